@@ -1,0 +1,82 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How the runtime path is compiled: by numba where it is installed, else not at all.
+
+The functions are plain Python either way and give the same bits: no fast-math flag is set,
+so the compiler may neither reorder a sum nor fuse a product into it, and a sample computed
+in a vector lane equals the same sample computed alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import hashlib
+import os
+from pathlib import Path
+from typing import Any, cast, TypeVar
+
+__all__ = ['COMPILED', 'UNCOMPILED_COST', 'compiled', 'entry_point', 'inlined',
+           'source_digest']
+
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+try:
+    import numba
+except ImportError:
+    COMPILED = False
+
+    def inlined(function: Function) -> Function:
+        """Return the function as it is: there is no compiler."""
+        return function
+
+    compiled = entry_point = inlined
+else:
+    COMPILED = os.environ.get('NUMBA_DISABLE_JIT', '0') in ('', '0')
+
+    def inlined(function: Function) -> Function:
+        """Compile a part of a loop's body; inlined, so that the loop becomes vector code."""
+        # error_model 'numpy': a division by zero gives inf or nan and no exception, which
+        # would be a branch that keeps the loop from becoming vector code.
+        return cast('Function', numba.njit(error_model='numpy', forceinline=True)(function))
+
+    def compiled(function: Function) -> Function:
+        """Compile a function that is called as one."""
+        return cast('Function', numba.njit(error_model='numpy', nogil=True)(function))
+
+    def entry_point(function: Function) -> Function:
+        """Compile what Python calls; its machine code is kept on disk for the next start."""
+        kept = numba.njit(error_model='numpy', nogil=True, cache=True)
+        return cast('Function', kept(function))
+
+
+
+def source_digest(*modules: str) -> str:
+    """
+    Return a digest of these modules' sources, which stand beside this one.
+
+    numba takes kept machine code for valid while the file of the entry point is unchanged,
+    whatever became of the files of the functions it calls. What an entry point closes over
+    is part of its key, so an entry point closes over this.
+    """
+    digest = hashlib.sha256()
+    for module in modules:
+        digest.update(Path(__file__).with_name(f'{module}.py').read_bytes())
+    return digest.hexdigest()
+
+
+UNCOMPILED_COST = (
+    'numba is not in use: the dynamics run uncompiled, with the same results but about a '
+    'thousand times slower (milliseconds for each setpoint); install it with pip install numba')

@@ -1,0 +1,349 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The parameters: one table of them, and the YAML that is read by it.
+
+The check, the node's declaration and the README's table all come from PARAMETERS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+import difflib
+import math
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from stewart_dynamics.errors import ParameterError
+
+NODE = 'stewart_dynamics'
+
+
+class Parameter(NamedTuple):
+    """
+    What is known of one parameter.
+
+    ``sizes`` are the lengths an array may have, none for a single value; a length of one or
+    six may also be given as a single value, for all legs. ``minimum`` and ``maximum`` hold
+    for every entry, ``minimum`` itself not where ``above`` is set.
+    """
+
+    name: str
+    type: str
+    text: str
+    unit: str = ''
+    default: Any = None
+    required: bool = False
+    sizes: tuple[int, ...] = ()
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    above: bool = False
+    choices: tuple[str, ...] = ()
+    while_active: bool = False
+
+    @property
+    def ros_type(self) -> str:
+        """The type's name in ROS, as the documents have it."""
+        if not self.sizes:
+            return self.type
+        return f'{self.type}[{" or ".join(map(str, self.sizes))}]'
+
+    @property
+    def rule(self) -> str:
+        """The values it may have, in words."""
+        if self.choices:
+            return 'one of ' + ', '.join(self.choices)
+        if self.minimum > -math.inf:
+            return f'{"more than" if self.above else "at least"} {self.minimum:g}'
+        return ''
+
+
+def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
+    return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
+
+
+PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
+    Parameter('base_frame', 'string', 'frame in which setpoints and wrenches are given',
+              default='base'),
+    Parameter('platform_frame', 'string', 'frame that moves with the platform',
+              default='platform'),
+    Parameter('joints', 'string', "the legs' names, in the order of all arrays of six",
+              default=tuple(f'leg_{n}' for n in range(1, 7)), sizes=(6,)),
+    Parameter('geometry.base_joints', 'double',
+              'x y z of the six base joints, one leg after the other, base frame', 'm',
+              required=True, sizes=(18,)),
+    Parameter('geometry.platform_joints', 'double',
+              'x y z of the six platform joints, in the same order, platform frame', 'm',
+              required=True, sizes=(18,)),
+    _legs('geometry.zero_length', 'length at which a leg\'s published position is zero', 'm'),
+    Parameter('platform.mass', 'double', 'mass of the platform with all that it carries', 'kg',
+              required=True, minimum=0.0, above=True, while_active=True),
+    Parameter('platform.center_of_mass', 'double', 'its center of mass, platform axes', 'm',
+              (0.0, 0.0, 0.0), sizes=(3,), while_active=True),
+    Parameter('platform.inertia', 'double',
+              'ixx ixy ixz iyy iyz izz about its center of mass, platform axes', 'kg m^2',
+              required=True, sizes=(6,), while_active=True),
+    _legs('legs.cylinder.mass', 'mass of a leg\'s lower part', 'kg', minimum=0.0),
+    _legs('legs.cylinder.center_of_mass', 'its distance from the base joint', 'm'),
+    _legs('legs.cylinder.inertia', 'transverse inertia about its center of mass', 'kg m^2',
+          minimum=0.0),
+    _legs('legs.piston.mass', 'mass of a leg\'s upper part', 'kg', minimum=0.0),
+    _legs('legs.piston.center_of_mass', 'its distance from the platform joint', 'm'),
+    _legs('legs.piston.inertia', 'transverse inertia about its center of mass', 'kg m^2',
+          minimum=0.0),
+    _legs('actuator.reflected_mass', 'inertia of rotor and screw, J (2 pi / lead)^2', 'kg',
+          minimum=0.0),
+    _legs('actuator.viscous_friction', 'friction force per rate of the leg', 'N s/m',
+          minimum=0.0),
+    _legs('actuator.coulomb_friction', 'dry friction; linear within 1 mm/s of standstill', 'N',
+          minimum=0.0),
+    Parameter('gravity', 'double', 'acceleration of free fall, base axes', 'm/s^2',
+              (0.0, 0.0, -9.80665), sizes=(3,)),
+    _legs('limits.length_min', 'shortest length of a leg; none: not checked', 'm', (),
+          minimum=0.0),
+    _legs('limits.length_max', 'longest length of a leg; none: not checked', 'm', (),
+          minimum=0.0, above=True),
+    _legs('limits.velocity_max', 'fastest rate of a leg; none: not checked', 'm/s', (),
+          minimum=0.0, above=True),
+    _legs('limits.force_max', 'largest force of a leg, to which forces are clipped; none: not '
+          'checked', 'N', (), minimum=0.0, above=True),
+    Parameter('singularity.characteristic_length', 'double',
+              'length that makes moments and forces alike in the condition number; by default '
+              'the mean distance of the platform joints from their center', 'm',
+              minimum=0.0, above=True),
+    Parameter('singularity.warn_condition', 'double',
+              'condition number of J_inv from which a singularity is near; the warning ends '
+              'below 0.8 of it', '', 50.0, minimum=1.0, while_active=True),
+    Parameter('singularity.stop_condition', 'double',
+              'condition number from which singularity.action is taken, until below 0.8 of it',
+              '', 500.0, minimum=1.0, while_active=True),
+    Parameter('singularity.warn_time', 'double',
+              'a crossing of det(J) = 0 foretold sooner than this is warned of', 's', 0.5,
+              minimum=0.0, while_active=True),
+    Parameter('singularity.action', 'string',
+              'what is done inside stop_condition: warn only, or publish no forces', '', 'warn',
+              choices=('warn', 'suppress_forces'), while_active=True),
+    Parameter('setpoint.source', 'string',
+              'three topics, one combined topic, or the pose alone (quasi-static: no motion '
+              'terms)', '', 'separate', choices=('separate', 'combined', 'pose')),
+    Parameter('setpoint.sync_tolerance', 'double',
+              'how far the stamps of one setpoint may lie apart', 's', 0.0, minimum=0.0),
+    Parameter('setpoint.timeout', 'double',
+              'silence after which setpoints are stale; a longer jump back in time is a '
+              'restart', 's', 0.1, minimum=0.0, above=True),
+    Parameter('setpoint.exclusive', 'bool',
+              'refuse setpoints while a topic has more than one writer', default=False),
+    Parameter('visualization_rate', 'double', 'most markers in a second; 0: none', 'Hz', 30.0,
+              minimum=0.0),
+    Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
+)})
+
+_PYTHON_TYPES = {'string': str, 'double': float, 'bool': bool}
+
+
+class Parameters(Mapping[str, Any]):
+    """
+    A whole, checked set of parameters under their dotted names; it never changes.
+
+    Arrays are read-only numpy arrays: joints (6, 3), whatever is given for each leg (6,),
+    limits that are not checked None. Raises ParameterError at the first rule broken.
+
+    Parameters
+    ----------
+    values : mapping of dotted name to value
+        As YAML or ROS gives them; what is missing takes its default.
+    source : str
+        Where they come from, for the text of an error.
+
+    """
+
+    def __init__(self, values: Mapping[str, Any], source: str = 'parameters') -> None:
+        for name in values:
+            if name not in PARAMETERS:
+                raise ParameterError(f'{source}: {name}: unknown parameter' + _nearest(name))
+        self._given = {name: values[name] for name in PARAMETERS if name in values}
+        self._values = {
+            name: _checked(parameter, values.get(name, parameter.default), source)
+            for name, parameter in PARAMETERS.items()}
+        self._check_together(source)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a parameter's value."""
+        return self._values[name]
+
+    def __iter__(self) -> Any:
+        """Return an iterator over the names."""
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        """Return how many parameters there are."""
+        return len(self._values)
+
+    def replaced(self, changes: Mapping[str, Any], source: str = 'parameters') -> Parameters:
+        """Return the parameters with these changed, checked as a whole again."""
+        return Parameters({**self._given, **changes}, source)
+
+    @classmethod
+    def from_yaml(cls, path: str | Path, node: str = NODE) -> Parameters:
+        """
+        Read a ROS parameter file, ``/**:`` or the node's name, then ``ros__parameters:``.
+
+        Raises ParameterError, naming file, parameter, value and rule.
+        """
+        return cls(read_yaml(path, node), str(path))
+
+    def _check_together(self, source: str) -> None:
+        """Check what one parameter demands of another."""
+        joints = self['joints']
+        if len(set(joints)) < 6 or '' in joints:
+            raise ParameterError(f'{source}: joints: {list(joints)}: six different names needed')
+        inertia = inertia_matrix(self['platform.inertia'])
+        moments = np.linalg.eigvalsh(inertia)
+        if moments[0] <= 0.0:
+            raise ParameterError(
+                f'{source}: platform.inertia: {self["platform.inertia"].tolist()}: must be '
+                f'positive definite, but its smallest principal moment is {moments[0]:.6g} '
+                'kg m^2 (the order is ixx ixy ixz iyy iyz izz)')
+        low, high = self['limits.length_min'], self['limits.length_max']
+        if low is not None and high is not None and np.any(low >= high):
+            raise ParameterError(
+                f'{source}: limits.length_min: {low.tolist()}: must be less than '
+                f'limits.length_max, {high.tolist()}')
+        warn, stop = self['singularity.warn_condition'], self['singularity.stop_condition']
+        if stop < warn:
+            raise ParameterError(
+                f'{source}: singularity.stop_condition: {stop}: must be at least '
+                f'singularity.warn_condition, {warn}')
+        if self['singularity.characteristic_length'] is None:
+            platform_joints = self['geometry.platform_joints']
+            size = float(np.mean(np.linalg.norm(
+                platform_joints - platform_joints.mean(axis=0), axis=1)))
+            if size == 0.0:
+                raise ParameterError(
+                    f'{source}: geometry.platform_joints: all six are one point: they must '
+                    'span the platform')
+            self._values['singularity.characteristic_length'] = size
+
+
+def inertia_matrix(six: Any) -> Any:
+    """Return the (3, 3) matrix of ixx ixy ixz iyy iyz izz."""
+    ixx, ixy, ixz, iyy, iyz, izz = six
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+def read_yaml(path: str | Path, node: str = NODE) -> dict[str, Any]:
+    """
+    Return the values that a ROS parameter file holds for a node, under dotted names.
+
+    Sections apply in the file's order, a later one over an earlier one, as in ROS.
+    """
+    try:
+        with Path(path).open(encoding='utf-8') as file:
+            document = YAML(typ='safe', pure=True).load(file)
+    except (OSError, UnicodeDecodeError) as exc:
+        reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
+        raise ParameterError(f'{path}: cannot be read: {reason}') from exc
+    except (YAMLError, ValueError, RecursionError) as exc:
+        raise ParameterError(f'{path}: not YAML: {" ".join(str(exc).split())}') from exc
+    if not isinstance(document, dict):
+        raise ParameterError(f"{path}: must begin with '/**:' or '{node}:'")
+    values: dict[str, Any] = {}
+    found = False
+    for section, content in document.items():
+        if str(section).strip('/') not in ('**', node):
+            continue
+        if not isinstance(content, dict) or 'ros__parameters' not in content:
+            raise ParameterError(f"{path}: {section}: must hold 'ros__parameters:'")
+        found = True
+        values.update(_flat(content['ros__parameters'] or {}, '', str(path)))
+    if not found:
+        raise ParameterError(
+            f"{path}: holds {', '.join(map(str, document))}, but neither '/**:' nor '{node}:'")
+    return values
+
+
+def _flat(tree: Any, prefix: str, source: str) -> Iterable[tuple[str, Any]]:
+    if not isinstance(tree, dict):
+        raise ParameterError(f'{source}: {prefix or "ros__parameters"}: {tree!r}: must hold '
+                             'names and values')
+    for key, value in tree.items():
+        name = f'{prefix}{key}'
+        if isinstance(value, dict):
+            yield from _flat(value, f'{name}.', source)
+        else:
+            yield name, value
+
+
+def _nearest(name: str) -> str:
+    near = difflib.get_close_matches(name, PARAMETERS, n=1)
+    return f'; do you mean {near[0]}?' if near else ''
+
+
+def _checked(parameter: Parameter, value: Any, source: str) -> Any:
+    """Return the value as the package uses it, or raise ParameterError."""
+    if value is None:
+        if parameter.required:
+            raise ParameterError(f'{source}: {parameter.name}: missing, it has no default')
+        return None
+    if isinstance(value, np.ndarray) or hasattr(value, 'tolist'):
+        value = value.tolist()
+    is_array = isinstance(value, list | tuple)
+    entries = list(value) if is_array else [value]
+    if is_array and not parameter.sizes:
+        raise _broken(parameter, value, source, f'must be a single {parameter.type}')
+    if not is_array and parameter.sizes and 1 not in parameter.sizes:
+        raise _broken(parameter, value, source, f'must be an array of {parameter.sizes[0]}')
+    if not entries and parameter.default == ():
+        return None
+    if is_array and len(entries) not in parameter.sizes:
+        raise _broken(parameter, value, source, 'must have {} entries, has {}'.format(
+            ' or '.join(map(str, parameter.sizes)), len(entries)))
+    for entry in entries:
+        _check_entry(parameter, entry, source)
+    if parameter.type != 'double':
+        return tuple(entries) if parameter.sizes else entries[0]
+    if not parameter.sizes:
+        return entries[0]
+    array = np.array(entries * 6 if len(entries) == 1 else entries)
+    array = array.reshape(6, 3) if len(array) == 18 else array
+    array.setflags(write=False)
+    return array
+
+
+def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
+    given = type(entry)
+    if given is not _PYTHON_TYPES[parameter.type]:
+        if parameter.type == 'double' and given is int:
+            raise _broken(parameter, entry, source,
+                          f'is an integer, must be a double: write {entry}.0')
+        raise _broken(parameter, entry, source, f'must be a {parameter.type}')
+    if parameter.choices and entry not in parameter.choices:
+        raise _broken(parameter, entry, source, f'must be {parameter.rule}')
+    if parameter.type == 'double':
+        if not math.isfinite(entry):
+            raise _broken(parameter, entry, source, 'must be finite')
+        if entry < parameter.minimum or (parameter.above and entry == parameter.minimum):
+            raise _broken(parameter, entry, source, f'must be {parameter.rule}')
+
+
+def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> ParameterError:
+    unit = f' {parameter.unit}' if parameter.unit and isinstance(value, float) else ''
+    shown = f'{value!r}' if len(f'{value!r}') < 80 else f'{value!r:.77}...'
+    return ParameterError(f'{source}: {parameter.name}: {shown}{unit}: {rule}')

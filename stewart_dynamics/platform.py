@@ -1,0 +1,235 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A Gough-Stewart platform: what the library's user calls."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stewart_dynamics import inverse_dynamics as runtime
+from stewart_dynamics import lagrange
+from stewart_dynamics.compiled import COMPILED
+from stewart_dynamics.errors import MotionError, SingularityError
+from stewart_dynamics.motion import Motion
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.singularity import time_to_crossing, UNSOLVABLE_CONDITION
+
+Array = NDArray[np.float64]
+
+# A thread gets no fewer samples than this: a millisecond's work, far more than starting it costs.
+_SAMPLES_FOR_A_THREAD = 4096
+_CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
+
+
+class InverseDynamics(NamedTuple):
+    """What the six legs do in a motion; (...) is the motion's leading shape."""
+
+    lengths: Array
+    """Lengths (..., 6) [m]."""
+    rates: Array
+    """Their time derivatives (..., 6) [m/s], + extends."""
+    forces: Array
+    """Forces of the actuators (..., 6) [N], + pushes."""
+    unit_load_forces: Array
+    """
+    Largest force of each leg under a unit load on the platform (..., 6).
+
+    The load is any force F and moment M with |F|^2 + |M / l|^2 = 1, l the characteristic length.
+    """
+    determinant: Array
+    """det(J) := det(J_inv), (...) [m^3]."""
+    determinant_rate: Array
+    """d(det(J))/dt, (...) [m^3/s]."""
+    condition_number: Array
+    """
+    Ratio of the largest to the smallest singular value of J_inv, (...), at least 1.
+
+    The right three columns of J_inv are divided by the characteristic length first.
+    """
+
+    @property
+    def time_to_crossing(self) -> Array:
+        """Time after which det(J) is zero if it goes on as it does, (...) [s]; inf: never."""
+        return time_to_crossing(self.determinant, self.determinant_rate)
+
+
+class StewartPlatform:
+    """
+    A machine with given parameters, and the mechanics of it.
+
+    All poses are of the platform frame in the base frame, all vectors in base axes, all units
+    SI. Every call takes one sample or any leading shape of samples.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self._machine = _machine_numbers(parameters)
+        self._no_wrench = np.zeros((1, runtime.WRENCH))
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> StewartPlatform:
+        """Return the machine of a parameter file; ParameterError says what is wrong in it."""
+        return cls(Parameters.from_yaml(path))
+
+    def inverse_dynamics(
+            self, motion: Motion, wrench: ArrayLike | None = None) -> InverseDynamics:
+        """
+        Return leg lengths, rates and forces of a motion, and how near a singularity it is.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of any leading shape (...).
+        wrench : (..., 6), optional
+            Force [N] and moment [N m] that the surroundings put on the platform at its
+            origin, base axes; broadcasts against the motion. None by default.
+
+        Raises
+        ------
+        MotionError
+            The wrench does not fit the motion or is not finite, or numbers overflow.
+        SingularityError
+            J_inv cannot be solved in a sample: it names the sample.
+
+        """
+        rows = motion.rows.reshape(-1, runtime.MOTION)
+        results = self.solve(rows, self._wrench_rows(motion, wrench))
+        for row in results[~np.isfinite(results).all(axis=-1)]:
+            raise MotionError(f'a sample is out of range: its leg lengths would be {row[:6]} m')
+        condition = results[:, runtime.CONDITION]
+        if np.any(condition >= UNSOLVABLE_CONDITION):
+            at = int(np.argmax(condition >= UNSOLVABLE_CONDITION))
+            raise SingularityError(
+                f'sample {at}: J_inv cannot be solved: its condition number is '
+                f'{condition[at]:.3g}, must be under {UNSOLVABLE_CONDITION:g}; position '
+                f'{rows[at, :3].tolist()} m')
+        return self._named(results.reshape(*motion.shape, runtime.RESULT))
+
+    def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
+        """
+        Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
+
+        This is the runtime path itself, laid out as ``inverse_dynamics`` (the module) says;
+        large batches use all processors.
+        """
+        if wrenches is None:
+            wrenches = self._no_wrench
+        results = np.empty((len(rows), runtime.RESULT))
+        threads = min(_CPUS, len(rows) // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+        if threads < 2:
+            runtime.solve(self._machine, rows, wrenches, results)
+            return results
+        edges = np.linspace(0, len(rows), threads + 1).astype(int)
+
+        def part(first: int, end: int) -> None:
+            runtime.solve(self._machine, rows[first:end],
+                          wrenches if len(wrenches) == 1 else wrenches[first:end],
+                          results[first:end])
+
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(part, edges[:-1], edges[1:]))
+        return results
+
+    def inverse_kinematics(self, position: ArrayLike, rotation: ArrayLike) -> Array:
+        """Return the six leg lengths at a pose, (..., 6) [m]; MotionError for what is none."""
+        motion = Motion(position, rotation)
+        results = self.solve(motion.rows.reshape(-1, runtime.MOTION))
+        lengths = results[:, runtime.LENGTHS:runtime.LENGTHS + 6]
+        return lengths.reshape(*motion.shape, 6).copy()
+
+    def jacobian(self, position: ArrayLike, rotation: ArrayLike) -> Array:
+        """Return J_inv (..., 6, 6): leg rates = J_inv [v; w], J_inv^T forces = wrench."""
+        return lagrange.jacobian(self._legs(Motion(position, rotation)))
+
+    def jacobian_rate(self, motion: Motion) -> Array:
+        """Return dJ_inv/dt (..., 6, 6) in a motion."""
+        return lagrange.jacobian_rate(
+            self._legs(motion), motion.linear_velocity, motion.angular_velocity)
+
+    def mass_matrix(self, position: ArrayLike, rotation: ArrayLike) -> Array:
+        """
+        Return M (..., 6, 6) of M X'' + C X' + G = J_inv^T f + wrench, with X' = [v; w].
+
+        Platform, both parts of each leg, and the actuators' reflected mass.
+        """
+        motion = Motion(position, rotation)
+        return lagrange.mass_matrix(self.parameters, motion.position, motion.rotation)
+
+    def coriolis_matrix(
+            self, position: ArrayLike, rotation: ArrayLike, linear_velocity: ArrayLike,
+            angular_velocity: ArrayLike, christoffel: bool = False) -> Array:
+        """
+        Return C (..., 6, 6); without friction.
+
+        C X' is the same either way. The paper's C has X'^T (M' - 2 C) X' = 0; with
+        ``christoffel``, M' - 2 C is skew itself, which passivity-based controllers need.
+        """
+        motion = Motion(position, rotation, linear_velocity, angular_velocity)
+        return lagrange.coriolis_matrix(
+            self.parameters, motion.position, motion.rotation, motion.linear_velocity,
+            motion.angular_velocity, christoffel)
+
+    def gravity_vector(self, position: ArrayLike, rotation: ArrayLike) -> Array:
+        """Return G (..., 6) [N, N m]: the wrench that holds the machine at rest."""
+        motion = Motion(position, rotation)
+        return lagrange.gravity_vector(self.parameters, motion.position, motion.rotation)
+
+    def _legs(self, motion: Motion) -> lagrange.Legs:
+        return lagrange.legs(self.parameters, motion.position, motion.rotation)
+
+    def _wrench_rows(self, motion: Motion, wrench: ArrayLike | None) -> Array:
+        if wrench is None:
+            return self._no_wrench
+        try:
+            rows = np.array(np.broadcast_to(
+                np.asarray(wrench, dtype=float), (*motion.shape, runtime.WRENCH)))
+        except (TypeError, ValueError) as exc:
+            raise MotionError(f'wrench: shape {np.shape(wrench)}: must broadcast to '
+                              f'{(*motion.shape, runtime.WRENCH)}') from exc
+        if not np.all(np.isfinite(rows)):
+            raise MotionError('wrench: must be finite')
+        return rows.reshape(-1, runtime.WRENCH)
+
+    @staticmethod
+    def _named(results: Array) -> InverseDynamics:
+        return InverseDynamics(
+            results[..., runtime.LENGTHS:runtime.LENGTHS + 6],
+            results[..., runtime.RATES:runtime.RATES + 6],
+            results[..., runtime.FORCES:runtime.FORCES + 6],
+            results[..., runtime.UNIT_LOAD_FORCES:runtime.UNIT_LOAD_FORCES + 6],
+            # [()] makes a number of an array without a shape
+            results[..., runtime.DETERMINANT][()], results[..., runtime.DETERMINANT_RATE][()],
+            results[..., runtime.CONDITION][()])
+
+
+def _machine_numbers(p: Parameters) -> Array:
+    """Return the machine's numbers in the order of the runtime path."""
+    cylinder_mass, cylinder_com = p['legs.cylinder.mass'], p['legs.cylinder.center_of_mass']
+    legs = np.column_stack([
+        p['geometry.base_joints'], p['geometry.platform_joints'],
+        p['legs.piston.mass'], p['legs.piston.center_of_mass'],
+        cylinder_mass * cylinder_com,
+        cylinder_mass * cylinder_com ** 2 + p['legs.cylinder.inertia'] + p['legs.piston.inertia'],
+        p['actuator.reflected_mass'], p['actuator.viscous_friction'],
+        p['actuator.coulomb_friction']])
+    return np.concatenate([
+        p['gravity'], [p['singularity.characteristic_length'], p['platform.mass']],
+        p['platform.center_of_mass'], p['platform.inertia'], legs.ravel()])

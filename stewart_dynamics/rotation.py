@@ -1,0 +1,91 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rotations: from Euler angles with exact rates, and from quaternions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def from_euler(angles: ArrayLike) -> Array:
+    """
+    Return R = Rz(gamma) Ry(beta) Rx(alpha) of angles (..., 3) [rad], the paper's r_11 .. r_33.
+
+    R (..., 3, 3) turns platform axes into base axes.
+    """
+    alpha, beta, gamma = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
+    ca, sa, cb, sb, cg, sg = (np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta),
+                              np.cos(gamma), np.sin(gamma))
+    return _matrix([
+        [cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa],
+        [sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa],
+        [-sb, cb * sa, cb * ca]])
+
+
+def euler_rate_matrix(angles: ArrayLike) -> Array:
+    """
+    Return E (..., 3, 3) with angular velocity = E [alpha', beta', gamma'], base axes.
+
+    The paper takes E for the identity, which holds at zero angles only. See Diebel,
+    Representing Attitude, Stanford, 2006, 5.3.
+    """
+    _, beta, gamma = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
+    cb, sb, cg, sg = np.cos(beta), np.sin(beta), np.cos(gamma), np.sin(gamma)
+    zero, one = np.zeros_like(cb), np.ones_like(cb)
+    return _matrix([[cg * cb, -sg, zero], [sg * cb, cg, zero], [-sb, zero, one]])
+
+
+def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
+    """Return dE/dt (..., 3, 3): angular acceleration = E angles'' + E' angles'."""
+    _, beta, gamma = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
+    _, db, dg = np.moveaxis(np.asarray(rates, dtype=float), -1, 0)
+    cb, sb, cg, sg = np.cos(beta), np.sin(beta), np.cos(gamma), np.sin(gamma)
+    zero = np.zeros_like(cb * db)
+    return _matrix([
+        [-sg * cb * dg - cg * sb * db, -cg * dg, zero],
+        [cg * cb * dg - sg * sb * db, -sg * dg, zero],
+        [-cb * db, zero, zero]])
+
+
+def to_quaternion(rotation: ArrayLike) -> Array:
+    """
+    Return unit quaternions x y z w (..., 4) of rotation matrices (..., 3, 3), w >= 0.
+
+    Each takes the largest of its four numbers from the diagonal (Shepperd,
+    J. Guidance and Control 1(3), 1978, doi:10.2514/3.55767b), so that none is lost in rounding.
+    """
+    r = np.asarray(rotation, dtype=float)
+    r00, r11, r22 = r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]
+    squares = np.stack([1 + r00 - r11 - r22, 1 - r00 + r11 - r22, 1 - r00 - r11 + r22,
+                        1 + r00 + r11 + r22], axis=-1)
+    xy, xz, yz = (r[..., 0, 1] + r[..., 1, 0], r[..., 0, 2] + r[..., 2, 0],
+                  r[..., 1, 2] + r[..., 2, 1])
+    xw, yw, zw = (r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0],
+                  r[..., 1, 0] - r[..., 0, 1])
+    candidates = _matrix([
+        [squares[..., 0], xy, xz, xw], [xy, squares[..., 1], yz, yw],
+        [xz, yz, squares[..., 2], zw], [xw, yw, zw, squares[..., 3]]])
+    best = np.argmax(squares, axis=-1)[..., None, None]
+    q = np.take_along_axis(candidates, best, axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    unit: Array = np.where(q[..., 3:] < 0.0, -q, q)
+    return unit
+
+
+def _matrix(rows: list[list[Array]]) -> Array:
+    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
