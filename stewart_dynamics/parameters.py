@@ -20,12 +20,12 @@ The check, the node's declaration and the README's table all come from PARAMETER
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 import difflib
 import math
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -33,7 +33,8 @@ from ruamel.yaml.error import YAMLError
 
 from stewart_dynamics.errors import ParameterError
 
-NODE = 'stewart_dynamics'
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 class Parameter(NamedTuple):
@@ -158,7 +159,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
 _PYTHON_TYPES = {'string': str, 'double': float, 'bool': bool}
 
 
-class Parameters(Mapping[str, Any]):
+class ParameterSet(Mapping[str, Any]):
     """
     A whole, checked set of parameters under their dotted names; it never changes.
 
@@ -174,21 +175,26 @@ class Parameters(Mapping[str, Any]):
 
     """
 
+    table: ClassVar[Mapping[str, Parameter]]
+    node: ClassVar[str]
+
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters') -> None:
         for name in values:
-            if name not in PARAMETERS:
-                raise ParameterError(f'{source}: {name}: unknown parameter' + _nearest(name))
-        self._given = {name: values[name] for name in PARAMETERS if name in values}
+            if name not in self.table:
+                near = difflib.get_close_matches(name, self.table, n=1)
+                raise ParameterError(f'{source}: {name}: unknown parameter'
+                                     + (f'; do you mean {near[0]}?' if near else ''))
+        self.given: Mapping[str, Any] = MappingProxyType(dict(values))
         self._values = {
             name: _checked(parameter, values.get(name, parameter.default), source)
-            for name, parameter in PARAMETERS.items()}
+            for name, parameter in self.table.items()}
         self._check_together(source)
 
     def __getitem__(self, name: str) -> Any:
         """Return a parameter's value."""
         return self._values[name]
 
-    def __iter__(self) -> Any:
+    def __iter__(self) -> Iterator[str]:
         """Return an iterator over the names."""
         return iter(self._values)
 
@@ -196,18 +202,28 @@ class Parameters(Mapping[str, Any]):
         """Return how many parameters there are."""
         return len(self._values)
 
-    def replaced(self, changes: Mapping[str, Any], source: str = 'parameters') -> Parameters:
+    def replaced(self, changes: Mapping[str, Any], source: str = 'parameters') -> Self:
         """Return the parameters with these changed, checked as a whole again."""
-        return Parameters({**self._given, **changes}, source)
+        return type(self)({**self.given, **changes}, source)
 
     @classmethod
-    def from_yaml(cls, path: str | Path, node: str = NODE) -> Parameters:
+    def from_yaml(cls, path: str | Path) -> Self:
         """
         Read a ROS parameter file, ``/**:`` or the node's name, then ``ros__parameters:``.
 
         Raises ParameterError, naming file, parameter, value and rule.
         """
-        return cls(read_yaml(path, node), str(path))
+        return cls(read_yaml(path, cls.node), str(path))
+
+    def _check_together(self, source: str) -> None:
+        """Check what one parameter demands of another."""
+
+
+class Parameters(ParameterSet):
+    """The parameters of a machine and of the node that computes for it."""
+
+    table = PARAMETERS
+    node = 'stewart_dynamics'
 
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""
@@ -248,7 +264,7 @@ def inertia_matrix(six: Any) -> Any:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
-def read_yaml(path: str | Path, node: str = NODE) -> dict[str, Any]:
+def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
     """
     Return the values that a ROS parameter file holds for a node, under dotted names.
 
@@ -289,11 +305,6 @@ def _flat(tree: Any, prefix: str, source: str) -> Iterable[tuple[str, Any]]:
             yield from _flat(value, f'{name}.', source)
         else:
             yield name, value
-
-
-def _nearest(name: str) -> str:
-    near = difflib.get_close_matches(name, PARAMETERS, n=1)
-    return f'; do you mean {near[0]}?' if near else ''
 
 
 def _checked(parameter: Parameter, value: Any, source: str) -> Any:
