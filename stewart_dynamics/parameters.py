@@ -270,16 +270,7 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
 
     Sections apply in the file's order, a later one over an earlier one, as in ROS.
     """
-    try:
-        with Path(path).open(encoding='utf-8') as file:
-            document = YAML(typ='safe', pure=True).load(file)
-    except (OSError, UnicodeDecodeError) as exc:
-        reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
-        raise ParameterError(f'{path}: cannot be read: {reason}') from exc
-    except (YAMLError, ValueError, RecursionError) as exc:
-        raise ParameterError(f'{path}: not YAML: {" ".join(str(exc).split())}') from exc
-    if not isinstance(document, dict):
-        raise ParameterError(f"{path}: must begin with '/**:' or '{node}:'")
+    document = read_document(path)
     values: dict[str, Any] = {}
     found = False
     for section, content in document.items():
@@ -293,6 +284,21 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
         raise ParameterError(
             f"{path}: holds {', '.join(map(str, document))}, but neither '/**:' nor '{node}:'")
     return values
+
+
+def read_document(path: str | Path) -> dict[Any, Any]:
+    """Return what a YAML file holds, a mapping; ParameterError says why it cannot be read."""
+    try:
+        with Path(path).open(encoding='utf-8') as file:
+            document = YAML(typ='safe', pure=True).load(file)
+    except (OSError, UnicodeDecodeError) as exc:
+        reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
+        raise ParameterError(f'{path}: cannot be read: {reason}') from exc
+    except (YAMLError, ValueError, RecursionError) as exc:
+        raise ParameterError(f'{path}: not YAML: {" ".join(str(exc).split())}') from exc
+    if not isinstance(document, dict):
+        raise ParameterError(f"{path}: must begin with '/**:' or a node's name")
+    return document
 
 
 def _flat(tree: Any, prefix: str, source: str) -> Iterable[tuple[str, Any]]:

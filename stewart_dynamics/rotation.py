@@ -62,6 +62,18 @@ def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
         [-cb * db, zero, zero]])
 
 
+def from_quaternion(
+        x: float, y: float, z: float, w: float,
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return the nine numbers of R, row by row, of a unit quaternion."""
+    xx, yy, zz = x * x, y * y, z * z
+    xy, xz, yz = x * y, x * z, y * z
+    wx, wy, wz = w * x, w * y, w * z
+    return (1.0 - 2.0 * (yy + zz), 2.0 * (xy - wz), 2.0 * (xz + wy),
+            2.0 * (xy + wz), 1.0 - 2.0 * (xx + zz), 2.0 * (yz - wx),
+            2.0 * (xz - wy), 2.0 * (yz + wx), 1.0 - 2.0 * (xx + yy))
+
+
 def to_quaternion(rotation: ArrayLike) -> Array:
     """
     Return unit quaternions x y z w (..., 4) of rotation matrices (..., 3, 3), w >= 0.

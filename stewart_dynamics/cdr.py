@@ -1,0 +1,204 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The messages of the hot path as bytes: setpoints in, outputs out.
+
+ROS 2 sends messages as XCDR1 ("plain CDR"): four bytes that tell the byte order, then the
+fields, each aligned to its own size (OMG DDS-XTypes 1.3, 7.4.3). Reading and writing these
+few layouts here costs a tenth of what rclpy's typed messages cost, needs no ROS, and is what
+node and replay have in common: the same bytes in, the same bytes out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from struct import error as StructError
+from struct import Struct
+from typing import NamedTuple
+
+LITTLE_ENDIAN = b'\x00\x01\x00\x00'
+
+_TIME_AND_LENGTH = {0: Struct('>iII'), 1: Struct('<iII')}
+_SIX = {0: Struct('>6d'), 1: Struct('<6d')}
+_SEVEN = {0: Struct('>7d'), 1: Struct('<7d')}
+_COUNT = {0: Struct('>I'), 1: Struct('<I')}
+
+
+class MalformedError(ValueError):
+    """Bytes that are no message of the type they are taken for."""
+
+
+class Stamped(NamedTuple):
+    """A message with a header: its stamp, its frame and its numbers."""
+
+    stamp: int
+    """[ns]"""
+    frame: bytes
+    values: tuple[float, ...]
+
+
+def _aligned8(offset: int) -> int:
+    """Return the next offset at which a double may stand; the first stands at 4."""
+    return (offset + 3 & ~7) + 4
+
+
+def _stamped(data: bytes, numbers: dict[int, Struct]) -> Stamped:
+    try:
+        order = data[1]
+        sec, nanosec, size = _TIME_AND_LENGTH[order].unpack_from(data, 4)
+        end = 16 + size
+        values = numbers[order].unpack_from(data, _aligned8(end))
+    except (IndexError, KeyError, StructError) as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    return Stamped(_nanoseconds(data, sec, nanosec), _text(data, 16, size), values)
+
+
+def _nanoseconds(data: bytes, sec: int, nanosec: int) -> int:
+    if data[0] != 0:
+        raise MalformedError(f'encapsulation {data[:2].hex()} is not plain CDR')
+    if nanosec >= 1_000_000_000:
+        raise MalformedError(f'stamp of {nanosec} ns: must be under 1000000000')
+    return int(sec) * 1_000_000_000 + int(nanosec)
+
+
+def _text(data: bytes, start: int, size: int) -> bytes:
+    if size == 0:
+        return b''
+    if start + size > len(data) or data[start + size - 1] != 0:
+        raise MalformedError('a string does not end in a zero byte')
+    return data[start:start + size - 1]
+
+
+def pose(data: bytes) -> Stamped:
+    """Read a geometry_msgs/PoseStamped: x y z and the quaternion's x y z w."""
+    return _stamped(data, _SEVEN)
+
+
+def twist(data: bytes) -> Stamped:
+    """Read a geometry_msgs/TwistStamped or AccelStamped: linear and angular x y z."""
+    return _stamped(data, _SIX)
+
+
+def wrench(data: bytes) -> Stamped:
+    """Read a geometry_msgs/WrenchStamped: force and torque x y z."""
+    return _stamped(data, _SIX)
+
+
+def combined(data: bytes) -> Stamped:
+    """
+    Read a trajectory_msgs/MultiDOFJointTrajectory of one point and one joint.
+
+    The 19 values are position, quaternion x y z w, twist and acceleration.
+    """
+    try:
+        order = data[1]
+        sec, nanosec, size = _TIME_AND_LENGTH[order].unpack_from(data, 4)
+        count = _COUNT[order]
+        frame = _text(data, 16, size)
+        names, at = _sequence(data, 16 + size, count)
+        for _ in range(names):
+            length, at = _sequence(data, at, count)
+            at += length
+        points, at = _sequence(data, at, count)
+        if points != 1:
+            raise MalformedError(f'{points} points: a setpoint has one')
+        values: tuple[float, ...] = ()
+        for name, layout in (('transforms', _SEVEN), ('velocities', _SIX),
+                             ('accelerations', _SIX)):
+            number, at = _sequence(data, at, count)
+            if number != 1:
+                raise MalformedError(f'{number} {name}: a setpoint has one')
+            at = _aligned8(at)
+            values += layout[order].unpack_from(data, at)
+            at += layout[order].size
+    except (IndexError, KeyError, StructError) as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    return Stamped(_nanoseconds(data, sec, nanosec), frame, values)
+
+
+def _sequence(data: bytes, at: int, count: Struct) -> tuple[int, int]:
+    """Return a sequence's length, and where its first entry begins."""
+    at = at + 3 & ~3
+    number = count.unpack_from(data, at)[0]
+    if number > len(data):
+        raise MalformedError(f'a sequence of {number} in {len(data)} bytes')
+    return number, at + 4
+
+
+_FLOAT64 = Struct('<4sd')
+_BOOL = Struct('<4s?')
+# an empty layout's two numbers, the number of entries, and what aligns them
+_FLOAT64_ARRAY = Struct('<4sIII4x6d')
+
+
+def float64(value: float) -> bytes:
+    """Write a std_msgs/Float64."""
+    return _FLOAT64.pack(LITTLE_ENDIAN, value)
+
+
+def boolean(value: bool) -> bytes:
+    """Write a std_msgs/Bool."""
+    return _BOOL.pack(LITTLE_ENDIAN, value)
+
+
+def float64_array(values: Sequence[float]) -> bytes:
+    """Write six numbers as a std_msgs/Float64MultiArray without a layout."""
+    return _FLOAT64_ARRAY.pack(LITTLE_ENDIAN, 0, 0, 6, *values)
+
+
+class JointState:
+    """
+    Writes sensor_msgs/JointState of six joints with these names; frame_id is empty.
+
+    All but stamp and numbers is the same in every message and made once.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        head = '<4siII1s'  # encapsulation, stamp, the empty frame_id and its zero byte
+        constant: list[object] = [1, b'\x00']
+        size = 13
+        for text in [None, *names]:
+            head += f'{-size % 4}x'
+            size += -size % 4
+            if text is None:
+                head, size = head + 'I', size + 4
+                constant.append(6)
+            else:
+                encoded = text.encode() + b'\x00'
+                head, size = head + f'I{len(encoded)}s', size + 4 + len(encoded)
+                constant += [len(encoded), encoded]
+        first = f'{-size % 4}xI'
+        size += -size % 4 + 4
+        doubles = f'{-size % 8}x6d'
+        # Each later count stands where doubles end, so that four bytes align what follows.
+        self._whole = Struct(f'{head}{first}{doubles}I4x6dI4x6d')
+        self._without_effort = Struct(f'{head}{first}{doubles}I4x6dI')
+        self._constant = tuple(constant)
+
+    def write(self, stamp: int, position: Sequence[float], velocity: Sequence[float],
+              effort: Sequence[float] | None) -> bytes:
+        """Return the message; its effort is empty where there is none."""
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        if effort is None:
+            return self._without_effort.pack(
+                LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position, 6, *velocity, 0)
+        return self._whole.pack(LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position,
+                                6, *velocity, 6, *effort)
+
+
+def finite(values: Sequence[float]) -> bool:
+    """Return whether all numbers are finite."""
+    return all(map(math.isfinite, values))

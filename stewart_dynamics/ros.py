@@ -1,0 +1,128 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the executables that are ROS nodes share: parameters, spinning, exit codes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import sys
+
+from rcl_interfaces.msg import ParameterDescriptor
+import rclpy
+from rclpy.exceptions import ROSInterruptException
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.task import Future
+
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.parameters import Parameter, ParameterSet, read_document
+
+# The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
+_SPIN_SECONDS = 10.0
+
+# What ROS itself declares in every node.
+_OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
+
+
+def is_ours(name: str) -> bool:
+    """Return whether a parameter of this name is not one that ROS itself declares."""
+    return not name.startswith(_OF_ROS)
+
+
+def parameter_files(arguments: Sequence[str]) -> list[str]:
+    """Return the parameter files that a command line names."""
+    return [value for option, value in zip(arguments, arguments[1:], strict=False)
+            if option == '--params-file']
+
+
+def declare_parameters(node: Node, kind: type[ParameterSet]) -> ParameterSet:
+    """
+    Return the node's parameters, checked, and declare all of the table.
+
+    The node must have been made with ``automatically_declare_parameters_from_overrides``.
+    Types are left to the table's own check, whose texts say more than ROS's. Raises
+    ParameterError, for an unknown name as well.
+    """
+    source = ', '.join(parameter_files(sys.argv)) or 'command line'
+    given = {name: parameter.value
+             for name, parameter in node.get_parameters_by_prefix('').items() if is_ours(name)}
+    parameters = kind(given, source)
+    for name, parameter in kind.table.items():
+        if node.has_parameter(name):
+            node.set_descriptor(name, _descriptor(parameter))
+        else:
+            default = parameter.default
+            if isinstance(default, tuple):
+                default = list(default) or None
+            node.declare_parameter(name, default, _descriptor(parameter))
+    return parameters
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    unit = f' [{parameter.unit}]' if parameter.unit else ''
+    return ParameterDescriptor(
+        description=parameter.text + unit, additional_constraints=parameter.rule,
+        dynamic_typing=True)
+
+
+def _executor() -> Executor:
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+    except ImportError:
+        get_logger('stewart_dynamics').warning(
+            'this rclpy has no events executor: the single-threaded one takes 2.5 times the '
+            'processor time')
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
+def run(make_node: Callable[[], Node], done: Future | None = None) -> int:
+    """
+    Make a node, spin it until it is told to stop, and return the exit code.
+
+    Parameters
+    ----------
+    make_node : callable
+        Called once ROS is up; a StewartError that it raises is said in one line, exit code 1.
+    done : Future, optional
+        When it is done, its result is the exit code.
+
+    """
+    stop = done or Future()
+    executor = node = None
+    try:
+        for path in parameter_files(sys.argv):
+            read_document(path)
+        rclpy.init()
+        node = make_node()
+        executor = _executor()
+        executor.add_node(node)
+        while rclpy.ok() and not stop.done():
+            executor.spin_until_future_complete(stop, _SPIN_SECONDS)
+        return int(stop.result() or 0) if stop.done() else 0
+    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+        return 0
+    except StewartError as exc:
+        print(f'{type(exc).__name__}: {exc}', file=sys.stderr)
+        return 1
+    finally:
+        # On this thread and before the end, else rclpy 7.1 crashes at exit.
+        if executor is not None:
+            executor.shutdown()
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()

@@ -1,0 +1,248 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From messages on the setpoint topics to joined setpoints; what is refused is counted.
+
+Node and replay feed it the same bytes in the same order, so both refuse and join alike.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+from stewart_dynamics import cdr
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.rotation import from_quaternion
+from stewart_dynamics.step import NO_WRENCH, Setpoint, Six
+
+# Of each topic under the node's name: type, how it is read.
+POSE = 'setpoint/pose'
+TWIST = 'setpoint/twist'
+ACCEL = 'setpoint/accel'
+COMBINED = 'setpoint/combined'
+WRENCH = 'wrench'
+INPUT_TYPES = {
+    POSE: 'geometry_msgs/msg/PoseStamped',
+    TWIST: 'geometry_msgs/msg/TwistStamped',
+    ACCEL: 'geometry_msgs/msg/AccelStamped',
+    COMBINED: 'trajectory_msgs/msg/MultiDOFJointTrajectory',
+    WRENCH: 'geometry_msgs/msg/WrenchStamped',
+}
+SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}
+_READERS: dict[str, Callable[[bytes], cdr.Stamped]] = {
+    POSE: cdr.pose, TWIST: cdr.twist, ACCEL: cdr.twist, COMBINED: cdr.combined,
+    WRENCH: cdr.wrench}
+
+# A quaternion's length may be this far from one; it is brought to one.
+QUATERNION_TOLERANCE = 1e-3
+# Samples of a topic that wait for those of the others; beyond it the oldest is given up.
+WAITING = 256
+
+_STANDSTILL = (0.0,) * 6
+
+
+class Refusal(NamedTuple):
+    """Why a message, or what became of it, is counted and not used."""
+
+    topic: str
+    reason: str
+
+
+MALFORMED = 'malformed'
+NOT_FINITE = 'not finite'
+NOT_UNIT = 'quaternion not of unit length'
+WRONG_FRAME = 'wrong frame_id'
+TOO_OLD = 'older than the last used'
+TWICE = 'same stamp twice'
+NOT_JOINED = 'passed over: not all topics had its stamp'
+OUT_OF_RANGE = 'out of range: the numbers overflow'
+NOT_EXCLUSIVE = 'more than one writer'
+
+
+class Setpoints:
+    """
+    Joins the topics' samples by stamp.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Which topics, frame, tolerance and timeout.
+    refused : callable
+        Told of each refusal and its details, beside the counting.
+    noticed : callable
+        Told what a user should hear once: a restart, stamps that are all zero.
+
+    """
+
+    def __init__(
+            self, parameters: Parameters, refused: Callable[[Refusal, str], None],
+            noticed: Callable[[str], None]) -> None:
+        self.topics = SOURCES[parameters['setpoint.source']]
+        self.counts: Counter[Refusal] = Counter()
+        self.wrench: Six = NO_WRENCH
+        self._frames = {b'', parameters['base_frame'].encode()}
+        self._tolerance = round(parameters['setpoint.sync_tolerance'] * 1e9)
+        self._timeout = round(parameters['setpoint.timeout'] * 1e9)
+        self._refused = refused
+        self._noticed = noticed
+        self._last: int | None = None
+        self._waiting: dict[str, dict[int, tuple[float, ...]]] = {t: {} for t in self.topics}
+        self._unstamped: dict[str, deque[tuple[float, ...]]] = {
+            t: deque(maxlen=WAITING) for t in self.topics}
+        self._unstamped_said = False
+
+    def take_wrench(self, data: bytes) -> None:
+        """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
+        sample = self._sound(WRENCH, data)
+        if sample is not None:
+            fx, fy, fz, tx, ty, tz = sample.values
+            self.wrench = fx, fy, fz, tx, ty, tz
+
+    def take(self, topic: str, data: bytes, now: int) -> Setpoint | None:
+        """
+        Return the setpoint that this message completes, if it does.
+
+        Parameters
+        ----------
+        topic : str
+            One of ``topics``.
+        data : bytes
+            The message as it came, CDR.
+        now : int
+            The clock [ns], for a setpoint whose own stamps are zero.
+
+        """
+        sample = self._sound(topic, data)
+        if sample is None:
+            return None
+        if sample.stamp == 0:
+            return self._join_unstamped(topic, sample.values, now)
+        if not self._in_time(topic, sample.stamp):
+            return None
+        waiting = self._waiting[topic]
+        waiting[sample.stamp] = sample.values
+        if len(waiting) > WAITING:
+            oldest = next(iter(waiting))
+            del waiting[oldest]
+            self._refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
+        return self._join(sample.stamp)
+
+    def refuse(self, topic: str, reason: str, details: str) -> None:
+        """Count what is not used for a reason that only the caller can know."""
+        self._refuse(topic, reason, details)
+
+    def _refuse(self, topic: str, reason: str, details: str) -> None:
+        refusal = Refusal(topic, reason)
+        self.counts[refusal] += 1
+        self._refused(refusal, details)
+
+    def _sound(self, topic: str, data: bytes) -> cdr.Stamped | None:
+        """Return the message, its quaternion in place of a rotation matrix, or refuse it."""
+        try:
+            sample = _READERS[topic](data)
+        except cdr.MalformedError as exc:
+            self._refuse(topic, MALFORMED, str(exc))
+            return None
+        values = sample.values
+        if sample.frame not in self._frames:
+            self._refuse(topic, WRONG_FRAME, f'{sample.frame.decode(errors="replace")!r}, must '
+                         f'be {max(self._frames).decode()!r} or empty')
+            return None
+        if not cdr.finite(values):
+            self._refuse(topic, NOT_FINITE, str(values))
+            return None
+        if topic is POSE or topic is COMBINED:
+            x, y, z, w = values[3:7]
+            length = math.hypot(x, y, z, w)
+            if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
+                self._refuse(topic, NOT_UNIT, f'length {length:.6g}, must be within '
+                             f'{QUATERNION_TOLERANCE:g} of 1')
+                return None
+            values = values[:3] + from_quaternion(
+                x / length, y / length, z / length, w / length) + values[7:]
+        return sample._replace(values=values)
+
+    def _in_time(self, topic: str, stamp: int) -> bool:
+        """Return whether a sample may still be used, or refuse it."""
+        if stamp in self._waiting[topic]:
+            self._refuse(topic, TWICE, f'stamp {stamp} ns')
+            return False
+        if self._last is None or not 0 <= self._last - stamp <= self._timeout:
+            return True
+        if stamp == self._last:
+            self._refuse(topic, TWICE, f'stamp {stamp} ns')
+        else:
+            self._refuse(topic, TOO_OLD, f'stamp {stamp} ns is {(self._last - stamp) / 1e9:g} s '
+                         f'older than the last used')
+        return False
+
+    def _join(self, stamp: int) -> Setpoint | None:
+        """Return the setpoint at a stamp if every topic has it."""
+        stamps = []
+        for topic in self.topics:
+            waiting = self._waiting[topic]
+            if stamp in waiting:
+                stamps.append(stamp)
+                continue
+            if not waiting or not self._tolerance:
+                return None
+            near = min(waiting, key=lambda other: abs(other - stamp))
+            if abs(near - stamp) > self._tolerance:
+                return None
+            stamps.append(near)
+        values = [self._waiting[topic].pop(at)
+                  for topic, at in zip(self.topics, stamps, strict=True)]
+        self._give_up(stamps[0])
+        self._last = stamps[0]
+        return Setpoint(stamps[0], self._motion(values))
+
+    def _give_up(self, stamp: int) -> None:
+        """Drop and count what waits and can no longer be used once this stamp is."""
+        last = self._last
+        restart = last is not None and last - stamp > self._timeout
+        if restart and last is not None:
+            self._noticed(f'stamps jumped back by {(last - stamp) / 1e9:g} s: followed as a '
+                          'restart')
+        for topic in self.topics:
+            waiting = self._waiting[topic]
+            if not waiting:
+                continue
+            for other in [other for other in waiting if other <= stamp or (
+                    restart and last is not None and other > last - self._timeout)]:
+                del waiting[other]
+                self._refuse(topic, NOT_JOINED, f'stamp {other} ns')
+
+    def _join_unstamped(
+            self, topic: str, values: tuple[float, ...], now: int) -> Setpoint | None:
+        """Join samples without a stamp in their order of arrival."""
+        if not self._unstamped_said:
+            self._unstamped_said = True
+            self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
+                          'of arrival and stamped with the clock')
+        queue = self._unstamped[topic]
+        if len(queue) == queue.maxlen:
+            self._refuse(topic, NOT_JOINED, 'stamp 0')
+        queue.append(values)
+        if not all(self._unstamped.values()):
+            return None
+        return Setpoint(now, self._motion([self._unstamped[t].popleft() for t in self.topics]))
+
+    def _motion(self, values: list[tuple[float, ...]]) -> tuple[float, ...]:
+        """Return a row of motion: what the topics give, and zeros for what they do not."""
+        motion = sum(values, ())
+        return motion + _STANDSTILL + _STANDSTILL if len(motion) == 12 else motion
