@@ -92,8 +92,9 @@ def sample_times(parameters: TrajectoryParameters) -> NDArray[np.int64]:
 
 def sample_time(parameters: TrajectoryParameters, index: ArrayLike) -> NDArray[np.int64]:
     """Return the times of samples by their index (...) [ns]; errors of rounding do not add up."""
-    times = np.rint(np.asarray(index) * 1e9 / parameters['rate'])
-    return times.astype(np.int64)
+    times: NDArray[np.int64] = np.rint(
+        np.asarray(index) * 1e9 / parameters['rate']).astype(np.int64)
+    return times
 
 
 def motion_at(parameters: TrajectoryParameters, times: ArrayLike) -> Motion:
@@ -121,7 +122,8 @@ def motion_at(parameters: TrajectoryParameters, times: ArrayLike) -> Motion:
     if kind == 'hold':
         return _euler_motion(np.broadcast_to(initial, (*time.shape, 6)), np.zeros(6), np.zeros(6))
     if kind == 'sine':
-        amplitude, omega = parameters['motion.amplitude'], 2 * np.pi * parameters['motion.frequency']
+        amplitude = parameters['motion.amplitude']
+        omega = 2.0 * np.pi * parameters['motion.frequency']
         angle = omega * time[..., None] + parameters['motion.phase']
         return _euler_motion(
             initial + amplitude * np.sin(angle), amplitude * omega * np.cos(angle),
