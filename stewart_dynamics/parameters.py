@@ -20,7 +20,7 @@ The check, the node's declaration and the README's table all come from PARAMETER
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 import difflib
 import math
 from pathlib import Path
@@ -42,8 +42,8 @@ class Parameter(NamedTuple):
     What is known of one parameter.
 
     ``sizes`` are the lengths an array may have, none for a single value; a length of one or
-    six may also be given as a single value, for all legs. ``minimum`` and ``maximum`` hold
-    for every entry, ``minimum`` itself not where ``above`` is set.
+    six may also be given as a single value, for all legs. ``minimum`` holds for
+    every entry, ``minimum`` itself not where ``above`` is set.
     """
 
     name: str
@@ -54,7 +54,6 @@ class Parameter(NamedTuple):
     required: bool = False
     sizes: tuple[int, ...] = ()
     minimum: float = -math.inf
-    maximum: float = math.inf
     above: bool = False
     choices: tuple[str, ...] = ()
     while_active: bool = False
@@ -131,10 +130,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               minimum=0.0, above=True),
     Parameter('singularity.warn_condition', 'double',
               'condition number of J_inv from which a singularity is near; the warning ends '
-              'below 0.8 of it', '', 50.0, minimum=1.0, while_active=True),
+              'below 0.8 of it', '', 20.0, minimum=1.0, while_active=True),
     Parameter('singularity.stop_condition', 'double',
               'condition number from which singularity.action is taken, until below 0.8 of it',
-              '', 500.0, minimum=1.0, while_active=True),
+              '', 100.0, minimum=1.0, while_active=True),
     Parameter('singularity.warn_time', 'double',
               'a crossing of det(J) = 0 foretold sooner than this is warned of', 's', 0.5,
               minimum=0.0, while_active=True),
@@ -180,10 +179,7 @@ class ParameterSet(Mapping[str, Any]):
 
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters') -> None:
         for name in values:
-            if name not in self.table:
-                near = difflib.get_close_matches(name, self.table, n=1)
-                raise ParameterError(f'{source}: {name}: unknown parameter'
-                                     + (f'; do you mean {near[0]}?' if near else ''))
+            self._declared(name, source)
         self.given: Mapping[str, Any] = MappingProxyType(dict(values))
         self._values = {
             name: _checked(parameter, values.get(name, parameter.default), source)
@@ -214,6 +210,20 @@ class ParameterSet(Mapping[str, Any]):
         Raises ParameterError, naming file, parameter, value and rule.
         """
         return cls(read_yaml(path, cls.node), str(path))
+
+    @classmethod
+    def check_file(cls, path: str | Path) -> None:
+        """Raise ParameterError if what a file gives a node breaks a rule; it need not be all."""
+        for name, value in _sections(path, cls.node):
+            _checked(cls._declared(name, str(path)), value, str(path))
+
+    @classmethod
+    def _declared(cls, name: str, source: str) -> Parameter:
+        if name not in cls.table:
+            near = difflib.get_close_matches(name, cls.table, n=1)
+            raise ParameterError(f'{source}: {name}: unknown parameter'
+                                 + (f'; do you mean {near[0]}?' if near else ''))
+        return cls.table[name]
 
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""
@@ -270,20 +280,22 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
 
     Sections apply in the file's order, a later one over an earlier one, as in ROS.
     """
-    document = read_document(path)
-    values: dict[str, Any] = {}
-    found = False
-    for section, content in document.items():
+    values = dict(_sections(path, node))
+    if not values:
+        raise ParameterError(
+            f"{path}: holds {', '.join(map(str, read_document(path)))}, but no parameters under "
+            f"'/**:' or '{node}:'")
+    return values
+
+
+def _sections(path: str | Path, node: str) -> Iterator[tuple[str, Any]]:
+    """Return the names and values that a file holds for a node, in the file's order."""
+    for section, content in read_document(path).items():
         if str(section).strip('/') not in ('**', node):
             continue
         if not isinstance(content, dict) or 'ros__parameters' not in content:
             raise ParameterError(f"{path}: {section}: must hold 'ros__parameters:'")
-        found = True
-        values.update(_flat(content['ros__parameters'] or {}, '', str(path)))
-    if not found:
-        raise ParameterError(
-            f"{path}: holds {', '.join(map(str, document))}, but neither '/**:' nor '{node}:'")
-    return values
+        yield from _flat(content['ros__parameters'] or {}, '', str(path))
 
 
 def read_document(path: str | Path) -> dict[Any, Any]:
@@ -301,7 +313,7 @@ def read_document(path: str | Path) -> dict[Any, Any]:
     return document
 
 
-def _flat(tree: Any, prefix: str, source: str) -> Iterable[tuple[str, Any]]:
+def _flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
     if not isinstance(tree, dict):
         raise ParameterError(f'{source}: {prefix or "ros__parameters"}: {tree!r}: must hold '
                              'names and values')

@@ -18,9 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import sys
+from typing import TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -29,10 +31,12 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.parameters import Parameter, ParameterSet, read_document
+from stewart_dynamics.parameters import Parameter, ParameterSet
 
 # The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
 _SPIN_SECONDS = 10.0
+
+Kind = TypeVar('Kind', bound=ParameterSet)
 
 # What ROS itself declares in every node.
 _OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
@@ -49,7 +53,7 @@ def parameter_files(arguments: Sequence[str]) -> list[str]:
             if option == '--params-file']
 
 
-def declare_parameters(node: Node, kind: type[ParameterSet]) -> ParameterSet:
+def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
@@ -90,7 +94,8 @@ def _executor() -> Executor:
     return EventsExecutor()
 
 
-def run(make_node: Callable[[], Node], done: Future | None = None) -> int:
+def run(make_node: Callable[[], Node], kind: type[ParameterSet],
+        done: Future | None = None) -> int:
     """
     Make a node, spin it until it is told to stop, and return the exit code.
 
@@ -98,6 +103,8 @@ def run(make_node: Callable[[], Node], done: Future | None = None) -> int:
     ----------
     make_node : callable
         Called once ROS is up; a StewartError that it raises is said in one line, exit code 1.
+    kind : type of ParameterSet
+        What the parameter files on the command line are checked by before ROS sees them.
     done : Future, optional
         When it is done, its result is the exit code.
 
@@ -106,7 +113,7 @@ def run(make_node: Callable[[], Node], done: Future | None = None) -> int:
     executor = node = None
     try:
         for path in parameter_files(sys.argv):
-            read_document(path)
+            kind.check_file(path)
         rclpy.init()
         node = make_node()
         executor = _executor()
@@ -116,8 +123,10 @@ def run(make_node: Callable[[], Node], done: Future | None = None) -> int:
         return int(stop.result() or 0) if stop.done() else 0
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         return 0
-    except StewartError as exc:
-        print(f'{type(exc).__name__}: {exc}', file=sys.stderr)
+    except (StewartError, RCLError, UnknownROSArgsError) as exc:
+        if node is not None and not rclpy.ok():
+            return 0  # cut short by a signal
+        print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
         return 1
     finally:
         # On this thread and before the end, else rclpy 7.1 crashes at exit.

@@ -1,0 +1,170 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Record the bags of this folder: what stewart_trajectory publishes, over real topics.
+
+``python bags/record.py`` records all of them anew, ``python bags/record.py clear`` one. The
+flawed one goes through a relay that spoils some of the messages on their way.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+import random
+import shutil
+import struct
+import subprocess
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
+
+HERE = Path(__file__).resolve().parent
+NODE = 'stewart_dynamics'
+TYPES = {'setpoint/pose': PoseStamped, 'setpoint/twist': TwistStamped,
+         'setpoint/accel': AccelStamped}
+QOS = QoSProfile(depth=1000)
+
+# Name of the bag, the motion, and whether it is spoiled.
+BAGS = {'singular': ('trajectory_singular.yaml', False), 'clear': ('trajectory_clear.yaml', False),
+        'flawed': ('trajectory_clear.yaml', True)}
+
+
+class Recorder(Node):
+    """Writes every setpoint message that comes, with the time when it came."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__('recorder')
+        self.messages = 0
+        self._writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._writer.open()
+        types = get_typestore(Stores.ROS2_JAZZY)
+        for topic, kind in TYPES.items():
+            connection = self._writer.add_connection(
+                f'/{NODE}/{topic}', f'geometry_msgs/msg/{kind.__name__}', typestore=types)
+            self.create_subscription(
+                kind, f'/{NODE}/{topic}', self._writes(connection), QOS, raw=True)
+
+    def _writes(self, connection: Any) -> Callable[[bytes], None]:
+        def write(data: bytes) -> None:
+            self.messages += 1
+            self._writer.write(connection, time.time_ns(), data)
+        return write
+
+    def close(self) -> None:
+        """Finish the bag."""
+        self._writer.close()
+
+
+class Spoiler(Node):
+    """
+    Passes on what /unspoiled/... brings, but for some messages, always the same ones.
+
+    One in a hundred each: dropped, doubled, held back until the next has passed, and the first
+    of its numbers made a NaN.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('spoiler')
+        self._random = random.Random(2018)
+        self._held: dict[str, bytes] = {}
+        for topic, kind in TYPES.items():
+            publisher = self.create_publisher(kind, f'/{NODE}/{topic}', QOS)
+            self.create_subscription(
+                kind, f'/unspoiled/{topic}', self._spoils(topic, publisher), QOS, raw=True)
+
+    def _spoils(self, topic: str, publisher: Any) -> Callable[[bytes], None]:
+        def spoil(data: bytes) -> None:
+            held = self._held.pop(topic, None)
+            fate = self._random.randrange(100)
+            if fate == 0:
+                pass
+            elif fate == 1:
+                publisher.publish(data)
+                publisher.publish(data)
+            elif fate == 2:
+                self._held[topic] = data
+            elif fate == 3:
+                # the doubles stand at the end: 7 of a pose, 6 of the others
+                first = len(data) - 8 * (7 if topic == 'setpoint/pose' else 6)
+                publisher.publish(data[:first] + struct.pack('<d', float('nan'))
+                                  + data[first + 8:])
+            else:
+                publisher.publish(data)
+            if held is not None:
+                publisher.publish(held)
+        return spoil
+
+
+def record(name: str) -> None:
+    """Record one bag in place of the one that is there."""
+    config, spoiled = BAGS[name]
+    partial, final = HERE / f'{name}.partial', HERE / name
+    shutil.rmtree(partial, ignore_errors=True)
+    recorder = Recorder(partial)
+    nodes: list[Any] = [recorder, *([Spoiler()] if spoiled else [])]
+    executor = rclpy.executors.SingleThreadedExecutor()
+    for node in nodes:
+        executor.add_node(node)
+    command = [Path(sys.executable).with_name('stewart_trajectory'), '--ros-args',
+               '--params-file', HERE.parent / 'config' / config, '-p', 'start_delay:=3.0']
+    if spoiled:
+        command += ['-p', 'target:=unspoiled']
+    with subprocess.Popen(command) as trajectory:
+        quiet_since = time.monotonic()
+        while trajectory.poll() is None or time.monotonic() - quiet_since < 1.0:
+            before = recorder.messages
+            executor.spin_once(timeout_sec=0.1)
+            if recorder.messages != before or trajectory.poll() is None:
+                quiet_since = time.monotonic()
+    if trajectory.returncode:
+        raise SystemExit(f'stewart_trajectory ended with exit code {trajectory.returncode}')
+    recorder.close()
+    for node in nodes:
+        executor.remove_node(node)
+        node.destroy_node()
+    executor.shutdown()
+    mcap = partial / f'{name}.mcap'
+    (partial / f'{name}.partial.mcap').rename(mcap)
+    metadata = partial / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace(f'{name}.partial.mcap', mcap.name))
+    shutil.rmtree(final, ignore_errors=True)
+    partial.rename(final)
+    print(f'{final.relative_to(HERE.parent)}: {recorder.messages} messages, '
+          f'{(final / mcap.name).stat().st_size} bytes')
+
+
+def main() -> None:
+    """Record the bags that the command line names, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('names', nargs='*', choices=[[], *BAGS], metavar='NAME',
+                        help=f'one of {", ".join(BAGS)} (default: all)')
+    names = parser.parse_args().names or list(BAGS)
+    rclpy.init()
+    for name in names:
+        record(name)
+    rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,312 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node: setpoints in, leg lengths, forces and the warning of a singularity out."""
+
+from __future__ import annotations
+
+from collections import deque
+from functools import partial
+import time
+import traceback
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+from rcl_interfaces.msg import SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Float64MultiArray
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from stewart_dynamics import setpoints as inputs
+from stewart_dynamics.compiled import COMPILED, UNCOMPILED_COST
+from stewart_dynamics.diagnostics import Diagnostics
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.ros import declare_parameters, is_ours, run
+from stewart_dynamics.setpoints import Refusal, Setpoints
+from stewart_dynamics.step import NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Step
+
+_TYPES: dict[str, Any] = {
+    'geometry_msgs/msg/PoseStamped': PoseStamped,
+    'geometry_msgs/msg/TwistStamped': TwistStamped,
+    'geometry_msgs/msg/AccelStamped': AccelStamped,
+    'geometry_msgs/msg/WrenchStamped': WrenchStamped,
+    'trajectory_msgs/msg/MultiDOFJointTrajectory': MultiDOFJointTrajectory,
+    'sensor_msgs/msg/JointState': JointState,
+    'std_msgs/msg/Float64MultiArray': Float64MultiArray,
+    'std_msgs/msg/Float64': Float64,
+    'std_msgs/msg/Bool': Bool,
+}
+
+# So many messages of a topic may wait in the middleware, so many joined setpoints here.
+# When more setpoints wait the node has fallen behind: only the newest is answered.
+_QUEUE = 1000
+_BACKLOG = 10
+
+_WATCH_SECONDS = 0.05
+_REPORT_SECONDS = 1.0
+_SAY_AGAIN_SECONDS = 5.0
+
+PASSED_OVER = 'passed over: the node had fallen behind'
+
+
+class DynamicsNode(LifecycleNode):
+    """
+    Answers each joined setpoint with leg lengths, rates and forces.
+
+    Raises ParameterError where the parameters break a rule: nothing starts then.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True)
+        self._settings = declare_parameters(self, Parameters)
+        self._active = False
+        self._configured = False
+        self._io: list[Any] = []
+        self._said: dict[Refusal, tuple[float, int]] = {}
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        self._answer_impossible_transitions()
+        if not COMPILED:
+            self.get_logger().warning(UNCOMPILED_COST)
+        if self._settings['autostart']:
+            if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
+                self.trigger_activate()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Compile the dynamics and open the topics."""
+        try:
+            self._configure()
+        except Exception:
+            # rclpy turns an exception in a transition into ERROR without a word.
+            self.get_logger().error(f'cannot be configured: {traceback.format_exc()}')
+            self._close()
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to answer, as if nothing had come before."""
+        now = time.monotonic()
+        self._setpoints = Setpoints(
+            self._settings, self._on_refusal, self.get_logger().warning)
+        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now)
+        self._waiting: deque[Setpoint] = deque()
+        self._last: Output | None = None
+        self._reported = now
+        self._said.clear()
+        self._active = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer no more."""
+        self._active = False
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the topics."""
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer no more and close the topics."""
+        self._active = False
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _configure(self) -> None:
+        self._step = Step(self._settings)
+        begun = time.monotonic()
+        # The first call compiles; it shall not wait for the first setpoint.
+        self._step(Setpoint(0, (0.0,) * 24), NO_WRENCH, None)
+        self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
+        self._publishers_of: dict[str, Publisher] = {}
+        for topic, name in OUTPUT_TYPES.items():
+            qos = QoSProfile(depth=10)
+            if topic == 'singularity_warning':
+                qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            self._publishers_of[topic] = self.create_publisher(_TYPES[name], f'~/{topic}', qos)
+        self._diagnostics_publisher = self.create_publisher(
+            DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
+        topics = inputs.SOURCES[self._settings['setpoint.source']]
+        subscriptions = [self._subscribe(topic, partial(self._on_setpoint, topic))
+                         for topic in topics]
+        subscriptions.append(self._subscribe(inputs.WRENCH, self._on_wrench))
+        self._topic_names = {topic: subscription.topic_name for topic, subscription
+                             in zip(topics, subscriptions, strict=False)}
+        # A steady clock: ROS time may stand still or jump.
+        watch = self.create_timer(_WATCH_SECONDS, self._on_watch,
+                                  clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._io = [*subscriptions, watch, *self._publishers_of.values(),
+                    self._diagnostics_publisher]
+        self._configured = True
+
+    def _subscribe(self, topic: str, callback: Any) -> Any:
+        return self.create_subscription(
+            _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', callback, QoSProfile(depth=_QUEUE),
+            raw=True, qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=lambda event: self.get_logger().error(
+                    f'{topic}: a publisher offers an incompatible quality of service, policy '
+                    f'{event.last_policy_kind}: it is not heard')))
+
+    def _close(self) -> None:
+        self._configured = False
+        for entity in self._io:
+            entity.destroy()
+        self._io = []
+
+    def _answer_impossible_transitions(self) -> None:
+        """
+        Answer a request for a transition that the present state does not have.
+
+        rclpy 7.1 raises it out of spin instead, and the asker waits for ever.
+        """
+        service = self._service_change_state
+        change_state = service.callback
+
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return change_state(request, response)
+            except RCLError as exc:
+                self.get_logger().error(f'transition refused: {exc}')
+                response.success = False
+                return response
+
+        service.callback = answer
+
+    # -- setpoints ------------------------------------------------------------------------
+
+    def _on_setpoint(self, topic: str, data: bytes) -> None:
+        if not self._active:
+            return
+        self._diagnostics.heard(topic, time.monotonic())
+        if self._settings['setpoint.exclusive'] and self._diagnostics.writers.get(topic, 1) > 1:
+            self._setpoints.refuse(topic, inputs.NOT_EXCLUSIVE, self._topic_names[topic])
+            return
+        setpoint = self._setpoints.take(topic, data, self.get_clock().now().nanoseconds)
+        if setpoint is None:
+            return
+        self._waiting.append(setpoint)
+        if len(self._waiting) == 1:
+            # Runs behind the messages that have come already: it sees what waits.
+            self.executor.create_task(self._answer)
+
+    def _on_wrench(self, data: bytes) -> None:
+        if self._active:
+            self._setpoints.take_wrench(data)
+
+    def _answer(self) -> None:
+        """Answer what waits: all of it, or the newest where the node has fallen behind."""
+        if not self._active:
+            return
+        while len(self._waiting) > _BACKLOG:
+            for _ in range(len(self._waiting) - 1):
+                passed = self._waiting.popleft()
+                self._setpoints.refuse('setpoint', PASSED_OVER, f'stamp {passed.stamp} ns')
+        while self._waiting:
+            setpoint = self._waiting.popleft()
+            output = self._step(setpoint, self._setpoints.wrench, self._last_singularity())
+            if output is None:
+                self._setpoints.refuse(
+                    'setpoint', inputs.OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
+                continue
+            for topic, message in self._step.messages(output):
+                self._publish(self._publishers_of[topic], message)
+            self._last = output
+            if self._diagnostics.answered(output, time.monotonic()):
+                self._report()
+
+    def _publish(self, publisher: Publisher, message: Any) -> None:
+        try:
+            publisher.publish(message)
+        except RCLError:
+            # A signal shuts ROS down in the middle of whatever runs: nobody listens then.
+            if self.context.ok():
+                raise
+
+    def _last_singularity(self) -> Any:
+        return None if self._last is None else self._last.singularity
+
+    # -- words ----------------------------------------------------------------------------
+
+    def _on_refusal(self, refusal: Refusal, details: str) -> None:
+        now = time.monotonic()
+        self._diagnostics.refused(refusal, details, now)
+        said, since = self._said.get(refusal, (-_SAY_AGAIN_SECONDS, 0))
+        if now - said < _SAY_AGAIN_SECONDS:
+            self._said[refusal] = said, since + 1
+            return
+        self._said[refusal] = now, 0
+        more = f' (and {since} before it)' if since else ''
+        self.get_logger().warning(f'{refusal.topic} refused: {refusal.reason}: {details}{more}')
+
+    def _on_watch(self) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        due = now - self._reported >= _REPORT_SECONDS
+        if due or self._settings['setpoint.exclusive']:
+            self._diagnostics.writers = {topic: self.count_publishers(name)
+                                         for topic, name in self._topic_names.items()}
+        if due or self._diagnostics.level_changed(now):
+            self._report()
+
+    def _report(self) -> None:
+        now = time.monotonic()
+        self._reported = now
+        name = self.get_fully_qualified_name().lstrip('/')
+        array = DiagnosticArray(status=[
+            DiagnosticStatus(
+                level=bytes([status.level]), name=f'{name}: {status.name}',
+                message=status.message, hardware_id=name,
+                values=[KeyValue(key=key, value=value) for key, value in status.values])
+            for status in self._diagnostics.report(now)])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._publish(self._diagnostics_publisher, array)
+
+    # -- parameters -----------------------------------------------------------------------
+
+    def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
+        """Take all of these, between two setpoints, or none."""
+        ours = {change.name: change.value for change in changes if is_ours(change.name)}
+        try:
+            if self._configured:
+                fixed = [name for name in ours if name in Parameters.table
+                         and not Parameters.table[name].while_active]
+                if fixed:
+                    raise ParameterError(f'{", ".join(fixed)}: only changed while the node is '
+                                         'unconfigured')
+            parameters = self._settings.replaced(ours)
+            step = Step(parameters)
+        except ParameterError as exc:
+            return SetParametersResult(successful=False, reason=str(exc))
+        self._settings = parameters
+        if self._configured:
+            self._step = step
+        if self._active:
+            self._diagnostics.parameters = parameters
+        return SetParametersResult(successful=True)
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    return run(DynamicsNode, Parameters)

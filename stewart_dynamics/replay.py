@@ -1,0 +1,301 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Recorded bags in, the node's outputs out; needs no ROS.
+
+Setpoints go through the joining and the step that the node has, message by message in the
+order of the bag, so the outputs are the node's, bit for bit.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import csv
+from pathlib import Path
+import shutil
+import sys
+import tempfile
+from typing import Any, NamedTuple
+
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
+
+from stewart_dynamics import setpoints as inputs
+from stewart_dynamics.compiled import COMPILED, UNCOMPILED_COST
+from stewart_dynamics.errors import BagError, StewartError
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.setpoints import Refusal, Setpoints
+from stewart_dynamics.singularity import Singularity
+from stewart_dynamics.step import Output, OUTPUT_TYPES, Step
+from stewart_dynamics.summary import Summary
+
+DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
+NODE = '/stewart_dynamics'
+
+_NAN = float('nan')
+
+
+class Replayed(NamedTuple):
+    """What became of one bag."""
+
+    bag: Path
+    summary: Summary | None
+    """None where no setpoint was answered."""
+    refusals: dict[Refusal, int]
+    limit_met: bool
+    """A limit or a singularity warning was met."""
+    unread: str
+    """Why the rest of the bag could not be read; empty where all was."""
+
+
+class _Recorded(NamedTuple):
+    topic: str
+    time: int
+    data: bytes
+
+
+class _Bag:
+    """
+    The setpoint messages of a bag, in its order.
+
+    Raises BagError where it cannot be opened or lacks a topic. A fault further in ends the
+    iteration, and ``unread`` says which.
+    """
+
+    def __init__(self, path: Path, node: str, topics: Sequence[str]) -> None:
+        self.unread = ''
+        self._path = path
+        try:
+            self._reader = AnyReader(
+                [path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
+            self._reader.open()
+        except Exception as exc:  # rosbags lets bare errors through for a damaged file
+            raise BagError(f'{path}: not a bag that can be read: {_one_line(exc)}') from exc
+        try:
+            if not self._reader.is2:
+                raise BagError(f'{path}: a bag of ROS 1, must be one of ROS 2')
+            self._topics = {f'{node}/{topic}': topic for topic in (*topics, inputs.WRENCH)}
+            self._connections = [c for c in self._reader.connections if c.topic in self._topics]
+            self._check_topics(node, topics)
+        except BagError:
+            self._reader.close()
+            raise
+
+    def _check_topics(self, node: str, topics: Sequence[str]) -> None:
+        found = {c.topic for c in self._connections}
+        missing = [f'{node}/{topic}' for topic in topics if f'{node}/{topic}' not in found]
+        if missing:
+            held = ', '.join(sorted({f'{c.topic} ({c.msgtype})'
+                                     for c in self._reader.connections})) or 'nothing'
+            raise BagError(f'{self._path}: has no topic {", ".join(missing)}; it holds {held}')
+        for connection in self._connections:
+            needed = inputs.INPUT_TYPES[self._topics[connection.topic]]
+            if connection.msgtype != needed:
+                raise BagError(f'{self._path}: {connection.topic}: is a {connection.msgtype}, '
+                               f'must be a {needed}')
+
+    def __iter__(self) -> Iterator[_Recorded]:
+        messages = self._reader.messages(connections=self._connections)
+        while True:
+            try:
+                connection, time, data = next(messages)
+            except StopIteration:
+                return
+            except Exception as exc:
+                self.unread = _one_line(exc)
+                return
+            yield _Recorded(self._topics[connection.topic], time, bytes(data))
+
+    def close(self) -> None:
+        self._reader.close()
+
+
+class _Outputs:
+    """The output bag, and legs.csv beside it."""
+
+    def __init__(self, folder: Path, node: str, legs: Sequence[str]) -> None:
+        self._bag = Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+        self._bag.open()
+        types = get_typestore(Stores.ROS2_JAZZY)
+        self._connections = {
+            topic: self._bag.add_connection(f'{node}/{topic}', kind, typestore=types)
+            for topic, kind in OUTPUT_TYPES.items()}
+        self._file = (folder / 'legs.csv').open('w', newline='', encoding='utf-8')
+        self._csv = csv.writer(self._file)
+        self._csv.writerow([
+            'stamp (ns)',
+            *(f'{leg} {quantity}' for quantity in (
+                'length (m)', 'rate (m/s)', 'force (N)', 'demanded force (N)') for leg in legs),
+            'det(J) (m^3)', 'd(det(J))/dt (m^3/s)', 'condition number', 'singularity warning'])
+
+    def write(self, time: int, output: Output, messages: list[tuple[str, bytes]]) -> None:
+        for topic, data in messages:
+            self._bag.write(self._connections[topic], time, data)
+        none = ('',) * 6
+        self._csv.writerow([
+            output.stamp, *output.lengths, *output.rates, *(output.forces or none),
+            *(output.demanded_forces or none), output.determinant, output.determinant_rate,
+            output.condition, int(output.singularity.warning)])
+
+    def close(self) -> None:
+        self._bag.close()
+        self._file.close()
+
+
+@contextmanager
+def _whole_folder(final: Path) -> Iterator[Path]:
+    """Give a folder that takes its final name only when all in it is written."""
+    final.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(prefix=f'.{final.name}.', dir=final.parent))
+    try:
+        yield partial
+        partial.chmod(0o755)
+        partial.rename(final)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def replay(
+        path: Path, parameters: Parameters, folder: Path, node: str = NODE) -> Replayed:
+    """
+    Compute one bag's outputs into a folder: ``bag/`` and ``legs.csv``.
+
+    Parameters
+    ----------
+    path : Path
+        A rosbag2 folder, or one of its files (.mcap, .db3).
+    folder : Path
+        It must not exist; it appears when all is written.
+    node : str
+        The name under which the bag has the setpoints, and the outputs are written.
+
+    Raises BagError: the bag cannot be opened or lacks a topic, or the folder exists.
+
+    """
+    if folder.exists():
+        raise BagError(f'{folder}: exists already')
+    step = Step(parameters)
+    setpoints = Setpoints(parameters, lambda refusal, details: None, lambda text: None)
+    bag = _Bag(path, node, setpoints.topics)
+    stamps: list[int] = []
+    lengths: list[Sequence[float]] = []
+    forces: list[Sequence[float]] = []
+    determinants: list[float] = []
+    warnings: list[tuple[int, bool]] = []
+    limit_met = False
+    state: Singularity | None = None
+    try:
+        with _whole_folder(folder) as partial:
+            outputs = _Outputs(partial, node, parameters['joints'])
+            try:
+                for topic, time, data in bag:
+                    if topic == inputs.WRENCH:
+                        setpoints.take_wrench(data)
+                        continue
+                    setpoint = setpoints.take(topic, data, time)
+                    if setpoint is None:
+                        continue
+                    output = step(setpoint, setpoints.wrench, state)
+                    if output is None:
+                        setpoints.refuse('setpoint', inputs.OUT_OF_RANGE, '')
+                        continue
+                    state = output.singularity
+                    outputs.write(time, output, step.messages(output))
+                    stamps.append(output.stamp)
+                    lengths.append(output.lengths)
+                    forces.append(output.demanded_forces or (_NAN,) * 6)
+                    determinants.append(output.determinant)
+                    if output.warning_changed:
+                        warnings.append((output.stamp, state.warning))
+                    limit_met = limit_met or state.warning or bool(output.excesses)
+            finally:
+                outputs.close()
+    finally:
+        bag.close()
+    summary = Summary.of(parameters['joints'], stamps, lengths, forces, determinants,
+                         warnings) if stamps else None
+    return Replayed(path, summary, dict(setpoints.counts), limit_met, bag.unread)
+
+
+def _one_line(exc: BaseException) -> str:
+    return ' '.join(f'{exc}'.split()) or type(exc).__name__
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='stewart_replay', formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Compute leg lengths, forces and singularity warnings of recorded setpoints, '
+                    'as the node does, bit for bit.',
+        epilog='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node) '
+               'and legs.csv.\n\nexit codes: 0 done; 1 with --strict, when a limit or '
+               'singularity warning was met;\n2 bad arguments, parameters or bags; 3 part of a '
+               'bag could not be read, the rest is done')
+    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
+                        help='rosbag2 folder, .mcap or .db3 file')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the machine, the file that the node takes')
+    parser.add_argument('--output', type=Path, default=Path('replayed'), metavar='DIR',
+                        help='folder of the results (default: replayed)')
+    parser.add_argument('--node', default=NODE, metavar='NAME',
+                        help=f'name before the topics in the bag (default: {NODE})')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when a limit or singularity warning was met')
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    options = _arguments().parse_args(arguments)
+    code = DONE
+    try:
+        parameters = Parameters.from_yaml(options.params)
+        if not COMPILED:
+            print(f'stewart_replay: {UNCOMPILED_COST}', file=sys.stderr)
+    except StewartError as exc:
+        return _complain(exc)
+    for path in options.bags:
+        try:
+            result = replay(path, parameters, options.output / path.stem,
+                            '/' + options.node.strip('/'))
+        except (StewartError, OSError) as exc:
+            code = _complain(exc)
+            continue
+        _print(result)
+        if result.unread:
+            _complain(f'{path}: the rest could not be read: {result.unread}')
+            code = code or PARTLY_READ
+        elif options.strict and result.limit_met:
+            code = code or LIMIT_MET
+    return code
+
+
+def _complain(what: object) -> int:
+    print(f'stewart_replay: {" ".join(str(what).split())}', file=sys.stderr)
+    return BAD_INPUT
+
+
+def _print(result: Replayed) -> None:
+    print(f'{result.bag}:')
+    print(result.summary.table() if result.summary else 'no setpoint could be answered')
+    for refusal, number in sorted(result.refusals.items()):
+        print(f'refused, {refusal.topic}: {number} {refusal.reason}')
+    print()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,125 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a motion asked of the legs, and how near a singularity it came, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class Peak(NamedTuple):
+    """A leg's largest force, and the range of its length."""
+
+    leg: str
+    force: float
+    """Largest in size, with its sign [N]; nan where no force was published."""
+    force_time: float
+    """[s]"""
+    shortest: float
+    longest: float
+
+
+class Summary(NamedTuple):
+    """Of all samples of a motion; times are from the first sample on [s]."""
+
+    samples: int
+    duration: float
+    peaks: tuple[Peak, ...]
+    nearest: float
+    """det(J) nearest zero [m^3]."""
+    nearest_time: float
+    crossings: tuple[float, ...]
+    """When det(J) crossed zero, interpolated between two samples."""
+    warnings: tuple[tuple[float, float], ...]
+    """When each warning began and ended; the end is inf for one that was still on."""
+
+    @classmethod
+    def of(cls, legs: Sequence[str], stamps: ArrayLike, lengths: ArrayLike, forces: ArrayLike,
+           determinants: ArrayLike, warnings: Sequence[tuple[int, bool]]) -> Summary:
+        """
+        Return the summary.
+
+        Parameters
+        ----------
+        legs : six names
+        stamps : (N,)
+            Of the samples [ns], at least one.
+        lengths, forces : (N, 6)
+            [m, N]; a force that was not published is nan.
+        determinants : (N,)
+            [m^3]
+        warnings : sequence of (stamp, on)
+            The changes of the singularity warning [ns].
+
+        """
+        stamp = np.asarray(stamps, dtype=np.int64)
+        time = (stamp - stamp[0]) * 1e-9
+        length, force = np.asarray(lengths, dtype=float), np.asarray(forces, dtype=float)
+        det = np.asarray(determinants, dtype=float)
+        size = np.where(np.isnan(force), -np.inf, np.abs(force))
+        at = np.argmax(size, axis=0)
+        peaks = tuple(
+            Peak(leg, float(force[at[n], n]), float(time[at[n]]), float(length[:, n].min()),
+                 float(length[:, n].max())) for n, leg in enumerate(legs))
+        nearest = int(np.argmin(np.abs(det)))
+        signs = np.sign(det)
+        before = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+        share = det[before] / (det[before] - det[before + 1])
+        crossings = time[before] + share * (time[before + 1] - time[before])
+        begun: list[float] = []
+        spans: list[tuple[float, float]] = []
+        for when, on in warnings:
+            seconds = (when - int(stamp[0])) * 1e-9
+            if on and not begun:
+                begun.append(seconds)
+            elif not on and begun:
+                spans.append((begun.pop(), seconds))
+        spans += [(seconds, np.inf) for seconds in begun]
+        return cls(len(stamp), float(time[-1]), peaks, float(det[nearest]),
+                   float(time[nearest]), tuple(crossings.tolist()), tuple(spans))
+
+    def table(self) -> str:
+        """Return the summary as lines that a person can read."""
+        lines = [f'{self.samples} setpoints in {self.duration:.2f} s', '',
+                 'leg              peak force      at     length from        to',
+                 '                          N       s               m         m']
+        for peak in self.peaks:
+            force, when = ((f'{peak.force:16.1f}', f'{peak.force_time:8.2f}')
+                           if np.isfinite(peak.force) else (f'{"none":>16}', ' ' * 8))
+            lines.append(f'{peak.leg:<11.11}{force}{when}{peak.shortest:16.4f}'
+                         f'{peak.longest:10.4f}')
+        lines.append('')
+        if self.crossings:
+            times = ', '.join(f't = {time:.3f} s' for time in self.crossings)
+            lines.append(f'det(J) crossed zero at {times}: forces grow without bound there')
+        else:
+            lines.append('det(J) did not cross zero')
+        lines.append(f'det(J) nearest zero: {self.nearest:.6g} m^3 at t = '
+                     f'{self.nearest_time:.2f} s')
+        for begun, ended in self.warnings:
+            ahead = [time - begun for time in self.crossings if begun <= time <= ended]
+            lines.append(
+                f'singularity warning from t = {begun:.2f} s '
+                + (f'to {ended:.2f} s' if np.isfinite(ended) else 'to the end')
+                + (f': {ahead[0]:.2f} s before the crossing' if ahead else ''))
+        if not self.warnings:
+            lines.append('no singularity warning')
+        return '\n'.join(lines)

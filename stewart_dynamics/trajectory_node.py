@@ -1,0 +1,152 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Publishes a motion as setpoints, in real time."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from geometry_msgs.msg import (
+    Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
+    Vector3)
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from rclpy.time import Time
+from std_msgs.msg import Header
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from stewart_dynamics import setpoints as inputs
+from stewart_dynamics.inverse_dynamics import MOTION
+from stewart_dynamics.ros import declare_parameters, run
+from stewart_dynamics.rotation import to_quaternion
+from stewart_dynamics.trajectory import (
+    motion_at, sample_time, sample_times, TrajectoryParameters)
+
+# Samples are computed so many at once: one by one they cost more than to publish.
+_BLOCK = 256
+
+
+class TrajectoryNode(Node):
+    """
+    Publishes the motion's samples when they are due, then is done.
+
+    Parameters
+    ----------
+    done : Future
+        Gets the exit code after the last sample.
+
+    Raises ParameterError where the parameters break a rule.
+
+    """
+
+    def __init__(self, done: Future) -> None:
+        super().__init__('stewart_trajectory', automatically_declare_parameters_from_overrides=True)
+        self._settings = declare_parameters(self, TrajectoryParameters)
+        self._done = done
+        self._loop = self._settings['loop']
+        self._samples = len(sample_times(self._settings))
+        self._frame = self._settings['base_frame']
+        self._index = 0
+        self._block: Any = None
+        target = self._settings['target']
+        qos = QoSProfile(depth=1000)
+        if self._settings['output'] == 'combined':
+            self._combined = self.create_publisher(
+                MultiDOFJointTrajectory, f'{target}/{inputs.COMBINED}', qos)
+            self._publish = self._publish_combined
+        else:
+            self._pose = self.create_publisher(PoseStamped, f'{target}/{inputs.POSE}', qos)
+            self._twist = self.create_publisher(TwistStamped, f'{target}/{inputs.TWIST}', qos)
+            self._accel = self.create_publisher(AccelStamped, f'{target}/{inputs.ACCEL}', qos)
+            self._publish = self._publish_separate
+        delay = round(self._settings['start_delay'] * 1e9)
+        self._start = time.monotonic_ns() + delay
+        self._stamp = self.get_clock().now().nanoseconds + delay
+        self.create_timer(1.0 / self._settings['rate'], self._on_timer,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
+        motion, rate = self._settings['motion.type'], self._settings['rate']
+        self.get_logger().info(
+            f'{motion} motion at {rate:g} Hz to {target}' + (
+                ', until stopped' if self._loop else f', {self._samples} setpoints'))
+
+    def _on_timer(self) -> None:
+        """Publish what is due, each sample with its own stamp, however late the timer is."""
+        now = time.monotonic_ns() - self._start
+        while not self._done.done():
+            due = int(sample_time(self._settings, self._index))
+            if due > now:
+                return
+            self._publish(self._row(), Time(nanoseconds=self._stamp + due).to_msg())
+            self._index += 1
+            if not self._loop and self._index == self._samples:
+                self.get_logger().info(f'{self._samples} setpoints published')
+                self._done.set_result(0)
+
+    def _row(self) -> list[list[float]]:
+        """Return position, quaternion and the four rates of the sample that is due."""
+        at = self._index % _BLOCK
+        if at == 0:
+            times = sample_time(self._settings, range(self._index, self._index + _BLOCK)) * 1e-9
+            motion = motion_at(self._settings, times)
+            quaternions = to_quaternion(motion.rotation)
+            self._block = [
+                [row[0:3], quaternion, row[12:15], row[15:18], row[18:21], row[21:MOTION]]
+                for row, quaternion in zip(
+                    motion.rows.tolist(), quaternions.tolist(), strict=True)]
+        row: list[list[float]] = self._block[at]
+        return row
+
+    def _publish_separate(self, row: list[list[float]], stamp: Any) -> None:
+        header = Header(stamp=stamp, frame_id=self._frame)
+        position, quaternion, *rates = row
+        linear, angular, linear_rate, angular_rate = map(_vector, rates)
+        self._pose.publish(PoseStamped(header=header, pose=Pose(
+            position=_xyz(Point, position), orientation=_quaternion(quaternion))))
+        self._twist.publish(TwistStamped(
+            header=header, twist=Twist(linear=linear, angular=angular)))
+        self._accel.publish(AccelStamped(
+            header=header, accel=Accel(linear=linear_rate, angular=angular_rate)))
+
+    def _publish_combined(self, row: list[list[float]], stamp: Any) -> None:
+        position, quaternion, *rates = row
+        linear, angular, linear_rate, angular_rate = map(_vector, rates)
+        self._combined.publish(MultiDOFJointTrajectory(
+            header=Header(stamp=stamp, frame_id=self._frame), joint_names=['platform'],
+            points=[MultiDOFJointTrajectoryPoint(
+                transforms=[Transform(
+                    translation=_vector(position), rotation=_quaternion(quaternion))],
+                velocities=[Twist(linear=linear, angular=angular)],
+                accelerations=[Twist(linear=linear_rate, angular=angular_rate)])]))
+
+
+def _xyz(kind: Any, three: list[float]) -> Any:
+    return kind(x=three[0], y=three[1], z=three[2])
+
+
+def _vector(three: list[float]) -> Any:
+    return _xyz(Vector3, three)
+
+
+def _quaternion(four: list[float]) -> Any:
+    return Quaternion(x=four[0], y=four[1], z=four[2], w=four[3])
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    done = Future()
+    return run(lambda: TrajectoryNode(done), TrajectoryParameters, done)
