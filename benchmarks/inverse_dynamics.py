@@ -1,0 +1,419 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The runtime path beside Pinocchio and beside plain C, measured in turns in one run.
+
+Run by hand, ``make bench``; README.md beside this file says what is compared and how.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import ctypes
+import os
+from pathlib import Path
+import platform
+import statistics
+import subprocess
+import tempfile
+import time
+import timeit
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+import pinocchio as pin
+
+from stewart_dynamics import inverse_dynamics as runtime
+from stewart_dynamics import lagrange, Motion, Parameters, StewartPlatform
+from stewart_dynamics.parameters import inertia_matrix
+from stewart_dynamics.rotation import to_quaternion
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parent
+README = HERE / 'README.md'
+BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'
+C_COMPILER = ['gcc', '-O3', '-march=native']
+
+ROUNDS = 41
+SAMPLES = 200_000
+LAGRANGE_SAMPLES = 2_000
+SINGLE_CALLS_SECONDS = 0.005
+AGREEMENT = 1e-9
+
+# Actuators that the example machine does not have, so that their terms count in the checks.
+ACTUATORS = {
+    'actuator.reflected_mass': (25.0,), 'actuator.viscous_friction': (150.0,),
+    'actuator.coulomb_friction': (40.0,)}
+
+
+class Contestant(NamedTuple):
+    """What is measured against another: ``run`` takes one turn and returns s per sample."""
+
+    name: str
+    run: Callable[[], float]
+    measure: str = ''
+    """Name of the contestant to whose time its own is set in relation."""
+    decimals: int = 0
+
+
+class Turns(NamedTuple):
+    """What a contestant took in each round."""
+
+    seconds: list[float]
+    cores: list[float]
+    """Processor time divided by elapsed time."""
+
+
+def example_machine() -> Parameters:
+    """Return the machine of config/platform.yaml with actuators."""
+    given = Parameters.from_yaml(HERE.parent / 'config' / 'platform.yaml').given
+    return Parameters({**given, **ACTUATORS})
+
+
+def random_motions(many: int) -> Motion:
+    """Return motions all over the machine's workspace."""
+    rng = np.random.default_rng(20260101)
+
+    def within(bound: float) -> Array:
+        return rng.uniform(-bound, bound, (many, 3))
+
+    return Motion.from_euler(
+        np.array([0.0, 0.0, 1.0]) + within(0.15), within(0.3), within(0.5), within(1.0),
+        within(3.0), within(6.0))
+
+
+# --- plain C ---------------------------------------------------------------------------------
+
+class PlainC:
+    """inverse_dynamics.c, compiled here and now."""
+
+    def __init__(self) -> None:
+        with tempfile.TemporaryDirectory() as directory:
+            library = Path(directory) / 'inverse_dynamics.so'
+            subprocess.run(
+                [*C_COMPILER, '-shared', '-fPIC', '-o', str(library),
+                 str(HERE / 'inverse_dynamics.c'), '-lm'], check=True)
+            self.function = ctypes.CDLL(str(library)).solve
+        pointer, size = ctypes.c_void_p, ctypes.c_size_t
+        self.function.argtypes = [pointer, pointer, pointer, size, pointer, size]
+        self.function.restype = None
+
+    @staticmethod
+    def arguments(machine: Array, motions: Array, wrenches: Array, results: Array) -> list[Any]:
+        """Return what the function takes for these C-contiguous arrays; it keeps them alive."""
+        m, x, w, out = (array.ctypes.data_as(ctypes.c_void_p)
+                        for array in (machine, motions, wrenches, results))
+        return [m, x, w, int(len(wrenches) > 1), out, len(motions)]
+
+
+# --- Pinocchio -------------------------------------------------------------------------------
+
+class Tree:
+    """
+    The machine as Pinocchio's rnea takes it: legs and platform side by side, not connected.
+
+    Leg: a universal joint that carries the cylinder, a prismatic one that carries the piston.
+    Platform: a free flyer. rnea gives joint forces that would move all of them; it knows
+    nothing of the platform joints, which ``leg_forces`` brings in.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        p = parameters
+        self.parameters = p
+        self.model = pin.Model()
+        self.model.gravity.linear = np.array(p['gravity'])
+        x, y, here = np.eye(3)[0], np.eye(3)[1], pin.SE3.Identity()
+        self.tips = []
+        for i in range(6):
+            base = pin.SE3(np.eye(3), p['geometry.base_joints'][i])
+            cylinder = self.model.addJoint(0, pin.JointModelUniversal(x, y), base, f'base_{i}')
+            self.model.appendBodyToJoint(cylinder, _rod(
+                p['legs.cylinder.mass'][i], p['legs.cylinder.center_of_mass'][i],
+                p['legs.cylinder.inertia'][i]), here)
+            piston = self.model.addJoint(cylinder, pin.JointModelPZ(), here, f'leg_{i}')
+            self.model.appendBodyToJoint(piston, _rod(
+                p['legs.piston.mass'][i], -p['legs.piston.center_of_mass'][i],
+                p['legs.piston.inertia'][i]), here)
+            self.model.armature[3 * i + 2] = p['actuator.reflected_mass'][i]
+            self.tips.append(piston)
+        body = self.model.addJoint(0, pin.JointModelFreeFlyer(), here, 'platform')
+        self.model.appendBodyToJoint(body, pin.Inertia(
+            p['platform.mass'], p['platform.center_of_mass'],
+            inertia_matrix(p['platform.inertia'])), here)
+        self.data = self.model.createData()
+
+    def state(self, motion: Motion) -> tuple[Array, Array, Array, Array]:
+        """Return q, v, a of a single motion, and the matrix G of v = G [linear; angular]."""
+        q, v, a = np.zeros(25), np.zeros(24), np.zeros(24)
+        g = np.zeros((24, 6))
+        r, omega = motion.rotation, motion.angular_velocity
+        back, twist = np.kron(np.eye(2), r.T), motion.rows[12:18]
+        q[18:21], q[21:] = motion.position, to_quaternion(r)
+        g[18:] = back
+        a[18:] = back @ motion.rows[18:24]
+        a[18:21] -= r.T @ np.cross(omega, motion.linear_velocity)
+        at = lagrange.legs(self.parameters, motion.position, r)
+        for i, (s, length) in enumerate(zip(at.directions, at.lengths, strict=True)):
+            q[3 * i:3 * i + 3] = np.arctan2(-s[1], s[2]), np.arcsin(s[0]), length
+        # the velocities and accelerations that take each piston along with its platform joint
+        in_base_axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        pin.computeJointJacobians(self.model, self.data, q)
+        tips = [np.array(pin.getJointJacobian(self.model, self.data, tip, in_base_axes))[
+            :3, 3 * i:3 * i + 3] for i, tip in enumerate(self.tips)]
+        for i, arm in enumerate(at.arms):
+            joint = np.hstack([np.eye(3), -lagrange.skew(arm)])
+            g[3 * i:3 * i + 3] = np.linalg.solve(tips[i], joint)
+        v[:] = g @ twist
+        pin.forwardKinematics(self.model, self.data, q, v, np.zeros(24))
+        for i, arm in enumerate(at.arms):
+            drift = pin.getClassicalAcceleration(
+                self.model, self.data, self.tips[i], in_base_axes).linear
+            acceleration = (motion.linear_acceleration + np.cross(
+                motion.angular_acceleration, arm) + np.cross(omega, np.cross(omega, arm)))
+            a[3 * i:3 * i + 3] = np.linalg.solve(tips[i], acceleration - drift)
+        return q, v, a, g
+
+    def leg_forces(self, motion: Motion) -> Array:
+        """Return the leg forces of a single motion, by rnea and the principle of d'Alembert."""
+        q, v, a, g = self.state(motion)
+        at = lagrange.legs(self.parameters, motion.position, motion.rotation)
+        wrench = g.T @ pin.rnea(self.model, self.data, q, v, a)
+        forces: Array = np.linalg.solve(lagrange.jacobian(at).T, wrench) + _friction(
+            self.parameters, v[2:18:3])
+        return forces
+
+
+def _rod(mass: float, center_of_mass: float, inertia: float) -> Any:
+    return pin.Inertia(mass, np.array([0.0, 0.0, center_of_mass]),
+                       np.diag([inertia, inertia, 0.0]))
+
+
+def _friction(parameters: Parameters, rates: Array) -> Array:
+    slip = np.clip(rates / runtime.COULOMB_RATE, -1.0, 1.0)
+    force: Array = (parameters['actuator.viscous_friction'] * rates
+                    + parameters['actuator.coulomb_friction'] * slip)
+    return force
+
+
+# --- the Lagrange equations in numpy ---------------------------------------------------------
+
+def lagrange_forces(parameters: Parameters, motion: Motion) -> Array:
+    """Return the leg forces of the readable reference, matrix by matrix."""
+    position, rotation = motion.position, motion.rotation
+    twist, acceleration = motion.rows[..., 12:18, None], motion.rows[..., 18:24, None]
+    m = lagrange.mass_matrix(parameters, position, rotation)
+    c = lagrange.coriolis_matrix(parameters, position, rotation, motion.linear_velocity,
+                                 motion.angular_velocity)
+    g = lagrange.gravity_vector(parameters, position, rotation)
+    j = lagrange.jacobian(lagrange.legs(parameters, position, rotation))
+    wrench = m @ acceleration + c @ twist + g[..., None]
+    forces: Array = np.linalg.solve(np.swapaxes(j, -1, -2), wrench)[..., 0] + _friction(
+        parameters, (j @ twist)[..., 0])
+    return forces
+
+
+# --- the benchmark ---------------------------------------------------------------------------
+
+def check(name: str, found: Array, wanted: Array) -> None:
+    """Stop where a column of two results differs by more of its largest entry than agreed."""
+    difference = float(np.max(np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)))
+    # written so that a nan does not pass
+    if not difference <= AGREEMENT:
+        raise SystemExit(f'{name} does not agree with the runtime path: relative difference '
+                         f'{difference:.2g}, must be at most {AGREEMENT:g}')
+    print(f'{name} agrees with the runtime path: largest relative difference {difference:.1g}')
+
+
+def repeated(call: str, **names: Any) -> Callable[[], float]:
+    """Return a turn of so many calls that it takes about SINGLE_CALLS_SECONDS."""
+    timer = timeit.Timer(call, globals=names)
+    timer.timeit(10)
+    many = max(10, int(SINGLE_CALLS_SECONDS / (timer.timeit(100) / 100)))
+    return lambda: timer.timeit(many) / many
+
+
+def once(samples: int, function: Callable[..., Any], *arguments: Any) -> Callable[[], float]:
+    """Return a turn of one call on a batch."""
+    def turn() -> float:
+        start = time.perf_counter()
+        function(*arguments)
+        return (time.perf_counter() - start) / samples
+
+    return turn
+
+
+RNEA = '`pin.rnea` alone'
+PLAIN_C = 'plain C, one core'
+
+
+def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
+    """Return what is measured in single calls and in batches, after checking that all agree."""
+    parameters = example_machine()
+    machine = StewartPlatform(parameters)
+    numbers = machine._machine
+    motion = random_motions(samples)
+    rows, no_wrench = motion.rows, np.zeros((1, runtime.WRENCH))
+    results, c_results = (np.empty((samples, runtime.RESULT)) for _ in range(2))
+    c, tree = PlainC(), Tree(parameters)
+
+    wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, runtime.WRENCH))
+    for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
+        runtime.solve(numbers, rows, wrench, results)
+        c.function(*c.arguments(numbers, rows, wrench, c_results))
+        check(name, c_results, results)
+    forces = results[:, runtime.FORCES:runtime.FORCES + 6]
+    few = [_part(motion, slice(k, k + 1)) for k in range(min(50, samples))]
+    check('Pinocchio', np.array([tree.leg_forces(_single(one)) for one in few]),
+          forces[:len(few)])
+    part = _part(motion, slice(0, LAGRANGE_SAMPLES))
+    check('Lagrange', lagrange_forces(parameters, part), forces[:len(part.rows)])
+
+    one = _single(_part(motion, slice(0, 1)))
+    row, result = rows[:1].copy(), np.empty((1, runtime.RESULT))
+    q, v, a, _ = tree.state(one)
+    single = [
+        Contestant('`inverse_dynamics.solve`, one row: what the node calls', repeated(
+            'solve(machine, rows, wrenches, results)', solve=runtime.solve, machine=numbers,
+            rows=row, wrenches=no_wrench, results=result), RNEA),
+        Contestant(RNEA, repeated(
+            'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
+            q=q, v=v, a=a), RNEA),
+        Contestant('`StewartPlatform.solve`, one row', repeated(
+            'solve(rows)', solve=machine.solve, rows=row), RNEA),
+        Contestant('`StewartPlatform.inverse_dynamics`, one `Motion`', repeated(
+            'solve(motion)', solve=machine.inverse_dynamics, motion=one), RNEA),
+        Contestant('plain C through ctypes', repeated(
+            'solve(*arguments)', solve=c.function,
+            arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
+    batch = [
+        Contestant('`inverse_dynamics.solve`, one core', once(
+            samples, runtime.solve, numbers, rows, no_wrench, results), PLAIN_C),
+        Contestant(PLAIN_C, once(
+            samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),
+        Contestant('`StewartPlatform.solve`: the default, all cores', once(
+            samples, machine.solve, rows), PLAIN_C),
+        Contestant('`lagrange`, the reference in numpy', once(
+            len(part.rows), lagrange_forces, parameters, part), PLAIN_C)]
+    return single, batch
+
+
+def _part(motion: Motion, part: slice) -> Motion:
+    return Motion(
+        motion.position[part], motion.rotation[part], motion.linear_velocity[part],
+        motion.angular_velocity[part], motion.linear_acceleration[part],
+        motion.angular_acceleration[part])
+
+
+def _single(motion: Motion) -> Motion:
+    return Motion(
+        motion.position[0], motion.rotation[0], motion.linear_velocity[0],
+        motion.angular_velocity[0], motion.linear_acceleration[0],
+        motion.angular_acceleration[0])
+
+
+def measure(all_of_them: list[Contestant], rounds: int) -> dict[str, Turns]:
+    """Let them take turns, forth in one round and back in the next; the first does not count."""
+    turns = {one.name: Turns([], []) for one in all_of_them}
+    for number in range(-1, rounds):
+        for one in all_of_them if number % 2 else reversed(all_of_them):
+            start, processor = time.perf_counter(), time.process_time()
+            seconds = one.run()
+            cores = (time.process_time() - processor) / (time.perf_counter() - start)
+            if number >= 0:
+                turns[one.name].seconds.append(seconds)
+                turns[one.name].cores.append(cores)
+    return turns
+
+
+def table(title: str, rows: list[Contestant], turns: dict[str, Turns]) -> list[str]:
+    """Return the lines of a Markdown table that is also readable as it is."""
+    cells = [(title, 'ns', 'cores', f'times {rows[0].measure}', 'min .. max')]
+    for one in rows:
+        own = turns[one.name]
+        ratios = [mine / its for mine, its in zip(
+            own.seconds, turns[one.measure].seconds, strict=True)]
+        cells.append((
+            one.name, f'{1e9 * statistics.median(own.seconds):,.0f}',
+            f'{statistics.median(own.cores):.1f}', f'{statistics.median(ratios):.2f}',
+            '' if one.name == one.measure else f'{min(ratios):.2f} .. {max(ratios):.2f}'))
+    widths = [max(len(row[n]) for row in cells) for n in range(5)]
+    lines = ['| ' + ' | '.join(
+        cell.rjust(width) if n else cell.ljust(width)
+        for n, (cell, width) in enumerate(zip(row, widths, strict=True))) + ' |'
+        for row in cells]
+    lines.insert(1, '| ' + ' | '.join(
+        '-' * (width - 1) + (':' if n else '-') for n, width in enumerate(widths)) + ' |')
+    return lines
+
+
+def machine_measured_on() -> str:
+    """Return processor and versions."""
+    gcc = subprocess.run([C_COMPILER[0], '-dumpfullversion'], check=True, capture_output=True,
+                         text=True).stdout.strip()
+    cpus = len(os.sched_getaffinity(0))
+    return (f'{processor_name()}, {cpus} cores. Python {platform.python_version()}, '
+            f'numpy {np.__version__}, numba {numba.__version__}, '
+            f'Pinocchio {pin.__version__}, gcc {gcc}.')
+
+
+def processor_name() -> str:
+    """Return the processor's name, with family and model, for the name alone can say little."""
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    facts = dict(reversed([[part.strip() for part in line.split(':', 1)]
+                           for line in lines if ':' in line]))
+    name = facts.get('model name', platform.machine())
+    return f'{name} (family {facts["cpu family"]}, model {facts["model"]})' if (
+        'cpu family' in facts and 'model' in facts) else name
+
+
+def write(lines: list[str]) -> None:
+    """Put the lines between the README's markers."""
+    before, rest = README.read_text(encoding='utf-8').split(BEGIN)
+    _, after = rest.split(END)
+    text = '\n'.join([before + BEGIN, *lines, END + after])
+    README.write_text(text, encoding='utf-8')
+
+
+def main() -> None:
+    """Check, measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
+    parser.add_argument('--samples', type=int, default=SAMPLES,
+                        help='in a batch (%(default)s)')
+    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    options = parser.parse_args()
+    if options.rounds < 1 or options.samples < 1:
+        parser.error('--rounds and --samples must be at least 1')
+
+    single, batch = contestants(options.samples)
+    turns = measure(single + batch, options.rounds)
+    lines = [
+        '', *table('one call from Python', single, turns),
+        '', *table(f'a sample in a batch of {options.samples:,}', batch, turns),
+        '', f'{machine_measured_on()} Medians of {options.rounds} rounds.', '']
+    print('\n'.join(lines))
+    if options.write:
+        write(lines)
+
+
+if __name__ == '__main__':
+    main()
