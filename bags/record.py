@@ -39,6 +39,8 @@ from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
+from stewart_dynamics.trajectory import sample_times, TrajectoryParameters
+
 HERE = Path(__file__).resolve().parent
 NODE = 'stewart_dynamics'
 TYPES = {'setpoint/pose': PoseStamped, 'setpoint/twist': TwistStamped,
@@ -127,7 +129,7 @@ def record(name: str) -> None:
     for node in nodes:
         executor.add_node(node)
     command = [Path(sys.executable).with_name('stewart_trajectory'), '--ros-args',
-               '--params-file', HERE.parent / 'config' / config, '-p', 'start_delay:=3.0']
+               '--params-file', HERE.parent / 'config' / config, '-p', 'start_timeout:=60.0']
     if spoiled:
         command += ['-p', 'target:=unspoiled']
     with subprocess.Popen(command) as trajectory:
@@ -139,6 +141,10 @@ def record(name: str) -> None:
                 quiet_since = time.monotonic()
     if trajectory.returncode:
         raise SystemExit(f'stewart_trajectory ended with exit code {trajectory.returncode}')
+    expected = 3 * len(sample_times(TrajectoryParameters.from_yaml(
+        HERE.parent / 'config' / config)))
+    if not spoiled and recorder.messages != expected:
+        raise SystemExit(f'{name}: {recorder.messages} of {expected} messages came: record again')
     recorder.close()
     for node in nodes:
         executor.remove_node(node)
@@ -157,9 +163,11 @@ def record(name: str) -> None:
 def main() -> None:
     """Record the bags that the command line names, or all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('names', nargs='*', choices=[[], *BAGS], metavar='NAME',
+    parser.add_argument('names', nargs='*', metavar='NAME',
                         help=f'one of {", ".join(BAGS)} (default: all)')
     names = parser.parse_args().names or list(BAGS)
+    if unknown := [name for name in names if name not in BAGS]:
+        parser.error(f'unknown bag {unknown[0]}')
     rclpy.init()
     for name in names:
         record(name)

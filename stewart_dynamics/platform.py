@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 
 # A thread gets no fewer samples than this: a millisecond's work, far more than starting it costs.
 _SAMPLES_FOR_A_THREAD = 4096
+_PARTS_OF_A_THREAD = 8
 _CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
 
 
@@ -112,11 +113,15 @@ class StewartPlatform:
         """
         rows = motion.rows.reshape(-1, runtime.MOTION)
         results = self.solve(rows, self._wrench_rows(motion, wrench))
-        for row in results[~np.isfinite(results).all(axis=-1)]:
-            raise MotionError(f'a sample is out of range: its leg lengths would be {row[:6]} m')
+        finite = np.isfinite(results)
+        if not finite.all():
+            at = int(np.argmin(finite.all(axis=-1)))
+            raise MotionError(f'sample {at}: out of range, the numbers overflow; position '
+                              f'{rows[at, :3].tolist()} m')
         condition = results[:, runtime.CONDITION]
-        if np.any(condition >= UNSOLVABLE_CONDITION):
-            at = int(np.argmax(condition >= UNSOLVABLE_CONDITION))
+        unsolvable = condition >= UNSOLVABLE_CONDITION
+        if unsolvable.any():
+            at = int(np.argmax(unsolvable))
             raise SingularityError(
                 f'sample {at}: J_inv cannot be solved: its condition number is '
                 f'{condition[at]:.3g}, must be under {UNSOLVABLE_CONDITION:g}; position '
@@ -137,7 +142,8 @@ class StewartPlatform:
         if threads < 2:
             runtime.solve(self._machine, rows, wrenches, results)
             return results
-        edges = np.linspace(0, len(rows), threads + 1).astype(int)
+        # More parts than threads: a thread that is held up leaves more to the others.
+        edges = np.linspace(0, len(rows), _PARTS_OF_A_THREAD * threads + 1).astype(int)
 
         def part(first: int, end: int) -> None:
             runtime.solve(self._machine, rows[first:end],

@@ -35,6 +35,8 @@ class Peak(NamedTuple):
     """[s]"""
     shortest: float
     longest: float
+    clipped: bool
+    """The force is the limit, and the leg would need more."""
 
 
 class Summary(NamedTuple):
@@ -53,7 +55,8 @@ class Summary(NamedTuple):
 
     @classmethod
     def of(cls, legs: Sequence[str], stamps: ArrayLike, lengths: ArrayLike, forces: ArrayLike,
-           determinants: ArrayLike, warnings: Sequence[tuple[int, bool]]) -> Summary:
+           determinants: ArrayLike, warnings: Sequence[tuple[int, bool]],
+           force_max: ArrayLike | None = None) -> Summary:
         """
         Return the summary.
 
@@ -68,6 +71,8 @@ class Summary(NamedTuple):
             [m^3]
         warnings : sequence of (stamp, on)
             The changes of the singularity warning [ns].
+        force_max : (6,), optional
+            To what the forces were clipped [N]; not given where they were not.
 
         """
         stamp = np.asarray(stamps, dtype=np.int64)
@@ -76,9 +81,11 @@ class Summary(NamedTuple):
         det = np.asarray(determinants, dtype=float)
         size = np.where(np.isnan(force), -np.inf, np.abs(force))
         at = np.argmax(size, axis=0)
+        most = np.full(6, np.inf) if force_max is None else np.asarray(force_max, dtype=float)
         peaks = tuple(
             Peak(leg, float(force[at[n], n]), float(time[at[n]]), float(length[:, n].min()),
-                 float(length[:, n].max())) for n, leg in enumerate(legs))
+                 float(length[:, n].max()), bool(size[at[n], n] >= most[n]))
+            for n, leg in enumerate(legs))
         nearest = int(np.argmin(np.abs(det)))
         signs = np.sign(det)
         before = np.flatnonzero(signs[:-1] * signs[1:] < 0)
@@ -99,13 +106,16 @@ class Summary(NamedTuple):
     def table(self) -> str:
         """Return the summary as lines that a person can read."""
         lines = [f'{self.samples} setpoints in {self.duration:.2f} s', '',
-                 'leg              peak force      at     length from        to',
-                 '                          N       s               m         m']
+                 'leg              peak force       at     length from        to',
+                 '                          N        s               m         m']
         for peak in self.peaks:
             force, when = ((f'{peak.force:16.1f}', f'{peak.force_time:8.2f}')
                            if np.isfinite(peak.force) else (f'{"none":>16}', ' ' * 8))
-            lines.append(f'{peak.leg:<11.11}{force}{when}{peak.shortest:16.4f}'
+            mark = '*' if peak.clipped else ' '
+            lines.append(f'{peak.leg:<11.11}{force}{mark}{when}{peak.shortest:16.4f}'
                          f'{peak.longest:10.4f}')
+        if any(peak.clipped for peak in self.peaks):
+            lines.append('* clipped to limits.force_max from then on: the leg would need more')
         lines.append('')
         if self.crossings:
             times = ', '.join(f't = {time:.3f} s' for time in self.crossings)

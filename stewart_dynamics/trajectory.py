@@ -43,8 +43,8 @@ TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for
     Parameter('output', 'string', 'pose, twist and accel on three topics, or all in one message',
               default='separate', choices=('separate', 'combined')),
     Parameter('rate', 'double', 'setpoints in a second', 'Hz', 100.0, minimum=0.0, above=True),
-    Parameter('start_delay', 'double', 'time before the first setpoint, for others to connect',
-              's', 1.0, minimum=0.0),
+    Parameter('start_timeout', 'double', 'it begins half a second after all its topics have '
+              'subscribers, or after this time without', 's', 5.0, minimum=0.0),
     Parameter('loop', 'bool', 'go on until stopped: paper and quintic to and fro, sine and hold '
               'without an end', default=False),
     Parameter('motion.type', 'string', 'paper: from initial to final, each coordinate as a half '

@@ -40,6 +40,8 @@ from stewart_dynamics.trajectory import (
 # Samples are computed so many at once: one by one they cost more than to publish.
 _BLOCK = 256
 
+_SETTLE = 500_000_000  # [ns]
+
 
 class TrajectoryNode(Node):
     """
@@ -68,15 +70,16 @@ class TrajectoryNode(Node):
         if self._settings['output'] == 'combined':
             self._combined = self.create_publisher(
                 MultiDOFJointTrajectory, f'{target}/{inputs.COMBINED}', qos)
+            self._outputs = [self._combined]
             self._publish = self._publish_combined
         else:
             self._pose = self.create_publisher(PoseStamped, f'{target}/{inputs.POSE}', qos)
             self._twist = self.create_publisher(TwistStamped, f'{target}/{inputs.TWIST}', qos)
             self._accel = self.create_publisher(AccelStamped, f'{target}/{inputs.ACCEL}', qos)
+            self._outputs = [self._pose, self._twist, self._accel]
             self._publish = self._publish_separate
-        delay = round(self._settings['start_delay'] * 1e9)
-        self._start = time.monotonic_ns() + delay
-        self._stamp = self.get_clock().now().nanoseconds + delay
+        self._begun = self._subscribed = False
+        self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * 1e9)
         self.create_timer(1.0 / self._settings['rate'], self._on_timer,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         motion, rate = self._settings['motion.type'], self._settings['rate']
@@ -87,6 +90,9 @@ class TrajectoryNode(Node):
     def _on_timer(self) -> None:
         """Publish what is due, each sample with its own stamp, however late the timer is."""
         now = time.monotonic_ns() - self._start
+        if not self._begun:
+            self._wait(now)
+            return
         while not self._done.done():
             due = int(sample_time(self._settings, self._index))
             if due > now:
@@ -96,6 +102,19 @@ class TrajectoryNode(Node):
             if not self._loop and self._index == self._samples:
                 self.get_logger().info(f'{self._samples} setpoints published')
                 self._done.set_result(0)
+
+    def _wait(self, now: int) -> None:
+        """Begin when it is time, which comes sooner once all topics have subscribers."""
+        if not self._subscribed and all(p.get_subscription_count() for p in self._outputs):
+            self._subscribed = True
+            # A subscriber may know the publisher later than the publisher knows it.
+            if now < -_SETTLE:
+                self._start += now + _SETTLE
+                now = -_SETTLE
+        if now >= 0:
+            self._begun = True
+            self._start += now
+            self._stamp = self.get_clock().now().nanoseconds
 
     def _row(self) -> list[list[float]]:
         """Return position, quaternion and the four rates of the sample that is due."""
