@@ -1,0 +1,97 @@
+# `make demo` and `make test` need nothing set up before: the environment is made in .venv, with
+# ROS 2 from PyPI, or with the machine's own where one is sourced. Nothing outside this folder is
+# changed; `make clean` leaves nothing behind inside it.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -e -o pipefail -c
+.DELETE_ON_ERROR:
+.PHONY: bags bench clean demo docs environment lint test
+
+# PYTHON=... chooses another one. The ROS wheels are built for these versions.
+PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
+SUITABLE := import ensurepip, sys, venv; sys.exit(not (3, 10) <= sys.version_info < (3, 14))
+
+# The node needs this module; releases before Jazzy lack it and get the wheels, too.
+ROS := $(if $(ROS_DISTRO),$(shell python3 -Bc 'import rclpy.experimental' >/dev/null 2>&1 || echo no),no)
+
+ifeq ($(ROS),)
+ROS := $(ROS_DISTRO)
+# ROS's own modules are for the system's Python and need more of its modules.
+PYTHONS := python3
+VENV_OPTIONS := --system-site-packages
+REQUIREMENTS := requirements.txt
+else
+ROS := pypi
+REQUIREMENTS := requirements.txt requirements-ros.txt
+# What another ROS, or another environment with these wheels, has left in the shell.
+ifneq ($(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH LD_LIBRARY_PATH RMW_IMPLEMENTATION
+endif
+unexport PYTHONPATH
+endif
+unexport PYTHONHOME
+
+# Programs that would keep something in the home folder keep it here.
+CACHE := $(CURDIR)/.cache
+export COLCON_HOME := $(CACHE)/colcon
+export HYPOTHESIS_STORAGE_DIRECTORY := $(CACHE)/hypothesis
+export MPLCONFIGDIR := $(CACHE)/matplotlib
+export PIP_CACHE_DIR := $(CACHE)/pip
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PYTHONPYCACHEPREFIX := $(CACHE)/pycache
+export ROS_HOME := $(CACHE)/ros
+export ROS_LOG_DIR := $(CACHE)/ros/log
+export XDG_CACHE_HOME := $(CACHE)
+
+PIP := .venv/bin/python -m pip --quiet
+# One stamp for each kind of environment: the other kind is no use once ROS is sourced, or not.
+DEPENDENCIES := .venv/dependencies-$(ROS)
+INSTALLED := .venv/installed-$(ROS)
+
+test: lint
+	.venv/bin/python -m pytest
+
+lint: $(INSTALLED)
+	.venv/bin/python -m ruff check --quiet .
+	.venv/bin/python -m flake8
+	.venv/bin/python -m mypy
+
+demo: $(INSTALLED)
+	@.venv/bin/python demo/demo.py
+
+bench: $(INSTALLED)
+	.venv/bin/python benchmarks/inverse_dynamics.py --write
+
+bags: $(INSTALLED)
+	.venv/bin/python bags/record.py
+
+docs: $(INSTALLED)
+	.venv/bin/python docs/generate.py
+
+environment: $(INSTALLED)
+
+$(DEPENDENCIES): $(REQUIREMENTS)
+	@for python in $(PYTHONS); do \
+	  if "$$python" -c '$(SUITABLE)' 2>/dev/null; then found=$$python; break; fi; \
+	done; \
+	if [ -z "$$found" ]; then \
+	  echo 'make: found no CPython 3.10 to 3.13 that has venv and ensurepip (on Ubuntu:' \
+	    'apt install python3-venv); PYTHON=... names one' >&2; \
+	  exit 1; \
+	fi; \
+	echo "making .venv with $$("$$found" --version), ROS from $(ROS)"; \
+	"$$found" -m venv --clear $(VENV_OPTIONS) .venv
+	@cat $(REQUIREMENTS) > .venv/requirements.txt
+	@$(PIP) install --upgrade --constraint .venv/requirements.txt pip setuptools
+	@$(PIP) install --no-build-isolation --requirement .venv/requirements.txt
+	@touch $@
+
+# Not isolated: the build takes the setuptools that is pinned and no other, which warns of every
+# editable package that has a folder of its own name.
+$(INSTALLED): $(DEPENDENCIES) setup.py setup.cfg pyproject.toml
+	@PYTHONWARNINGS=ignore $(PIP) install --no-build-isolation --no-deps --editable .
+	@touch $@
+
+clean:
+	rm -rf .cache .venv build install log *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,92 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+from glob import glob
+
+from setuptools import setup
+
+package_name = 'stewart_dynamics'
+share = f'share/{package_name}'
+
+# No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
+# knows them under other names. Everything else that an executable imports is here.
+install_requires = [
+    'numba>=0.57; platform_machine in "x86_64 AMD64 aarch64 arm64"',
+    'numpy>=1.26',
+    'rosbags>=0.11',
+    'ruamel.yaml>=0.18',
+]
+extras_require = {
+    'ros': [
+        'ros-jazzy-common-interfaces~=5.3',
+        'ros-rclpy[fastrtps]~=7.1.6',
+    ],
+    'test': [
+        'colcon-common-extensions',
+        'flake8',
+        'flake8-blind-except',
+        'flake8-builtins',
+        'flake8-class-newline',
+        'flake8-comprehensions',
+        'flake8-deprecated',
+        'flake8-docstrings',
+        'flake8-import-order',
+        'flake8-quotes',
+        'hypothesis',
+        'matplotlib',
+        'mcap',
+        'mcap-ros2-support',
+        'mypy',
+        'packaging',
+        'pin',
+        'pytest',
+        'ruff',
+        'scipy',
+        'setuptools>=70.1,<80',  # wheels without the package wheel; colcon needs less than 80
+    ],
+}
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    description='Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs',
+    author='The stewart_dynamics developers',
+    maintainer='The stewart_dynamics developers',
+    maintainer_email='maintainers@stewart-dynamics.example',
+    license='Apache-2.0',
+    packages=[package_name],
+    package_data={package_name: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (share, ['package.xml']),
+        (f'{share}/bags', ['bags/README.md']),
+        *[(f'{share}/{bag}', sorted(glob(f'{bag}/*'))) for bag in sorted(glob('bags/*/'))
+          if not bag.startswith('bags/__')],
+        (f'{share}/config', sorted(glob('config/*.yaml'))),
+        # Not launch/*: after a launch file was compiled there is a folder __pycache__.
+        (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
+    ],
+    python_requires='>=3.10,<3.14',
+    install_requires=install_requires,
+    extras_require=extras_require,
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'stewart_dynamics = stewart_dynamics.node:main',
+            'stewart_replay = stewart_dynamics.replay:main',
+            'stewart_trajectory = stewart_dynamics.trajectory_node:main',
+        ],
+    },
+)

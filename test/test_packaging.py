@@ -1,0 +1,273 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What is built and installed: by colcon, by pip, and what package.xml says of it."""
+
+import ast
+from collections.abc import Iterable, Iterator
+import importlib.metadata
+import os
+from pathlib import Path
+import py_compile
+import re
+import shutil
+import subprocess
+import sys
+from xml.etree import ElementTree
+import zipfile
+
+from packaging.requirements import Requirement
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+NAME = 'stewart_dynamics'
+EXECUTABLES = ('stewart_dynamics', 'stewart_replay', 'stewart_trajectory')
+PACKAGED = ('bags', 'config', 'launch', 'resource', NAME, 'LICENSE', 'package.xml',
+            'pyproject.toml', 'setup.cfg', 'setup.py')
+SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'launch', 'test', NAME)
+
+# Modules whose rosdep key is not their own name; '' where rosdep has no key.
+KEYS = {
+    'hypothesis': 'python3-hypothesis', 'matplotlib': 'python3-matplotlib', 'mcap': '',
+    'mcap_ros2': '', 'numba': 'python3-numba', 'numpy': 'python3-numpy',
+    'packaging': 'python3-packaging', 'pinocchio': 'pinocchio', 'pytest': 'python3-pytest',
+    'rosbags': 'python3-rosbags-pip', 'ruamel': 'python3-ruamel.yaml',
+    'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools', 'yaml': 'python3-yaml'}
+# Modules whose name on PyPI is not their own.
+PIP_NAMES = {'ruamel': 'ruamel.yaml', 'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin',
+             'yaml': 'pyyaml'}
+
+HEADER = re.compile(r"""(#!.*
+)?# Copyright 20\d\d The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2\.0 \(the "License"\);
+# you may not use this file except in compliance with the License\.
+# You may obtain a copy of the License at
+#
+#     http://www\.apache\.org/licenses/LICENSE-2\.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied\.
+# See the License for the specific language governing permissions and
+# limitations under the License\.
+(\n|$)""")
+
+
+def python_files(*folders: str) -> list[Path]:
+    """Return the Python files in these folders of the repository."""
+    return sorted(path for folder in folders for path in (ROOT / folder).rglob('*.py'))
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Yield the modules that are imported, without those that only a type checker imports."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == 'TYPE_CHECKING':
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.module or ''
+        yield from imports(node)
+
+
+def third_party(*folders: str) -> set[str]:
+    """Return the top-level modules that are imported in these folders and not written here."""
+    files = python_files(*folders)
+    own = {NAME, 'test', *(path.stem for path in files), *(path.parent.name for path in files)}
+    found = {name.split('.')[0] for path in files for name in imports(ast.parse(path.read_text()))}
+    return found - own - set(sys.stdlib_module_names)
+
+
+def package_xml() -> ElementTree.Element:
+    """Return the root of package.xml."""
+    return ElementTree.parse(ROOT / 'package.xml').getroot()
+
+
+def depends(*kinds: str) -> set[str]:
+    """Return the rosdep keys in package.xml of these kinds of dependency."""
+    return {element.text or '' for kind in kinds for element in package_xml().findall(kind)}
+
+
+def call(arguments: Iterable[str | Path], **options: object) -> str:
+    """Run a program to its end, which must be a good one, and return what it printed."""
+    done = subprocess.run(
+        [str(argument) for argument in arguments], stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=300, **options)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+@pytest.fixture(scope='module')
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of what is packaged: a build leaves files beside setup.py."""
+    folder = tmp_path_factory.mktemp('source') / NAME
+    folder.mkdir()
+    for name in PACKAGED:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, folder / name,
+                            ignore=shutil.ignore_patterns('__pycache__'))
+        else:
+            shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the wheel that pip builds."""
+    pytest.importorskip('setuptools', '70.1')  # older ones need the package wheel as well
+    folder = tmp_path_factory.mktemp('wheel')
+    call([sys.executable, '-m', 'pip', 'wheel', '--no-deps', '--no-build-isolation',
+          '--wheel-dir', folder, source])
+    return next(folder.glob('*.whl'))
+
+
+@pytest.fixture(scope='module')
+def distribution(wheel: Path) -> importlib.metadata.Distribution:
+    """Return what the wheel says of itself."""
+    folder = next(path for path in zipfile.Path(wheel).iterdir()
+                  if path.name.endswith('.dist-info'))
+    return importlib.metadata.PathDistribution(folder)
+
+
+@pytest.fixture(scope='module')
+def install(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the install space of colcon after two builds."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ['PATH']])
+    colcon = shutil.which('colcon', path=path)
+    if colcon is None:
+        pytest.skip('there is no colcon')
+    folder = tmp_path_factory.mktemp('colcon')
+    for launch_file in (source / 'launch').glob('*.py'):
+        # As ros2 launch leaves them: a folder __pycache__ in launch/.
+        py_compile.compile(str(launch_file), doraise=True)
+    for _ in range(2):
+        call([colcon, '--log-base', folder / 'log', 'build', '--base-paths', source,
+              '--build-base', folder / 'build', '--install-base', folder / 'install',
+              '--event-handlers', 'desktop_notification-', 'console_direct+'],
+             cwd=folder, env={**os.environ, 'COLCON_HOME': str(folder / 'home')})
+    return folder / 'install'
+
+
+def check_share(share: Path) -> None:
+    """Check that the files are there which ROS and the launch files look up."""
+    assert (share / 'ament_index/resource_index/packages' / NAME).is_file()
+    assert (share / NAME / 'package.xml').is_file()
+    for pattern in ('bags/*.mcap', 'config/*.yaml', 'launch/*.launch.py'):
+        expected = {path.name for path in ROOT.glob(pattern)}
+        folder, _, files = pattern.partition('/')
+        assert {path.name for path in (share / NAME / folder).glob(files)} == expected
+    assert (share / NAME / 'config/platform.yaml').is_file()
+    assert (share / NAME / 'launch/demo.launch.py').is_file()
+
+
+def test_colcon_puts_executables_where_ros2_run_looks(install: Path) -> None:
+    """Scripts stand in lib/<package> and data in share/."""
+    scripts = install / NAME / 'lib' / NAME
+    assert {path.name for path in scripts.iterdir()} == set(EXECUTABLES)
+    assert all(os.access(path, os.X_OK) for path in scripts.iterdir())
+    check_share(install / NAME / 'share')
+
+
+def test_colcon_result_runs(install: Path) -> None:
+    """The executables are those of the install space and not of another installation."""
+    script = install / NAME / 'lib' / NAME / 'stewart_replay'
+    setup = f'. "{install}/setup.bash" && '
+    assert 'usage' in call(['bash', '-c', f'{setup}"{script}" --help'])
+    where = call(['bash', '-c', f'{setup}"{sys.executable}" -c '
+                  f'"import {NAME}; print({NAME}.__file__)"'], cwd=install)
+    assert str(install) in where
+
+
+def test_wheel_has_entry_points_and_no_scripts(
+        wheel: Path, distribution: importlib.metadata.Distribution) -> None:
+    """What setup.cfg says to colcon about scripts does not leak into the wheel."""
+    assert {point.name for point in distribution.entry_points} == set(EXECUTABLES)
+    names = zipfile.ZipFile(wheel).namelist()
+    assert not [name for name in names if '/scripts/' in name or '/lib/' in name]
+    modules = {path.relative_to(ROOT).as_posix() for path in python_files(NAME)}
+    assert {name for name in names if name.endswith('.py') and '.data/' not in name} == modules
+
+
+def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:
+    """They land in bin/, beside Python, and the data in share/."""
+    call([sys.executable, '-m', 'pip', 'install', '--no-deps', '--no-index', '--ignore-installed',
+          '--prefix', tmp_path, wheel])
+    assert {path.name for path in (tmp_path / 'bin').iterdir()} == set(EXECUTABLES)
+    check_share(tmp_path / 'share')
+
+
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_entry_point_loads(distribution: importlib.metadata.Distribution, name: str) -> None:
+    """The function behind each executable exists."""
+    if name != 'stewart_replay':
+        pytest.importorskip('rclpy')
+    point, = distribution.entry_points.select(name=name)
+    assert callable(point.load())
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'launch').glob('*.launch.py')),
+                         ids=lambda path: path.name)
+def test_launch_file_compiles(path: Path, tmp_path: Path) -> None:
+    """Launch files are Python; ROS's launch is not on PyPI, so no more can be asked."""
+    py_compile.compile(str(path), cfile=str(tmp_path / 'compiled'), doraise=True)
+    assert 'def generate_launch_description(' in path.read_text()
+
+
+def test_package_xml_names_what_the_package_imports() -> None:
+    """Each third-party module that is imported has its rosdep key in package.xml."""
+    needed = {KEYS.get(name, name) for name in third_party('launch', NAME)} - {''}
+    assert needed <= depends('depend', 'exec_depend')
+
+
+def test_package_xml_names_what_the_tests_import() -> None:
+    """The same for the tests."""
+    needed = {KEYS.get(name, name) for name in third_party('test')} - {''}
+    assert needed <= depends('depend', 'exec_depend', 'test_depend')
+
+
+def test_setup_agrees_with_package_xml(distribution: importlib.metadata.Distribution) -> None:
+    """Name, version and licence are the same to pip as to ROS."""
+    xml = package_xml()
+    assert distribution.metadata['Name'].replace('-', '_') == xml.findtext('name') == NAME
+    assert distribution.metadata['Version'] == xml.findtext('version')
+    assert distribution.metadata['License'] == xml.findtext('license') == 'Apache-2.0'
+    assert xml.findtext('export/build_type') == 'ament_python'
+
+
+def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None:
+    """What is imported is required, ROS only by its extra, and all of it is pinned."""
+    requirements = [Requirement(text) for text in distribution.requires or ()]
+    always = {item.name for item in requirements if 'extra' not in str(item.marker)}
+    imported = third_party(NAME) & set(KEYS)
+    assert {PIP_NAMES.get(name, name) for name in imported} <= always
+    assert not [name for name in always if name.startswith('ros-')]
+    extras = {item.name for item in requirements} | {'pip'}
+    imported = third_party(*SOURCES) & set(KEYS)
+    assert {PIP_NAMES.get(name, name) for name in imported} <= extras
+    pins = [Requirement(line) for file in ('requirements.txt', 'requirements-ros.txt')
+            for line in (ROOT / file).read_text().splitlines() if not line.startswith('#')]
+    assert {str(pin.specifier)[:2] for pin in pins} == {'=='}
+    versions = {pin.name: str(pin.specifier)[2:] for pin in pins}
+    for item in requirements:
+        assert item.specifier.contains(versions[item.name]), item
+
+
+@pytest.mark.parametrize('path', python_files(*SOURCES),
+                         ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_copyright_header(path: Path) -> None:
+    """Each file that says something begins with the header that ament_copyright asks for."""
+    text = path.read_text()
+    assert not text or HEADER.match(text)
