@@ -35,6 +35,8 @@ _TIME_AND_LENGTH = {0: Struct('>iII'), 1: Struct('<iII')}
 _SIX = {0: Struct('>6d'), 1: Struct('<6d')}
 _SEVEN = {0: Struct('>7d'), 1: Struct('<7d')}
 _COUNT = {0: Struct('>I'), 1: Struct('<I')}
+_STAMPS_END = 2 ** 31 * 1_000_000_000
+_DURATION = {0: Struct('>iI'), 1: Struct('<iI')}
 
 
 class MalformedError(ValueError):
@@ -124,6 +126,7 @@ def combined(data: bytes) -> Stamped:
             at = _aligned8(at)
             values += layout[order].unpack_from(data, at)
             at += layout[order].size
+        _DURATION[order].unpack_from(data, at)  # time_from_start: not used, but it must be there
     except (IndexError, KeyError, StructError) as exc:
         raise MalformedError(f'{len(data)} bytes: {exc}') from exc
     return Stamped(_nanoseconds(data, sec, nanosec), frame, values)
@@ -197,6 +200,11 @@ class JointState:
                 LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position, 6, *velocity, 0)
         return self._whole.pack(LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position,
                                 6, *velocity, 6, *effort)
+
+
+def is_stamp(nanoseconds: int) -> bool:
+    """Return whether a builtin_interfaces/Time can hold it: until 2038, a clock may be beyond."""
+    return -_STAMPS_END <= nanoseconds < _STAMPS_END
 
 
 def finite(values: Sequence[float]) -> bool:
