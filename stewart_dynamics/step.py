@@ -105,7 +105,7 @@ class Step:
     def __call__(
             self, setpoint: Setpoint, wrench: Six, before: Singularity | None) -> Output | None:
         """
-        Return the output, or None where numbers overflow.
+        Return the output, or None where numbers overflow, the stamp's own among them.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Step:
         """
         result = self._platform.solve(
             np.array((setpoint.motion,)), np.array((wrench,)))[0].tolist()
-        if not cdr.finite(result):
+        if not cdr.finite(result) or not cdr.is_stamp(setpoint.stamp):
             return None
         lengths: Six = tuple(result[0:6])
         rates: Six = tuple(result[6:12])
