@@ -62,11 +62,14 @@ class Summary(NamedTuple):
 
         Parameters
         ----------
-        legs : six names
+        legs : sequence of str
+            Six names.
         stamps : (N,)
             Of the samples [ns], at least one.
-        lengths, forces : (N, 6)
-            [m, N]; a force that was not published is nan.
+        lengths : (N, 6)
+            [m]
+        forces : (N, 6)
+            [N]; a force that was not published is nan.
         determinants : (N,)
             [m^3]
         warnings : sequence of (stamp, on)
@@ -87,10 +90,7 @@ class Summary(NamedTuple):
                  float(length[:, n].max()), bool(size[at[n], n] >= most[n]))
             for n, leg in enumerate(legs))
         nearest = int(np.argmin(np.abs(det)))
-        signs = np.sign(det)
-        before = np.flatnonzero(signs[:-1] * signs[1:] < 0)
-        share = det[before] / (det[before] - det[before + 1])
-        crossings = time[before] + share * (time[before + 1] - time[before])
+        crossings = _crossings(time, det)
         begun: list[float] = []
         spans: list[tuple[float, float]] = []
         for when, on in warnings:
@@ -100,8 +100,10 @@ class Summary(NamedTuple):
             elif not on and begun:
                 spans.append((begun.pop(), seconds))
         spans += [(seconds, np.inf) for seconds in begun]
-        return cls(len(stamp), float(time[-1]), peaks, float(det[nearest]),
-                   float(time[nearest]), tuple(crossings.tolist()), tuple(spans))
+        # where stamps jump back a bag began anew: what it lasted is what went forward
+        duration = int(np.diff(stamp).clip(0).sum()) * 1e-9
+        return cls(len(stamp), duration, peaks, float(det[nearest]),
+                   float(time[nearest]), crossings, tuple(spans))
 
     def table(self) -> str:
         """Return the summary as lines that a person can read."""
@@ -133,3 +135,13 @@ class Summary(NamedTuple):
         if not self.warnings:
             lines.append('no singularity warning')
         return '\n'.join(lines)
+
+
+def _crossings(time: Array, det: Array) -> tuple[float, ...]:
+    """Return when det(J) changed its sign, also by way of a zero, between forward steps."""
+    apart = np.flatnonzero(det)
+    before = apart[:-1][np.sign(det[apart[:-1]]) != np.sign(det[apart[1:]])]
+    before = before[time[before + 1] > time[before]]
+    share = det[before] / (det[before] - det[before + 1])
+    when: list[float] = (time[before] + share * (time[before + 1] - time[before])).tolist()
+    return tuple(when)
