@@ -22,14 +22,16 @@ order of the bag, so the outputs are the node's, bit for bit.
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import csv
+import os
 from pathlib import Path
 import shutil
 import sys
 import tempfile
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -45,6 +47,9 @@ from stewart_dynamics.step import Output, OUTPUT_TYPES, Step
 from stewart_dynamics.summary import Summary
 
 DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
+# of several bags the gravest decides
+_GRAVITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
+_INTERRUPTED = 130
 NODE = '/stewart_dynamics'
 
 _NAN = float('nan')
@@ -57,6 +62,9 @@ class Replayed(NamedTuple):
     summary: Summary | None
     """None where no setpoint was answered."""
     refusals: dict[Refusal, int]
+    """They, and the messages that made the setpoints, are all that was read."""
+    notices: tuple[str, ...]
+    """What the node would say in its log."""
     limit_met: bool
     """A limit or a singularity warning was met."""
     unread: str
@@ -153,8 +161,8 @@ class _Outputs:
             output.condition, int(output.singularity.warning)])
 
     def close(self) -> None:
-        self._bag.close()
-        self._file.close()
+        with self._file:
+            self._bag.close()
 
 
 @contextmanager
@@ -179,6 +187,8 @@ def replay(
     ----------
     path : Path
         A rosbag2 folder, or one of its files (.mcap, .db3).
+    parameters : Parameters
+        The machine's.
     folder : Path
         It must not exist; it appears when all is written.
     node : str
@@ -190,7 +200,8 @@ def replay(
     if folder.exists():
         raise BagError(f'{folder}: exists already')
     step = Step(parameters)
-    setpoints = Setpoints(parameters, lambda refusal, details: None, lambda text: None)
+    notices: list[str] = []
+    setpoints = Setpoints(parameters, lambda refusal, details: None, notices.append)
     bag = _Bag(path, node, setpoints.topics)
     stamps: list[int] = []
     lengths: list[Sequence[float]] = []
@@ -199,6 +210,8 @@ def replay(
     warnings: list[tuple[int, bool]] = []
     limit_met = False
     state: Singularity | None = None
+    taken: Counter[str] = Counter()
+    joined = 0
     try:
         with _whole_folder(folder) as partial:
             outputs = _Outputs(partial, node, parameters['joints'])
@@ -207,9 +220,11 @@ def replay(
                     if topic == inputs.WRENCH:
                         setpoints.take_wrench(data)
                         continue
+                    taken[topic] += 1
                     setpoint = setpoints.take(topic, data, time)
                     if setpoint is None:
                         continue
+                    joined += 1
                     output = step(setpoint, setpoints.wrench, state)
                     if output is None:
                         setpoints.refuse('setpoint', inputs.OUT_OF_RANGE, '')
@@ -227,9 +242,14 @@ def replay(
                 outputs.close()
     finally:
         bag.close()
+    for topic in setpoints.topics:
+        refused = sum(n for refusal, n in setpoints.counts.items() if refusal.topic == topic)
+        for _ in range(taken[topic] - joined - refused):
+            setpoints.refuse(topic, inputs.NOT_JOINED, 'the bag ends')
     summary = Summary.of(parameters['joints'], stamps, lengths, forces, determinants,
                          warnings) if stamps else None
-    return Replayed(path, summary, dict(setpoints.counts), limit_met, bag.unread)
+    return Replayed(
+        path, summary, dict(setpoints.counts), tuple(notices), limit_met, bag.unread)
 
 
 def _one_line(exc: BaseException) -> str:
@@ -264,24 +284,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     code = DONE
     try:
         parameters = Parameters.from_yaml(options.params)
+        folders = _folders(options.bags, options.output)
         if not COMPILED:
             print(f'stewart_replay: {UNCOMPILED_COST}', file=sys.stderr)
+        for path, folder in folders.items():
+            code = max(code, _replay_one(path, folder, parameters, options), key=_GRAVITY)
     except StewartError as exc:
         return _complain(exc)
-    for path in options.bags:
-        try:
-            result = replay(path, parameters, options.output / path.stem,
-                            '/' + options.node.strip('/'))
-        except (StewartError, OSError) as exc:
-            code = _complain(exc)
-            continue
-        _print(result)
-        if result.unread:
-            _complain(f'{path}: the rest could not be read: {result.unread}')
-            code = code or PARTLY_READ
-        elif options.strict and result.limit_met:
-            code = code or LIMIT_MET
+    except KeyboardInterrupt:
+        return _INTERRUPTED
     return code
+
+
+def _folders(bags: Sequence[Path], output: Path) -> dict[Path, Path]:
+    """Return each bag's folder of results, named as the bag; no two may have the same."""
+    folders: dict[Path, Path] = {}
+    for path in bags:
+        whole = Path(os.path.abspath(path))  # '.' has no name
+        folder = output / (whole.name if path.is_dir() else whole.stem)
+        for other, taken in folders.items():
+            if folder == taken:
+                raise BagError(f'{other}, {path}: the results of both would be {folder}: replay '
+                               'one of them into another --output')
+        folders[path] = folder
+    return folders
+
+
+def _replay_one(path: Path, folder: Path, parameters: Parameters,
+                options: argparse.Namespace) -> int:
+    try:
+        result = replay(path, parameters, folder, '/' + options.node.strip('/'))
+    except (StewartError, OSError) as exc:
+        return _complain(exc)
+    _print(result)
+    if result.unread:
+        _complain(f'{path}: the rest could not be read: {result.unread}')
+        return PARTLY_READ
+    return LIMIT_MET if options.strict and result.limit_met else DONE
 
 
 def _complain(what: object) -> int:
@@ -292,6 +331,8 @@ def _complain(what: object) -> int:
 def _print(result: Replayed) -> None:
     print(f'{result.bag}:')
     print(result.summary.table() if result.summary else 'no setpoint could be answered')
+    for notice in result.notices:
+        print(notice)
     for refusal, number in sorted(result.refusals.items()):
         print(f'refused, {refusal.topic}: {number} {refusal.reason}')
     print()
