@@ -54,6 +54,7 @@ extras_require = {
         'pytest',
         'ruff',
         'scipy',
+        'tqdm',
         'setuptools>=70.1,<80',  # wheels without the package wheel; colcon needs less than 80
     ],
 }

@@ -62,7 +62,6 @@ else:
         return cast('Function', kept(function))
 
 
-
 def source_digest(*modules: str) -> str:
     """
     Return a digest of these modules' sources, which stand beside this one.

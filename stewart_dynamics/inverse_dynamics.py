@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.compiled import compiled, entry_point, inlined, source_digest
 from stewart_dynamics.matrix6 import (
-    gram, inverse_and_determinant, laguerre_step, tridiagonal, Tridiagonal)
+    gram, inverse_and_determinant, laguerre_step, Tridiagonal, tridiagonal)
 from stewart_dynamics.vectors import (
     add, cross, dot, dot6, Matrix3, rotate, rotate_back, scale, subtract, symmetric, Vector3,
     Vector6)
@@ -308,7 +308,7 @@ def _entry_point(source: str) -> Callable[[Array, Array, Array, Array], None]:
             d(det)/dt [m^3/s] and the condition number.
 
         """
-        source  # part of the key of the kept machine code: see source_digest
+        _ = source  # part of the key of the kept machine code: see source_digest
         tile = np.empty(_TILE)
         many = len(motions)
         one_wrench = len(wrenches) == 1

@@ -25,7 +25,7 @@ together. Every function takes any leading shape of samples.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ class Legs(NamedTuple):
     arms: Array  # a_i = R p_i (..., 6, 3) [m]
 
 
-def skew(vector: Array) -> Array:
+def skew(vector: NDArray[np.floating[Any]]) -> Array:
     """Return S (..., 3, 3) with S b = vector x b."""
     x, y, z = np.moveaxis(vector, -1, 0)
     zero = np.zeros_like(x)

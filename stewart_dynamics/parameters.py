@@ -47,7 +47,7 @@ class Parameter(NamedTuple):
     """
 
     name: str
-    type: str
+    kind: str
     text: str
     unit: str = ''
     default: Any = None
@@ -62,8 +62,8 @@ class Parameter(NamedTuple):
     def ros_type(self) -> str:
         """The type's name in ROS, as the documents have it."""
         if not self.sizes:
-            return self.type
-        return f'{self.type}[{" or ".join(map(str, self.sizes))}]'
+            return self.kind
+        return f'{self.kind}[{" or ".join(map(str, self.sizes))}]'
 
     @property
     def rule(self) -> str:
@@ -92,7 +92,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('geometry.platform_joints', 'double',
               'x y z of the six platform joints, in the same order, platform frame', 'm',
               required=True, sizes=(18,)),
-    _legs('geometry.zero_length', 'length at which a leg\'s published position is zero', 'm'),
+    _legs('geometry.zero_length', 'length at which the published position is zero', 'm'),
     Parameter('platform.mass', 'double', 'mass of the platform with all that it carries', 'kg',
               required=True, minimum=0.0, above=True, while_active=True),
     Parameter('platform.center_of_mass', 'double', 'its center of mass, platform axes', 'm',
@@ -100,11 +100,11 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('platform.inertia', 'double',
               'ixx ixy ixz iyy iyz izz about its center of mass, platform axes', 'kg m^2',
               required=True, sizes=(6,), while_active=True),
-    _legs('legs.cylinder.mass', 'mass of a leg\'s lower part', 'kg', minimum=0.0),
+    _legs('legs.cylinder.mass', 'mass of the lower part', 'kg', minimum=0.0),
     _legs('legs.cylinder.center_of_mass', 'its distance from the base joint', 'm'),
     _legs('legs.cylinder.inertia', 'transverse inertia about its center of mass', 'kg m^2',
           minimum=0.0),
-    _legs('legs.piston.mass', 'mass of a leg\'s upper part', 'kg', minimum=0.0),
+    _legs('legs.piston.mass', 'mass of the upper part', 'kg', minimum=0.0),
     _legs('legs.piston.center_of_mass', 'its distance from the platform joint', 'm'),
     _legs('legs.piston.inertia', 'transverse inertia about its center of mass', 'kg m^2',
           minimum=0.0),
@@ -150,8 +150,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'restart', 's', 0.1, minimum=0.0, above=True),
     Parameter('setpoint.exclusive', 'bool',
               'refuse setpoints while a topic has more than one writer', default=False),
-    Parameter('visualization_rate', 'double', 'most markers in a second, 0: none; markers are not published yet', 'Hz', 30.0,
-              minimum=0.0),
+    Parameter('visualization_rate', 'double', 'most markers in a second, 0: none; markers are '
+              'not published yet', 'Hz', 30.0, minimum=0.0),
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
 )})
 
@@ -336,7 +336,7 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
     is_array = isinstance(value, list | tuple)
     entries = list(value) if is_array else [value]
     if is_array and not parameter.sizes:
-        raise _broken(parameter, value, source, f'must be a single {parameter.type}')
+        raise _broken(parameter, value, source, f'must be a single {parameter.kind}')
     if not is_array and parameter.sizes and 1 not in parameter.sizes:
         raise _broken(parameter, value, source, f'must be an array of {parameter.sizes[0]}')
     if not entries and parameter.default == ():
@@ -346,7 +346,7 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
             ' or '.join(map(str, parameter.sizes)), len(entries)))
     for entry in entries:
         _check_entry(parameter, entry, source)
-    if parameter.type != 'double':
+    if parameter.kind != 'double':
         return tuple(entries) if parameter.sizes else entries[0]
     if not parameter.sizes:
         return entries[0]
@@ -358,14 +358,14 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
 
 def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
     given = type(entry)
-    if given is not _PYTHON_TYPES[parameter.type]:
-        if parameter.type == 'double' and given is int:
+    if given is not _PYTHON_TYPES[parameter.kind]:
+        if parameter.kind == 'double' and given is int:
             raise _broken(parameter, entry, source,
                           f'is an integer, must be a double: write {entry}.0')
-        raise _broken(parameter, entry, source, f'must be a {parameter.type}')
+        raise _broken(parameter, entry, source, f'must be a {parameter.kind}')
     if parameter.choices and entry not in parameter.choices:
         raise _broken(parameter, entry, source, f'must be {parameter.rule}')
-    if parameter.type == 'double':
+    if parameter.kind == 'double':
         if not math.isfinite(entry):
             raise _broken(parameter, entry, source, 'must be finite')
         if entry < parameter.minimum or (parameter.above and entry == parameter.minimum):

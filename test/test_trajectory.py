@@ -203,7 +203,7 @@ def test_a_broken_rule_is_named(changes: dict[str, object], text: str) -> None:
 def test_every_parameter_is_described() -> None:
     for name, parameter in TrajectoryParameters.table.items():
         assert parameter.text
-        assert bool(parameter.unit) == (parameter.type == 'double'), name
+        assert bool(parameter.unit) == (parameter.kind == 'double'), name
 
 
 def limits_broken(platform: StewartPlatform, result: InverseDynamics) -> set[str]:
