@@ -1,0 +1,222 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Motions, and the rotations and angular velocities they are made of."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    derivative, random_direction, random_parameters, relative, rng, rotation_about,
+    smooth_motion)
+
+from stewart_dynamics import Motion, MotionError
+from stewart_dynamics.lagrange import skew
+from stewart_dynamics.rotation import (
+    euler_rate_matrix, euler_rate_matrix_rate, from_euler, to_quaternion)
+
+Array = NDArray[np.float64]
+
+X, Y, Z = np.eye(3)
+UPRIGHT = np.eye(3)
+
+
+def of_quaternion(quaternion: Array) -> Array:
+    """Return the rotation matrix of a unit quaternion x y z w."""
+    u, w = quaternion[:3], quaternion[3]
+    k = skew(u)
+    r: Array = np.eye(3) + 2.0 * w * k + 2.0 * k @ k
+    return r
+
+
+# Rotations
+
+def test_euler_angles_turn_about_x_then_y_then_z() -> None:
+    for alpha, beta, gamma in rng().uniform(-np.pi, np.pi, (50, 3)):
+        turned = rotation_about(Z, gamma) @ rotation_about(Y, beta) @ rotation_about(X, alpha)
+        assert np.allclose(from_euler([alpha, beta, gamma]), turned, rtol=0.0, atol=1e-15)
+
+
+def test_rotation_changes_as_the_angular_velocity_of_the_euler_rates_has_it() -> None:
+    random = rng()
+    for _ in range(50):
+        angles, rates = random.uniform(-3.0, 3.0, (2, 3))
+        omega = euler_rate_matrix(angles) @ rates
+        change = derivative(lambda h: from_euler(angles + h * rates), 1e-3)  # noqa: B023
+        assert relative(skew(omega) @ from_euler(angles), change) < 1e-9
+
+
+def test_euler_rate_matrix_rate_is_its_derivative() -> None:
+    random = rng()
+    for _ in range(50):
+        angles, rates = random.uniform(-3.0, 3.0, (2, 3))
+        change = derivative(lambda h: euler_rate_matrix(angles + h * rates), 1e-3)  # noqa: B023
+        assert relative(euler_rate_matrix_rate(angles, rates), change) < 1e-9
+
+
+def test_velocities_and_accelerations_of_euler_angles_are_derivatives_along_a_motion() -> None:
+    random = rng()
+    course = smooth_motion(random_parameters(random), random)
+    times = np.linspace(0.0, 3.0, 40)
+    motion = course(times)
+
+    def after(name: str) -> Array:
+        return derivative(lambda h: getattr(course(times + h), name), 1e-3)
+
+    spin = after('rotation') @ np.swapaxes(motion.rotation, -1, -2)
+    assert relative(skew(motion.angular_velocity), spin) < 1e-8
+    assert relative(motion.angular_acceleration, after('angular_velocity')) < 1e-8
+    assert relative(motion.linear_velocity, after('position')) < 1e-8
+    assert relative(motion.linear_acceleration, after('linear_velocity')) < 1e-8
+
+
+def test_angular_velocity_is_the_euler_rates_at_zero_angles_only() -> None:
+    rates = [0.1, 0.2, 0.3]
+    at_zero = Motion.from_euler(np.zeros(3), np.zeros(3), None, rates)
+    assert np.array_equal(at_zero.angular_velocity, rates)
+    tilted = Motion.from_euler(np.zeros(3), [0.1, 0.2, 0.3], None, rates)
+    assert not np.allclose(tilted.angular_velocity, rates, atol=1e-3)
+
+
+def test_quaternions_give_their_rotations_back() -> None:
+    random = rng()
+    turns = np.array([rotation_about(random_direction(random), angle)
+                      for angle in random.uniform(-np.pi, np.pi, 200)])
+    quaternions = to_quaternion(turns)
+    assert np.allclose(np.linalg.norm(quaternions, axis=-1), 1.0, rtol=0.0, atol=1e-15)
+    assert np.all(quaternions[:, 3] >= 0.0)
+    for quaternion, turn in zip(quaternions, turns, strict=True):
+        assert np.allclose(of_quaternion(quaternion), turn, rtol=0.0, atol=2e-15)
+
+
+@pytest.mark.parametrize('short_of', [0.0, 1e-12, 1e-8, 1e-4, -1e-8])
+@pytest.mark.parametrize('axis', [
+    X, Y, Z, -X, -Y, -Z, (X + Y) / np.sqrt(2), (Y - Z) / np.sqrt(2),
+    (X + Y + Z) / np.sqrt(3), (1e-9 * X + Y)])
+def test_quaternions_of_half_turns_lose_no_digits(axis: Array, short_of: float) -> None:
+    turn = rotation_about(axis, np.pi - short_of)
+    quaternion = to_quaternion(turn)
+    assert quaternion[3] >= 0.0
+    assert np.allclose(of_quaternion(quaternion), turn, rtol=0.0, atol=2e-15)
+    assert abs(np.dot(quaternion[:3], axis)) == pytest.approx(np.cos(short_of / 2), abs=1e-15)
+
+
+def test_exact_half_turns_have_exact_quaternions() -> None:
+    for axis in np.eye(3):
+        turn = 2.0 * np.outer(axis, axis) - np.eye(3)
+        assert np.array_equal(to_quaternion(turn), [*axis, 0.0])
+    assert np.array_equal(to_quaternion(np.eye(3)), [0.0, 0.0, 0.0, 1.0])
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
+    lambda q: np.linalg.norm(q) > 1e-3))
+def test_any_quaternion_comes_back_up_to_its_sign(numbers: list[float]) -> None:
+    quaternion = np.array(numbers) / np.linalg.norm(numbers)
+    back = to_quaternion(of_quaternion(quaternion))
+    assert abs(np.dot(back, quaternion)) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_rotations_take_any_leading_shape() -> None:
+    angles = rng().uniform(-1.0, 1.0, (2, 3, 3))
+    for function, tail in ((from_euler, (3, 3)), (euler_rate_matrix, (3, 3)),
+                           (lambda a: to_quaternion(from_euler(a)), (4,))):
+        many = function(angles)
+        assert many.shape == (2, 3, *tail)
+        assert np.allclose(many[1, 2], function(angles[1, 2]), rtol=0.0, atol=1e-15)
+        assert function(angles[:0]).shape == (0, 3, *tail)
+
+
+# Motions
+
+def test_parts_are_given_back_and_what_is_left_out_is_zero() -> None:
+    motion = Motion([1.0, 2.0, 3.0], UPRIGHT, angular_velocity=[4.0, 5.0, 6.0])
+    assert motion.shape == ()
+    assert np.array_equal(motion.position, [1.0, 2.0, 3.0])
+    assert np.array_equal(motion.rotation, UPRIGHT)
+    assert np.array_equal(motion.linear_velocity, np.zeros(3))
+    assert np.array_equal(motion.angular_velocity, [4.0, 5.0, 6.0])
+    assert np.array_equal(motion.linear_acceleration, np.zeros(3))
+    assert np.array_equal(motion.angular_acceleration, np.zeros(3))
+    assert '[1.0, 2.0, 3.0]' in repr(motion)
+
+
+def test_leading_shapes_broadcast() -> None:
+    motion = Motion(np.zeros((4, 1, 3)), UPRIGHT, np.ones((5, 3)))
+    assert motion.shape == (4, 5)
+    assert motion.rotation.shape == (4, 5, 3, 3)
+    assert np.array_equal(motion.linear_velocity, np.ones((4, 5, 3)))
+    assert '(4, 5)' in repr(motion)
+    euler = Motion.from_euler([0.0, 0.0, 1.0], np.zeros((7, 3)), angle_rates=[0.1, 0.0, 0.0])
+    assert euler.shape == (7,)
+
+
+def test_arrays_are_copied_and_their_views_read_only() -> None:
+    position = np.zeros(3)
+    motion = Motion(position, UPRIGHT)
+    position[0] = 1.0
+    assert motion.position[0] == 0.0
+    for name in ('position', 'rotation', 'linear_velocity', 'angular_velocity',
+                 'linear_acceleration', 'angular_acceleration'):
+        with pytest.raises(ValueError, match='read-only'):
+            getattr(motion, name)[...] = 1.0
+
+
+@pytest.mark.parametrize(('arguments', 'texts'), [
+    (([0.0, 0.0], UPRIGHT), ['position: shape (2,)', 'must end in (3,)']),
+    ((0.0, UPRIGHT), ['position: shape ()', 'must end in (3,)']),
+    ((np.zeros(3), np.zeros(9)), ['rotation: shape (9,)', 'must end in (3, 3)']),
+    (([0.0, np.nan, 0.0], UPRIGHT), ['position[1]: nan', 'must be finite']),
+    ((np.zeros(3), UPRIGHT, [[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]),
+     ['linear_velocity[1, 2]: inf', 'must be finite']),
+    ((np.zeros(3), -UPRIGHT), ['rotation: [[-1.0', 'not a rotation', 'determinant of +1']),
+    ((np.zeros(3), 1.001 * UPRIGHT), ['rotation: ', 'not a rotation', '0.002', '1e-06']),
+    ((np.zeros(3), 1e200 * UPRIGHT), ['rotation: ', 'not a rotation']),
+    ((np.zeros(3), [UPRIGHT, UPRIGHT, np.zeros((3, 3))]), ['rotation[2]: ', 'not a rotation']),
+    ((np.zeros((2, 3)), UPRIGHT, np.zeros((3, 3))),
+     ['do not fit', "'position': (2,)", "'linear_velocity': (3,)"]),
+    ((['a', 'b', 'c'], UPRIGHT), ['position: not an array of numbers']),
+    (([[0.0, 0.0, 0.0], [0.0]], UPRIGHT), ['position: not an array of numbers']),
+    ((object(), UPRIGHT), ['position: not an array of numbers']),
+])
+def test_what_is_no_motion_is_refused_with_its_place_and_rule(
+        arguments: Any, texts: list[str]) -> None:
+    with pytest.raises(MotionError) as caught:
+        Motion(*arguments)
+    for text in texts:
+        assert text in str(caught.value)
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (([0.0, 0.0, 1.0], [0.0, 0.0]), 'angles: shape (2,)'),
+    (([0.0, 0.0, 1.0], np.zeros(3), None, [0.0, np.inf, 0.0]), 'angle_rates[1]: inf'),
+    (([0.0, 0.0, 1.0], np.zeros((2, 3)), None, np.zeros((3, 3))), 'do not fit each other'),
+    (([0.0, 0.0, 1.0], np.zeros(3), None, None, None, [[0.0]]), 'angle_accelerations: shape'),
+])
+def test_what_are_no_euler_angles_is_refused(arguments: Any, text: str) -> None:
+    with pytest.raises(MotionError, match=re.escape(text)):
+        Motion.from_euler(*arguments)
+
+
+def test_a_rotation_as_coarse_as_a_message_s_rounding_is_taken() -> None:
+    rounded = rotation_about(X, 0.3).astype(np.float32)
+    assert Motion(np.zeros(3), rounded).shape == ()

@@ -1,0 +1,375 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The parameters: what a good file gives, and what each bad one is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, HealthCheck, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from referees import ROOT
+from ruamel.yaml import YAML
+
+from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.parameters import PARAMETERS
+
+GOOD = """\
+/**:
+  ros__parameters:
+    joints: [a, b, c, d, e, f]
+    geometry:
+      base_joints: [1.0, 0.3, 0.0,  0.9, 0.5, 0.1,  -0.1, 1.0, 0.0,
+                    -0.8, 0.6, 0.0,  -0.8, -0.6, 0.0,  1.0, -0.4, 0.0]
+      platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,
+                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]
+    platform:
+      mass: 150.0
+      center_of_mass: [0.01, 0.0, 0.1]
+      inertia: [20.0, 1.0, 2.0, 21.0, 3.0, 35.0]
+    legs:
+      cylinder: {mass: 12.0, center_of_mass: 0.3, inertia: 0.4}
+      piston: {mass: [6.0, 6.1, 6.2, 6.3, 6.4, 6.5], center_of_mass: 0.35, inertia: 1e-3}
+    limits: {length_min: 0.8, length_max: 1.4}
+    singularity: {warn_condition: 40.0, stop_condition: 400.0}
+    visualization_rate: 25.0
+"""
+
+
+def written(path: Path, text: str) -> Path:
+    """Return the path of a parameter file with this text."""
+    file = path / 'machine.yaml'
+    file.write_text(text, encoding='utf-8')
+    return file
+
+
+def refused(path: Path, text: str) -> str:
+    """Return what is said of a parameter file with this text."""
+    with pytest.raises(ParameterError) as caught:
+        Parameters.from_yaml(written(path, text))
+    return str(caught.value)
+
+
+# What a good file gives
+
+def test_a_good_file_gives_its_values(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    assert set(p) == set(PARAMETERS)
+    assert len(p) == len(PARAMETERS)
+    assert p['joints'] == ('a', 'b', 'c', 'd', 'e', 'f')
+    assert p['geometry.base_joints'].shape == (6, 3)
+    assert np.array_equal(p['geometry.base_joints'][1], [0.9, 0.5, 0.1])
+    assert p['platform.mass'] == 150.0
+    assert np.array_equal(p['platform.inertia'], [20.0, 1.0, 2.0, 21.0, 3.0, 35.0])
+    assert np.array_equal(p['legs.piston.mass'], [6.0, 6.1, 6.2, 6.3, 6.4, 6.5])
+    assert p['visualization_rate'] == 25.0
+
+
+def test_what_is_left_out_takes_its_default(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    assert np.array_equal(p['gravity'], [0.0, 0.0, -9.80665])
+    assert p['base_frame'] == 'base'
+    assert p['limits.force_max'] is None
+    assert p['singularity.action'] == 'warn'
+    assert p['autostart'] is True
+
+
+def test_one_value_holds_for_all_legs(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    assert np.array_equal(p['legs.cylinder.mass'], np.full(6, 12.0))
+    assert np.array_equal(p['limits.length_min'], np.full(6, 0.8))
+    assert np.array_equal(p['actuator.reflected_mass'], np.zeros(6))
+    in_brackets = Parameters.from_yaml(written(tmp_path, GOOD.replace('mass: 12.0',
+                                                                      'mass: [12.0]')))
+    assert np.array_equal(in_brackets['legs.cylinder.mass'], np.full(6, 12.0))
+
+
+def test_a_number_without_a_point_but_with_an_exponent_is_a_double(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    assert np.array_equal(p['legs.piston.inertia'], np.full(6, 1e-3))
+
+
+def test_arrays_are_read_only(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    arrays = [value for value in p.values() if isinstance(value, np.ndarray)]
+    assert len(arrays) > 10
+    for array in arrays:
+        with pytest.raises(ValueError, match='read-only'):
+            array[...] = 0.0
+
+
+def test_the_characteristic_length_is_the_mean_distance_of_the_platform_joints(
+        tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    joints = p['geometry.platform_joints']
+    distances = np.linalg.norm(joints - joints.mean(axis=0), axis=1)
+    assert p['singularity.characteristic_length'] == pytest.approx(distances.mean(), rel=1e-15)
+    given_one = p.replaced({'singularity.characteristic_length': 0.25})
+    assert given_one['singularity.characteristic_length'] == 0.25
+
+
+def test_replaced_changes_these_alone_and_checks_the_whole(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    heavier = p.replaced({'platform.mass': 200.0})
+    assert heavier['platform.mass'] == 200.0
+    assert p['platform.mass'] == 150.0
+    for name in set(p) - {'platform.mass'}:
+        assert np.array_equal(heavier[name], p[name])
+    with pytest.raises(ParameterError, match=r'limits\.length_min.*less than'):
+        p.replaced({'limits.length_max': 0.7})
+    with pytest.raises(ParameterError, match=r'^a node: platform\.mass: -1\.0 kg: '):
+        p.replaced({'platform.mass': -1.0}, 'a node')
+
+
+def test_replaced_geometry_takes_its_own_characteristic_length(tmp_path: Path) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD))
+    twice = p.replaced({'geometry.platform_joints': 2.0 * p['geometry.platform_joints'].ravel()})
+    assert twice['singularity.characteristic_length'] == pytest.approx(
+        2.0 * p['singularity.characteristic_length'], rel=1e-15)
+
+
+@pytest.mark.parametrize('section', ['stewart_dynamics', '/stewart_dynamics', '/**'])
+def test_the_section_may_be_the_node_s(tmp_path: Path, section: str) -> None:
+    p = Parameters.from_yaml(written(tmp_path, GOOD.replace('/**', section)))
+    assert p['platform.mass'] == 150.0
+
+
+def test_a_later_section_overrides_an_earlier_one_and_others_nodes_do_not_count(
+        tmp_path: Path) -> None:
+    later = """\
+stewart_dynamics:
+  ros__parameters: {platform: {mass: 160.0}}
+other_node:
+  ros__parameters: {platform: {mass: 170.0}, anything: 1}
+"""
+    assert Parameters.from_yaml(written(tmp_path, GOOD + later))['platform.mass'] == 160.0
+
+
+def test_names_may_be_dotted_in_the_file(tmp_path: Path) -> None:
+    text = GOOD + '    singularity.warn_time: 0.25\n'
+    assert Parameters.from_yaml(written(tmp_path, text))['singularity.warn_time'] == 0.25
+
+
+@pytest.mark.parametrize('file', sorted(path.name for path in (ROOT / 'config').glob('*.yaml')))
+def test_the_package_s_own_files_hold_sections_that_can_be_read(file: str) -> None:
+    document = YAML(typ='safe', pure=True).load(ROOT / 'config' / file)
+    assert all('ros__parameters' in content for content in document.values())
+
+
+def test_the_machine_of_the_package_can_be_computed() -> None:
+    platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
+    lengths = platform.inverse_kinematics([0.0, 0.0, 1.0], np.eye(3))
+    assert np.all(lengths > 0.0)
+
+
+# What a bad file is told: the line that is changed, what of it, and the words of the answer
+
+BAD = {
+    'missing required value': ('      mass: 150.0\n', '', ['platform.mass', 'missing']),
+    'missing required array': (
+        '      inertia: [20.0, 1.0, 2.0, 21.0, 3.0, 35.0]\n', '',
+        ['platform.inertia', 'missing']),
+    'unknown name': ('visualization_rate', 'visualisation_rate', [
+        'visualisation_rate', 'unknown parameter', 'do you mean visualization_rate?']),
+    'unknown name in a group': ('warn_condition', 'warn_conditions', [
+        'singularity.warn_conditions', 'unknown', 'do you mean singularity.warn_condition?']),
+    'unknown name like no other': ('visualization_rate: 25.0', 'qqq: 25.0', [
+        'qqq: unknown parameter']),
+    'integer for a double': ('mass: 150.0', 'mass: 150', [
+        'platform.mass', '150', 'is an integer, must be a double', 'write 150.0']),
+    'integer in an array': ('[20.0, 1.0,', '[20.0, 1,', [
+        'platform.inertia', ' 1:', 'is an integer', 'write 1.0']),
+    'string for a number': ('mass: 150.0', "mass: '150.0'", [
+        'platform.mass', "'150.0'", 'must be a double']),
+    'bool for a number': ('mass: 150.0', 'mass: true', [
+        'platform.mass', 'True', 'must be a double']),
+    'number for a string': ('joints: [a,', 'joints: [1,', ['joints', '1', 'must be a string']),
+    'number for a bool': ('visualization_rate: 25.0', 'autostart: 1', [
+        'autostart', '1', 'must be a bool']),
+    'array for a single value': ('mass: 150.0', 'mass: [150.0, 1.0]', [
+        'platform.mass', '[150.0, 1.0]', 'must be a single double']),
+    'single value for an array': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: 0.1', [
+        'platform.center_of_mass', '0.1', 'must be an array of 3']),
+    'wrong length': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]', [
+        'platform.center_of_mass', '[0.01, 0.1]', 'must have 3 entries, has 2']),
+    'neither one nor six': ('6.4, 6.5]', '6.4]', [
+        'legs.piston.mass', '[6.0, 6.1, 6.2, 6.3, 6.4]', 'must have 1 or 6 entries, has 5']),
+    'wrong length of joints': ('1.0, -0.4, 0.0]', '1.0, -0.4]', [
+        'geometry.base_joints', 'must have 18 entries, has 17']),
+    'empty array': ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]', [
+        'legs.piston.mass', '[]', 'must have 1 or 6 entries, has 0']),
+    'group for a value': ('mass: 150.0', 'mass: {kg: 150.0}', [
+        'platform.mass.kg', 'unknown parameter', 'do you mean platform.mass?']),
+    'value for a group': ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', [
+        'limits', 'unknown parameter']),
+    'bad choice': ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop', [
+        'singularity.action', "'stop'", 'must be one of warn, suppress_forces']),
+    'negative mass': ('mass: 150.0', 'mass: -150.0', [
+        'platform.mass', '-150.0 kg', 'must be more than 0']),
+    'no mass': ('mass: 150.0', 'mass: 0.0', ['platform.mass', '0.0 kg', 'must be more than 0']),
+    'negative mass of a leg': ('6.3, 6.4', '6.3, -6.4', [
+        'legs.piston.mass', '-6.4 kg', 'must be at least 0']),
+    'inertia of no body': (
+        '[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', [
+            'platform.inertia', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', 'positive definite',
+            '-1 kg m^2', 'ixx ixy ixz iyy iyz izz']),
+    'inertia in another order': (
+        '[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 20.0, 35.0, 0.0, 0.0, 0.0]', [
+            'platform.inertia', 'positive definite']),
+    'shortest not below longest': ('length_max: 1.4', 'length_max: 0.8', [
+        'limits.length_min', '0.8', 'must be less than limits.length_max', '0.8']),
+    'one leg shortest above longest': (
+        'length_max: 1.4', 'length_max: [1.4, 1.4, 1.4, 0.7, 1.4, 1.4]', [
+            'limits.length_min', 'must be less than limits.length_max', '0.7']),
+    'stop before warn': ('stop_condition: 400.0', 'stop_condition: 39.0', [
+        'singularity.stop_condition', '39.0', 'must be at least singularity.warn_condition',
+        '40.0']),
+    'condition below one': ('warn_condition: 40.0', 'warn_condition: 0.5', [
+        'singularity.warn_condition', '0.5', 'must be at least 1']),
+    'not a number': ('mass: 150.0', 'mass: .nan', ['platform.mass', 'nan kg', 'must be finite']),
+    'infinite': ('center_of_mass: [0.01,', 'center_of_mass: [-.inf,', [
+        'platform.center_of_mass', '-inf m', 'must be finite']),
+    'too large to be finite': ('mass: 150.0', 'mass: 1.0e400', [
+        'platform.mass', 'inf kg', 'must be finite']),
+    'two legs of one name': ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]', [
+        'joints', "['a', 'b', 'c', 'd', 'e', 'a']", 'six different names']),
+    'a leg without a name': ('[a, b, c, d, e, f]', "[a, b, c, d, e, '']", [
+        'joints', 'six different names']),
+    'a platform that is one point': (
+        'platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
+        '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
+        f'platform_joints: {[0.5] * 18}', ['geometry.platform_joints', 'one point']),
+    'not yaml': ('mass: 150.0', 'mass: [150.0', ['not YAML', 'line']),
+    'a tab': ('      mass: 150.0', '\tmass: 150.0', ['not YAML', 'line']),
+    'duplicate keys': ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n', [
+        'not YAML', 'duplicate key', 'mass', 'line']),
+    'an anchor of nothing': ('mass: 150.0', 'mass: *m', ['not YAML', 'undefined alias', 'm']),
+    'a date that is none': ('mass: 150.0', 'mass: 2020-20-20', ['not YAML', 'month']),
+    'two documents': ('/**:', 'a: 1\n---\n/**:', ['not YAML', 'single document']),
+    'no section of ours': ('/**:', 'other_node:', [
+        'holds other_node', "no parameters under '/**:' or 'stewart_dynamics:'"]),
+    'no ros__parameters': ('ros__parameters:', 'parameters:', [
+        '/**', "must hold 'ros__parameters:'"]),
+}
+
+
+@pytest.mark.parametrize('case', BAD)
+def test_a_bad_file_is_told_file_parameter_value_and_rule(tmp_path: Path, case: str) -> None:
+    old, new, words = BAD[case]
+    assert GOOD.count(old) == 1
+    message = refused(tmp_path, GOOD.replace(old, new))
+    assert message.startswith(f'{tmp_path / "machine.yaml"}: ')
+    for word in words:
+        assert word in message
+    assert '\n' not in message
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('', ["must begin with '/**:' or a node's name"]),
+    ('[1.0, 2.0]\n', ['must begin with']),
+    ('just words\n', ['must begin with']),
+    ('/**: 3\n', ['/**', "must hold 'ros__parameters:'"]),
+    ('/**:\n', ['/**', "must hold 'ros__parameters:'"]),
+    ('/**: {ros__parameters: [1, 2]}\n', ['ros__parameters', '[1, 2]', 'names and values']),
+    ('/**: {ros__parameters: }\n', ['no parameters']),
+    ('{' * 1500, ['not YAML']),
+    ('/**: \x07\n', ['not YAML', 'special characters']),
+])
+def test_a_file_with_another_root_is_told_what_it_must_be(
+        tmp_path: Path, text: str, words: list[str]) -> None:
+    message = refused(tmp_path, text)
+    assert message.startswith(f'{tmp_path / "machine.yaml"}: ')
+    for word in words:
+        assert word in message
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r'nowhere\.yaml: cannot be read: No such file'):
+        Parameters.from_yaml(tmp_path / 'nowhere.yaml')
+    with pytest.raises(ParameterError, match='cannot be read: Is a directory'):
+        Parameters.from_yaml(tmp_path)
+
+
+def test_a_file_that_is_not_text_is_told_so(tmp_path: Path) -> None:
+    file = tmp_path / 'machine.yaml'
+    file.write_bytes(b'\xff\xfe\x00a')
+    with pytest.raises(ParameterError, match=r'machine\.yaml: cannot be read: not UTF-8 text'):
+        Parameters.from_yaml(file)
+
+
+def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
+    for name, parameter in PARAMETERS.items():
+        assert parameter.name == name
+        assert parameter.text
+        assert parameter.required == (parameter.default is None and name in (
+            'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
+            'platform.inertia'))
+        assert parameter.ros_type.startswith(parameter.kind)
+
+
+# Whatever is given
+
+NAMES = sorted(PARAMETERS)
+GIVEN = {'geometry.base_joints': [0.1 * n for n in range(18)],
+         'geometry.platform_joints': [0.2 * n for n in range(18)],
+         'platform.mass': 1.0, 'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]}
+# An empty value (null) is left to tests of its own.
+plain = st.one_of(
+    st.booleans(), st.integers(-10 ** 30, 10 ** 30), st.floats(), st.text(max_size=8),
+    st.sampled_from(['warn', 'base', '/**', 'ros__parameters', 'x' * 300]),
+    st.dates(), st.binary(max_size=8))
+values = st.recursive(plain, lambda inner: st.one_of(
+    st.lists(inner, max_size=7), st.lists(st.floats(), min_size=6, max_size=6),
+    st.lists(st.floats(0.1, 2.0), min_size=18, max_size=18),
+    st.dictionaries(st.text(max_size=5), inner, max_size=3)), max_leaves=12)
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.dictionaries(st.one_of(st.sampled_from(NAMES), st.text(max_size=8)), values,
+                       max_size=4))
+@np.errstate(all='ignore')
+def test_any_values_are_taken_or_refused_with_a_parameter_error(changes: Any) -> None:
+    try:
+        parameters = Parameters({**GIVEN, **changes})
+    except ParameterError:
+        return
+    for value in parameters.values():
+        if isinstance(value, np.ndarray):
+            assert np.all(np.isfinite(value))
+
+
+@settings(derandomize=True, max_examples=200, deadline=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.one_of(
+    st.text(max_size=60),
+    st.text(alphabet='/*:rosparmet_{}[],-&?!|>\'"%@`# \n0.e+~<', max_size=60),
+    st.tuples(st.integers(0, len(GOOD)), st.integers(0, 40), st.text(
+        alphabet='{}[],:-&?!|>\'"%@`# \n01.e+<*', max_size=6)).map(
+            lambda cut: GOOD[:cut[0]] + cut[2] + GOOD[cut[0] + cut[1]:])))
+@np.errstate(all='ignore')
+def test_any_document_is_taken_or_refused_with_a_parameter_error(
+        tmp_path: Path, text: str) -> None:
+    file = tmp_path / 'any.yaml'
+    file.write_text(text, encoding='utf-8', errors='surrogatepass')
+    try:
+        parameters = Parameters.from_yaml(file)
+    except ParameterError as exc:
+        assert str(exc).startswith(f'{file}: ')
+    else:
+        assert set(parameters) == set(PARAMETERS)
