@@ -1,0 +1,91 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages as bytes, serialized by rosbags: what the tests feed the package, without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+POSE = 'geometry_msgs/msg/PoseStamped'
+TWIST = 'geometry_msgs/msg/TwistStamped'
+ACCEL = 'geometry_msgs/msg/AccelStamped'
+WRENCH = 'geometry_msgs/msg/WrenchStamped'
+COMBINED = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
+
+HOME = (0.0, 0.0, 1.1)
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+REST = (0.0,) * 6
+
+
+def _new(kind: str, *fields: Any) -> Any:
+    return STORE.types[kind](*fields)
+
+
+def _header(stamp: int, frame: str) -> Any:
+    sec, nanosec = divmod(stamp, 1_000_000_000)
+    return _new('std_msgs/msg/Header', _new('builtin_interfaces/msg/Time', sec, nanosec), frame)
+
+
+def _vectors(kind: str, values: Sequence[float]) -> Any:
+    return _new(kind, _new('geometry_msgs/msg/Vector3', *values[:3]),
+                _new('geometry_msgs/msg/Vector3', *values[3:]))
+
+
+def _bytes(message: Any, little_endian: bool = True) -> bytes:
+    return bytes(STORE.serialize_cdr(message, message.__msgtype__, little_endian=little_endian))
+
+
+def pose(stamp: int, position: Sequence[float] = HOME, quaternion: Sequence[float] = UPRIGHT,
+         frame: str = 'base', little_endian: bool = True) -> bytes:
+    """Return a PoseStamped; the stamp is in nanoseconds."""
+    return _bytes(_new(POSE, _header(stamp, frame), _new(
+        'geometry_msgs/msg/Pose', _new('geometry_msgs/msg/Point', *position),
+        _new('geometry_msgs/msg/Quaternion', *quaternion))), little_endian)
+
+
+def twist(stamp: int, values: Sequence[float] = REST, frame: str = 'base') -> bytes:
+    """Return a TwistStamped."""
+    return _bytes(_new(TWIST, _header(stamp, frame), _vectors('geometry_msgs/msg/Twist', values)))
+
+
+def accel(stamp: int, values: Sequence[float] = REST, frame: str = 'base') -> bytes:
+    """Return an AccelStamped."""
+    return _bytes(_new(ACCEL, _header(stamp, frame), _vectors('geometry_msgs/msg/Accel', values)))
+
+
+def wrench(stamp: int, values: Sequence[float] = REST, frame: str = 'base') -> bytes:
+    """Return a WrenchStamped."""
+    return _bytes(_new(
+        WRENCH, _header(stamp, frame), _vectors('geometry_msgs/msg/Wrench', values)))
+
+
+def combined(
+        stamp: int, position: Sequence[float] = HOME, quaternion: Sequence[float] = UPRIGHT,
+        velocity: Sequence[float] = REST, acceleration: Sequence[float] = REST,
+        frame: str = 'base', names: Sequence[str] = ('platform',), points: int = 1,
+        parts: tuple[int, int, int] = (1, 1, 1)) -> bytes:
+    """Return a MultiDOFJointTrajectory; ``parts``: how many transforms, velocities, ...."""
+    transform = _new('geometry_msgs/msg/Transform', _new('geometry_msgs/msg/Vector3', *position),
+                     _new('geometry_msgs/msg/Quaternion', *quaternion))
+    point = _new('trajectory_msgs/msg/MultiDOFJointTrajectoryPoint', [transform] * parts[0],
+                 [_vectors('geometry_msgs/msg/Twist', velocity)] * parts[1],
+                 [_vectors('geometry_msgs/msg/Twist', acceleration)] * parts[2],
+                 _new('builtin_interfaces/msg/Duration', 0, 0))
+    return _bytes(_new(COMBINED, _header(stamp, frame), list(names), [point] * points))

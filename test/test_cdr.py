@@ -1,0 +1,372 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The messages as bytes, held against rclpy and rosbags, which serialize them on their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import math
+import struct
+import time
+from typing import Any
+
+from geometry_msgs.msg import (
+    AccelStamped, PoseStamped, Transform, Twist, TwistStamped, WrenchStamped)
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from messages import STORE
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Float64MultiArray
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from stewart_dynamics import cdr
+
+SECOND = 1_000_000_000
+READERS = {
+    'geometry_msgs/msg/PoseStamped': cdr.pose,
+    'geometry_msgs/msg/TwistStamped': cdr.twist,
+    'geometry_msgs/msg/AccelStamped': cdr.twist,
+    'geometry_msgs/msg/WrenchStamped': cdr.wrench,
+    'trajectory_msgs/msg/MultiDOFJointTrajectory': cdr.combined,
+}
+LENGTHS = {kind: {cdr.pose: 7, cdr.combined: 19}.get(reader, 6)
+           for kind, reader in READERS.items()}
+KINDS = pytest.mark.parametrize('kind', READERS)
+ENDIAN = pytest.mark.parametrize('little_endian', [True, False], ids=['little', 'big'])
+
+moderately = settings(derandomize=True, deadline=None, max_examples=100)
+# What a string of CDR can hold: anything but a zero.
+texts = st.text(st.characters(exclude_characters='\0', exclude_categories=['Cs']), max_size=40)
+stamps = st.integers(-2 ** 31 * SECOND, 2 ** 31 * SECOND - 1)
+sixes = st.tuples(*[st.floats()] * 6)
+
+
+def _set(of: Any, names: str, values: Sequence[float]) -> None:
+    for name, value in zip(names, values, strict=True):
+        setattr(of, name, value)
+
+
+def message(kind: str, stamp: int, frame: str, values: Sequence[float],
+            names: Sequence[str] = ('platform',)) -> Any:
+    """Return a real ROS message with these numbers."""
+    if kind.endswith('PoseStamped'):
+        of: Any = PoseStamped()
+        _set(of.pose.position, 'xyz', values[:3])
+        _set(of.pose.orientation, 'xyzw', values[3:])
+    elif kind.endswith('MultiDOFJointTrajectory'):
+        point = MultiDOFJointTrajectoryPoint(
+            transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])
+        _set(point.transforms[0].translation, 'xyz', values[:3])
+        _set(point.transforms[0].rotation, 'xyzw', values[3:7])
+        for part, at in ((point.velocities[0], 7), (point.accelerations[0], 13)):
+            _set(part.linear, 'xyz', values[at:at + 3])
+            _set(part.angular, 'xyz', values[at + 3:at + 6])
+        point.time_from_start.sec = 7
+        of = MultiDOFJointTrajectory(joint_names=list(names), points=[point])
+    else:
+        of, linear, angular = {
+            'TwistStamped': lambda: ((m := TwistStamped()), m.twist.linear, m.twist.angular),
+            'AccelStamped': lambda: ((m := AccelStamped()), m.accel.linear, m.accel.angular),
+            'WrenchStamped': lambda: ((m := WrenchStamped()), m.wrench.force, m.wrench.torque),
+        }[kind.rpartition('/')[2]]()
+        _set(linear, 'xyz', values[:3])
+        _set(angular, 'xyz', values[3:])
+    of.header.stamp.sec, of.header.stamp.nanosec = divmod(stamp, SECOND)
+    of.header.frame_id = frame
+    return of
+
+
+def in_order(data: bytes, kind: str, little_endian: bool) -> bytes:
+    """Return the message in either byte order, as rosbags writes it."""
+    return bytes(STORE.serialize_cdr(
+        STORE.deserialize_cdr(data, kind), kind, little_endian=little_endian))
+
+
+def same(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Return whether these are the same numbers to the bit; any nan is like any other."""
+    return len(a) == len(b) and all(
+        x == y and math.copysign(1.0, x) == math.copysign(1.0, y) or x != x and y != y
+        for x, y in zip(a, b, strict=True))
+
+
+def valid(kind: str, little_endian: bool = True, frame: str = 'base') -> bytes:
+    """Return a message that can be read, without padding behind it."""
+    values = [0.5 + n for n in range(LENGTHS[kind])]
+    return in_order(
+        serialize_message(message(kind, 3 * SECOND + 4, frame, values)), kind, little_endian)
+
+
+# Reading
+
+@KINDS
+@moderately
+@given(st.data())
+def test_what_rclpy_writes_is_read(kind: str, data: st.DataObject) -> None:
+    stamp, frame = data.draw(stamps), data.draw(texts)
+    values = data.draw(st.tuples(*[st.floats()] * LENGTHS[kind]))
+    names = data.draw(st.lists(texts, max_size=4))
+    written = serialize_message(message(kind, stamp, frame, values, names))
+    for order in (written, in_order(written, kind, True), in_order(written, kind, False)):
+        read = READERS[kind](order)
+        assert read.stamp == stamp
+        assert read.frame == frame.encode()
+        assert same(read.values, values)
+
+
+@KINDS
+@ENDIAN
+@pytest.mark.parametrize('letter', ['a', 'é', '漢', '🙂'])
+def test_every_length_of_frame_id_is_read(kind: str, little_endian: bool, letter: str) -> None:
+    values = [1.5 + n for n in range(LENGTHS[kind])]
+    for length in range(41):
+        data = serialize_message(message(kind, 5, letter * length, values))
+        read = READERS[kind](in_order(data, kind, little_endian))
+        assert read == (5, (letter * length).encode(), tuple(values))
+        assert READERS[kind](data) == read
+
+
+@ENDIAN
+def test_joint_names_of_every_length_and_number_are_passed(little_endian: bool) -> None:
+    kind = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
+    values = [1.5 + n for n in range(19)]
+    for number in range(9):
+        for length in range(9):
+            names = ['é' * (length + n) for n in range(number)]
+            data = serialize_message(message(kind, 5, 'base', values, names))
+            assert cdr.combined(in_order(data, kind, little_endian)).values == tuple(values)
+
+
+def test_a_pose_written_by_hand_is_read_in_both_orders() -> None:
+    # the layout of DDS-XTypes 1.3, 7.4.3, with nothing but struct
+    numbers = (1.0, 2.0, 3.0, 0.5, 0.5, -0.5, 0.5)
+    for order, sign in ((0, '>'), (1, '<')):
+        data = (bytes([0, order, 0, 0]) + struct.pack(f'{sign}iII5s', -2, 250, 5, b'base\0')
+                + b'\xaa' * 7 + struct.pack(f'{sign}7d', *numbers))
+        assert cdr.pose(data) == (-2 * SECOND + 250, b'base', numbers)
+
+
+@KINDS
+@ENDIAN
+@pytest.mark.parametrize('stamp', [
+    0, 1, -1, SECOND - 1, -SECOND, 2 ** 31 * SECOND - 1, -2 ** 31 * SECOND])
+def test_every_stamp_is_read(kind: str, little_endian: bool, stamp: int) -> None:
+    data = serialize_message(message(kind, stamp, '', [0.0] * LENGTHS[kind]))
+    assert READERS[kind](in_order(data, kind, little_endian)).stamp == stamp
+
+
+@KINDS
+@pytest.mark.parametrize('nanosec', [SECOND, SECOND + 1, 2 ** 32 - 1])
+def test_a_stamp_of_a_second_or_more_of_nanoseconds_is_refused(kind: str, nanosec: int) -> None:
+    of = message(kind, 0, 'base', [0.0] * LENGTHS[kind])
+    of.header.stamp.nanosec = nanosec
+    with pytest.raises(cdr.MalformedError, match=f'stamp of {nanosec} ns'):
+        READERS[kind](serialize_message(of))
+
+
+@KINDS
+@ENDIAN
+@pytest.mark.parametrize('frame', ['', 'b', 'base', 'world'])
+def test_a_message_cut_off_anywhere_is_refused(
+        kind: str, little_endian: bool, frame: str) -> None:
+    data = valid(kind, little_endian, frame)
+    READERS[kind](data)
+    for length in range(len(data)):
+        with pytest.raises(cdr.MalformedError):
+            READERS[kind](data[:length])
+
+
+@KINDS
+@pytest.mark.parametrize('head', ['0002', '0003', '0006', '0007', '000a', '0100', '0101', 'ffff'])
+def test_another_encapsulation_than_plain_cdr_is_refused(kind: str, head: str) -> None:
+    with pytest.raises(cdr.MalformedError):
+        READERS[kind](bytes.fromhex(head) + valid(kind)[2:])
+
+
+@KINDS
+def test_a_string_without_an_end_is_refused(kind: str) -> None:
+    data = bytearray(valid(kind))
+    assert data[20] == 0  # behind 'base'
+    data[20] = 0x65
+    with pytest.raises(cdr.MalformedError, match='zero byte'):
+        READERS[kind](bytes(data))
+
+
+@pytest.mark.parametrize(('points', 'parts'), [
+    (0, (1, 1, 1)), (2, (1, 1, 1)), (1, (0, 1, 1)), (1, (1, 0, 1)), (1, (1, 1, 0)),
+    (1, (2, 1, 1)), (1, (1, 2, 1)), (1, (1, 1, 2)), (1, (1, 0, 0))])
+def test_a_combined_setpoint_has_one_of_each(points: int, parts: tuple[int, int, int]) -> None:
+    point = MultiDOFJointTrajectoryPoint(
+        transforms=[Transform()] * parts[0], velocities=[Twist()] * parts[1],
+        accelerations=[Twist()] * parts[2])
+    data = serialize_message(MultiDOFJointTrajectory(points=[point] * points))
+    with pytest.raises(cdr.MalformedError, match='a setpoint has one'):
+        cdr.combined(data)
+
+
+def _survives(data: bytes) -> None:
+    """Read bytes as every kind: numbers, or MalformedError, and nothing else."""
+    for kind, reader in READERS.items():
+        try:
+            read = reader(data)
+        except cdr.MalformedError:
+            continue
+        assert len(read.values) == LENGTHS[kind]
+        assert isinstance(read.stamp, int)
+        assert cdr.is_stamp(read.stamp)
+        assert isinstance(read.frame, bytes)
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(st.binary(max_size=300))
+@example(b'')
+@example(b'\0')
+@example(b'\0\1\0\0' + b'\xff' * 300)
+def test_no_bytes_raise_anything_else(data: bytes) -> None:
+    _survives(data)
+    _survives(b'\0\1\0\0' + data)
+    _survives(b'\0\0\0\0' + data)
+
+
+@KINDS
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(st.data())
+def test_no_spoiled_message_raises_anything_else(kind: str, data: st.DataObject) -> None:
+    spoiled = bytearray(valid(kind, data.draw(st.booleans())))
+    for at in data.draw(st.lists(st.integers(0, len(spoiled) - 1), min_size=1, max_size=6)):
+        spoiled[at] = data.draw(st.integers(0, 255))
+    _survives(bytes(spoiled))
+
+
+def test_huge_counts_cost_no_time() -> None:
+    begun = time.perf_counter()
+    kind = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
+    data = valid(kind)
+    for at in range(4, len(data) - 4, 4):
+        for count in (2 ** 32 - 1, 2 ** 31, len(data), len(data) // 4):
+            for layout in ('<I', '>I'):
+                spoiled = data[:at] + struct.pack(layout, count) + data[at + 4:]
+                _survives(spoiled)
+    # as many names as there is room for, all of them empty
+    names = struct.pack('<iIIII', 0, 0, 0, 250_000, 0)
+    with pytest.raises(cdr.MalformedError):
+        cdr.combined(b'\0\1\0\0' + names + bytes(1_000_000))
+    assert time.perf_counter() - begun < 5.0
+
+
+# Writing
+
+def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
+    """Return the fields of a JointState's bytes, and nothing of what stands between them."""
+    at = 4
+    fields = [data[:4]]
+
+    def take(size: int, align: int) -> None:
+        nonlocal at
+        at += -(at - 4) % align
+        fields.append(data[at:at + size])
+        assert len(fields[-1]) == size
+        at += size
+
+    take(4, 4)
+    take(4, 4)
+    for text in (b'', None, *(name.encode() for name in names)):
+        take(4, 4)
+        if text is not None:
+            take(len(text) + 1, 1)
+    for number in (6, 6, numbers):
+        take(4, 4)
+        for _ in range(number):
+            take(8, 8)
+    assert len(data) - at < 8
+    return fields
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(stamps, st.lists(texts, min_size=6, max_size=6), sixes, sixes, st.none() | sixes)
+def test_a_joint_state_is_what_rclpy_and_rosbags_write(
+        stamp: int, names: list[str], position: tuple[float, ...], velocity: tuple[float, ...],
+        effort: tuple[float, ...] | None) -> None:
+    data = cdr.JointState(names).write(stamp, position, velocity, effort)
+
+    by_rclpy = deserialize_message(data, JointState)
+    by_rosbags = STORE.deserialize_cdr(data, 'sensor_msgs/msg/JointState')
+    for read in (by_rclpy, by_rosbags):
+        assert (read.header.stamp.sec, read.header.stamp.nanosec) == divmod(stamp, SECOND)
+        assert read.header.frame_id == ''
+        assert list(read.name) == names
+        assert same(read.position, position)
+        assert same(read.velocity, velocity)
+        assert same(read.effort, effort or ())
+
+    # rosbags writes zeros into the gaps, as we do; rclpy leaves in them, and behind an empty
+    # effort, what the memory held before
+    if all(value == value for value in (*position, *velocity, *(effort or ()))):
+        again = bytes(STORE.serialize_cdr(by_rosbags, 'sensor_msgs/msg/JointState'))
+        assert again[:len(data)] == data
+        assert not any(again[len(data):])
+        ros = serialize_message(by_rclpy)
+        numbers = 0 if effort is None else 6
+        assert significant(ros, names, numbers) == significant(data, names, numbers)
+
+
+def test_names_of_every_length_are_written() -> None:
+    numbers = (1.5, -2.5, 3.5, -4.5, 5.5, -6.5)
+    for letter in ('a', 'é', '漢'):
+        for length in range(33):
+            names = [letter * (length + n) for n in range(6)]
+            for effort in (numbers, None):
+                data = cdr.JointState(names).write(7, numbers, numbers, effort)
+                read = deserialize_message(data, JointState)
+                assert list(read.name) == names
+                assert tuple(read.position) == tuple(read.velocity) == numbers
+                assert tuple(read.effort) == (effort or ())
+
+
+@moderately
+@given(sixes)
+def test_an_array_is_what_rclpy_writes(values: tuple[float, ...]) -> None:
+    data = cdr.float64_array(values)
+    assert same(deserialize_message(data, Float64MultiArray).data, values)
+    assert same(STORE.deserialize_cdr(data, 'std_msgs/msg/Float64MultiArray').data, values)
+    if all(value == value for value in values):
+        # the gap before the numbers is left as the memory was by rclpy
+        ros = serialize_message(Float64MultiArray(data=values))
+        assert ros[:16] + ros[20:] == data[:16] + data[20:]
+
+
+@moderately
+@given(st.floats(allow_nan=False), st.booleans())
+def test_a_number_and_a_truth_value_are_what_rclpy_writes(number: float, truth: bool) -> None:
+    assert cdr.float64(number) == serialize_message(Float64(data=number))
+    assert deserialize_message(cdr.float64(number), Float64).data == number
+    data = cdr.boolean(truth)
+    assert serialize_message(Bool(data=truth))[:len(data)] == data  # padded to four bytes
+    assert deserialize_message(data, Bool).data is truth
+    assert STORE.deserialize_cdr(data, 'std_msgs/msg/Bool').data is truth
+
+
+@pytest.mark.parametrize(('stamp', 'holds'), [
+    (0, True), (-2 ** 31 * SECOND, True), (-2 ** 31 * SECOND - 1, False),
+    (2 ** 31 * SECOND - 1, True), (2 ** 31 * SECOND, False), (2 ** 63, False)])
+def test_stamps_have_the_seconds_of_32_bits(stamp: int, holds: bool) -> None:
+    assert cdr.is_stamp(stamp) is holds
+    write: Callable[..., bytes] = cdr.JointState('abcdef').write
+    if holds:
+        write(stamp, [0.0] * 6, [0.0] * 6, None)
+    else:
+        with pytest.raises(struct.error):
+            write(stamp, [0.0] * 6, [0.0] * 6, None)

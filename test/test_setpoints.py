@@ -1,0 +1,574 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Joining by stamp: every rule for bad input, and that each message is accounted for."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from itertools import permutations
+import math
+import re
+import tracemalloc
+
+from geometry_msgs.msg import PoseStamped
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+import messages
+from messages import HOME, REST, UPRIGHT
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from referees import rng, symmetric_parameters
+from scipy.spatial.transform import Rotation
+
+from stewart_dynamics.setpoints import (
+    ACCEL, COMBINED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, POSE, Refusal, Setpoints,
+    TOO_OLD, TWICE, TWIST, WAITING, WRENCH, WRONG_FRAME)
+from stewart_dynamics.step import NO_WRENCH, Setpoint
+
+PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
+TOPICS = (POSE, TWIST, ACCEL)
+ORDERS = list(permutations(TOPICS))
+WRITERS: dict[str, Callable[..., bytes]] = {
+    POSE: messages.pose, TWIST: messages.twist, ACCEL: messages.accel,
+    COMBINED: messages.combined, WRENCH: messages.wrench}
+
+MS = 1_000_000
+SECOND = 1000 * MS
+NOW = 1_700_000_000 * SECOND
+NAN, INF = math.nan, math.inf
+
+
+class Feed:
+    """Setpoints with given parameters; what it is given and what it says is kept."""
+
+    def __init__(self, **given: object) -> None:
+        self.said: list[tuple[Refusal, str]] = []
+        self.notices: list[str] = []
+        self.given: Counter[str] = Counter()
+        self.setpoints = Setpoints(
+            PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}),
+            lambda refusal, details: self.said.append((refusal, details)), self.notices.append)
+
+    def __call__(self, topic: str, data: bytes) -> Setpoint | None:
+        """Take one message."""
+        self.given[topic] += 1
+        return self.setpoints.take(topic, data, NOW)
+
+    def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Setpoint | None:
+        """Take a good message of a topic, the mark in its first number."""
+        values = HOME if topic in (POSE, COMBINED) else REST
+        return self(topic, WRITERS[topic](stamp, (mark, *values[1:])))
+
+    def whole(self, stamp: int, mark: float = 0.0) -> Setpoint | None:
+        """Take good messages of all topics; the last one must be what completes it."""
+        answers = [self.sample(topic, stamp, mark) for topic in self.setpoints.topics]
+        assert answers[:-1] == [None] * (len(answers) - 1)
+        return answers[-1]
+
+    @property
+    def counts(self) -> dict[tuple[str, str], int]:
+        """What is refused; the callback must have heard of each."""
+        assert Counter(refusal for refusal, _ in self.said) == self.setpoints.counts
+        return {tuple(refusal): n for refusal, n in self.setpoints.counts.items()}
+
+
+# Joining
+
+@pytest.mark.parametrize('order', ORDERS)
+def test_topics_are_joined_in_any_order(order: Sequence[str]) -> None:
+    half = math.sqrt(0.5)
+    data = {POSE: messages.pose(SECOND, (0.1, 0.2, 1.3), (0.0, 0.0, half, half)),
+            TWIST: messages.twist(SECOND, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)),
+            ACCEL: messages.accel(SECOND, (7.0, 8.0, 9.0, 10.0, 11.0, 12.0))}
+    feed = Feed()
+    assert feed(order[0], data[order[0]]) is None
+    assert feed(order[1], data[order[1]]) is None
+    setpoint = feed(order[2], data[order[2]])
+    assert setpoint is not None
+    assert setpoint.stamp == SECOND
+    assert setpoint.motion[:3] == (0.1, 0.2, 1.3)
+    assert np.allclose(setpoint.motion[3:12], [0, -1, 0, 1, 0, 0, 0, 0, 1], rtol=0, atol=1e-15)
+    assert setpoint.motion[12:] == tuple(range(1, 13))
+    assert not feed.counts
+    assert not feed.notices
+
+
+@pytest.mark.parametrize('order', ORDERS)
+def test_a_topic_may_be_far_ahead_of_the_others(order: Sequence[str]) -> None:
+    feed = Feed()
+    stamps = [n * 10 * MS for n in range(1, 101)]
+    for topic in order[:2]:
+        for stamp in stamps:
+            assert feed.sample(topic, stamp) is None
+    answers = [feed.sample(order[2], stamp) for stamp in stamps]
+    assert [answer.stamp for answer in answers if answer] == stamps
+    assert not feed.counts
+
+
+def test_messages_of_rclpy_are_joined() -> None:
+    message = PoseStamped()
+    message.header.stamp.sec = 1
+    message.header.frame_id = 'base'
+    feed = Feed(source='pose')
+    setpoint = feed(POSE, serialize_message(message))
+    assert setpoint == (SECOND, (0.0,) * 3 + (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+                        + (0.0,) * 12)
+
+
+def test_stamps_a_nanosecond_apart_are_not_joined() -> None:
+    feed = Feed()
+    feed.sample(POSE, SECOND)
+    feed.sample(TWIST, SECOND)
+    assert feed.sample(ACCEL, SECOND + 1) is None
+    assert feed.sample(ACCEL, SECOND)
+
+
+@pytest.mark.parametrize('order', ORDERS)
+def test_stamps_within_the_tolerance_are_joined(order: Sequence[str]) -> None:
+    feed = Feed(sync_tolerance=0.002)
+    stamps = {POSE: SECOND, TWIST: SECOND + 2 * MS, ACCEL: SECOND + MS}
+    for topic in order[:2]:
+        assert feed.sample(topic, stamps[topic]) is None
+    setpoint = feed.sample(order[2], stamps[order[2]])
+    assert setpoint is not None
+    assert setpoint.stamp in stamps.values()
+    assert not feed.counts
+
+
+@pytest.mark.parametrize('late', [TWIST, ACCEL])
+def test_stamps_beyond_the_tolerance_are_not_joined(late: str) -> None:
+    feed = Feed(sync_tolerance=0.002)
+    for topic in TOPICS:
+        if topic != late:
+            assert feed.sample(topic, SECOND) is None
+    assert feed.sample(late, SECOND + 2 * MS + 1) is None
+
+
+def test_of_several_within_the_tolerance_the_nearest_is_taken() -> None:
+    feed = Feed(sync_tolerance=0.005)
+    for stamp, mark in ((SECOND - 2 * MS, 1.0), (SECOND + MS, 2.0), (SECOND + 3 * MS, 3.0)):
+        feed.sample(TWIST, stamp, mark)
+        feed.sample(ACCEL, stamp, mark)
+    setpoint = feed.sample(POSE, SECOND)
+    assert setpoint is not None
+    assert (setpoint.motion[12], setpoint.motion[18]) == (2.0, 2.0)
+
+
+def test_a_combined_message_is_a_setpoint() -> None:
+    feed = Feed(source='combined')
+    assert feed.setpoints.topics == (COMBINED,)
+    setpoint = feed(COMBINED, messages.combined(
+        SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
+    assert setpoint == (SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)))
+    assert feed.sample(COMBINED, SECOND) is None
+    assert feed.counts == {(COMBINED, TWICE): 1}
+
+
+def test_a_pose_alone_stands_still() -> None:
+    feed = Feed(source='pose')
+    assert feed.setpoints.topics == (POSE,)
+    setpoint = feed.sample(POSE, SECOND, 0.25)
+    assert setpoint == (SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12)
+
+
+# Refusing
+
+def _spoilt() -> list[tuple[str, bytes, str, str]]:
+    found = []
+    for topic, numbers in ((POSE, 7), (TWIST, 6), (ACCEL, 6), (COMBINED, 19), (WRENCH, 6)):
+        good = WRITERS[topic](SECOND)
+        first = len(good) - 8 * numbers - (8 if topic == COMBINED else 0)
+        for at in range(numbers):
+            if topic == COMBINED:
+                # its three parts stand apart, each behind a count
+                at_byte = first - 16 + 8 * at + (0 if at < 7 else 8 if at < 13 else 16)
+            else:
+                at_byte = first + 8 * at
+            for value in (NAN, INF, -INF):
+                bad = good[:at_byte] + np.float64(value).tobytes() + good[at_byte + 8:]
+                found.append((topic, bad, NOT_FINITE, 'nan|inf'))
+        for length in (1 - 1.1e-3, 1 + 1.1e-3, 0.0, 2.0, 1e308):
+            if topic in (POSE, COMBINED):
+                quaternion = (0.0, 0.0, 0.6 * length, 0.8 * length)
+                found.append((topic, WRITERS[topic](SECOND, HOME, quaternion), NOT_UNIT,
+                              re.escape(f'{length:.6g}')))
+        found += [
+            (topic, WRITERS[topic](SECOND, frame='map'), WRONG_FRAME, "'map'.*'base'"),
+            (topic, WRITERS[topic](SECOND, frame='/base'), WRONG_FRAME, "'/base'"),
+            (topic, WRITERS[topic](SECOND, frame='Base'), WRONG_FRAME, "'Base'"),
+            (topic, good[:-1], MALFORMED, f'{len(good) - 1} bytes'),
+            (topic, b'', MALFORMED, '0 bytes')]
+    return found
+
+
+@pytest.mark.parametrize(('topic', 'data', 'reason', 'words'), _spoilt())
+def test_a_bad_message_is_refused_and_the_good_one_used(
+        topic: str, data: bytes, reason: str, words: str) -> None:
+    feed = Feed(source='combined' if topic == COMBINED else 'separate')
+    if topic == WRENCH:
+        feed.setpoints.take_wrench(messages.wrench(0, (1, 2, 3, 4, 5, 6)))
+        feed.setpoints.take_wrench(data)
+        assert feed.setpoints.wrench == (1, 2, 3, 4, 5, 6)
+    else:
+        for other in feed.setpoints.topics:
+            if other != topic:
+                feed.sample(other, SECOND)
+        assert feed(topic, data) is None
+    assert feed.counts == {(topic, reason): 1}
+    assert re.search(words, feed.said[0][1])
+    assert topic == WRENCH or feed.sample(topic, SECOND)
+
+
+@pytest.mark.parametrize('topic', [*TOPICS, COMBINED, WRENCH])
+@pytest.mark.parametrize('frame', ['', 'base'])
+def test_the_base_frame_and_an_empty_one_are_accepted(topic: str, frame: str) -> None:
+    feed = Feed(source='combined' if topic == COMBINED else 'separate')
+    data = WRITERS[topic](SECOND, frame=frame)
+    if topic == WRENCH:
+        feed.setpoints.take_wrench(data)
+    else:
+        feed(topic, data)
+    assert not feed.counts
+
+
+def test_another_base_frame_is_the_only_one() -> None:
+    setpoints = Setpoints(
+        PARAMETERS.replaced({'base_frame': 'sol élevé', 'setpoint.source': 'pose'}),
+        lambda refusal, details: None, lambda text: None)
+    assert setpoints.take(POSE, messages.pose(SECOND, frame='base'), NOW) is None
+    assert setpoints.counts == {Refusal(POSE, WRONG_FRAME): 1}
+    assert setpoints.take(POSE, messages.pose(SECOND, frame='sol élevé'), NOW)
+
+
+def test_a_wrench_holds_until_the_next() -> None:
+    feed = Feed()
+    assert feed.setpoints.wrench == NO_WRENCH
+    for values in ((1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (-1.0, 0.0, 0.0, 0.0, 0.0, 0.5)):
+        feed.setpoints.take_wrench(messages.wrench(0, values))
+        assert feed.setpoints.wrench == values
+    assert not feed.counts
+
+
+@pytest.mark.parametrize('topic', TOPICS)
+@pytest.mark.parametrize('ago', [1, 10 * MS, 100 * MS - 1, 100 * MS])
+def test_what_is_older_than_the_last_used_is_refused(topic: str, ago: int) -> None:
+    feed = Feed()
+    assert feed.whole(SECOND)
+    assert feed.sample(topic, SECOND - ago) is None
+    assert feed.counts == {(topic, TOO_OLD): 1}
+    assert f'{ago / 1e9:g} s' in feed.said[0][1]
+    assert not feed.notices
+    assert feed.whole(SECOND + 10 * MS)
+
+
+def test_of_the_same_stamp_twice_the_first_is_used() -> None:
+    feed = Feed()
+    feed.sample(POSE, SECOND, 1.0)
+    assert feed.sample(POSE, SECOND, 2.0) is None
+    assert feed.counts == {(POSE, TWICE): 1}
+    feed.sample(TWIST, SECOND)
+    setpoint = feed.sample(ACCEL, SECOND)
+    assert setpoint is not None
+    assert setpoint.motion[0] == 1.0
+    for topic in TOPICS:
+        assert feed.sample(topic, SECOND, 3.0) is None
+    assert feed.counts == {(POSE, TWICE): 2, (TWIST, TWICE): 1, (ACCEL, TWICE): 1}
+    assert feed.whole(SECOND + MS)
+
+
+def test_a_stamp_that_one_topic_lacks_is_passed_over() -> None:
+    feed = Feed()
+    feed.sample(POSE, SECOND)
+    feed.sample(TWIST, SECOND)
+    assert feed.whole(SECOND + 10 * MS)
+    assert feed.counts == {(POSE, NOT_JOINED): 1, (TWIST, NOT_JOINED): 1}
+    assert feed.sample(ACCEL, SECOND) is None
+    assert feed.counts[ACCEL, TOO_OLD] == 1
+
+
+# Jumping back
+
+def test_a_jump_back_beyond_the_timeout_is_followed_and_said_once_each_time() -> None:
+    feed = Feed()
+    for lap in range(3):
+        for n in range(12):  # a bag that loops: 110 ms back each time
+            assert feed.whole(10 * SECOND + n * 10 * MS)
+            assert len(feed.notices) == lap
+    assert not feed.counts
+    feed = Feed()
+    assert feed.whole(10 * SECOND)
+    for lap in range(1, 4):
+        for n in range(5):
+            assert feed.whole((10 - lap) * SECOND + n * 10 * MS)
+            assert len(feed.notices) == lap
+    assert 'restart' in feed.notices[0]
+    assert '1 s' in feed.notices[0]
+    assert not feed.counts
+
+
+def test_a_jump_back_of_a_nanosecond_beyond_the_timeout_is_a_restart() -> None:
+    feed = Feed()
+    assert feed.whole(SECOND)
+    assert feed.whole(SECOND - 100 * MS - 1)
+    assert len(feed.notices) == 1
+    assert not feed.counts
+
+
+@pytest.mark.parametrize('topic', TOPICS)
+def test_a_stray_old_sample_of_one_topic_resets_nothing(topic: str) -> None:
+    feed = Feed()
+    assert feed.whole(10 * SECOND)
+    assert feed.sample(topic, SECOND) is None
+    assert feed.whole(10 * SECOND + 10 * MS)
+    assert not feed.notices
+    assert feed.counts == {(topic, NOT_JOINED): 1}
+    # and what came before is still too old
+    assert feed.sample(POSE, 10 * SECOND + 5 * MS) is None
+    assert feed.counts[POSE, TOO_OLD] == 1
+
+
+def test_a_restart_gives_up_what_waits_from_before_it() -> None:
+    feed = Feed()
+    assert feed.whole(10 * SECOND)
+    feed.sample(POSE, 10 * SECOND + 10 * MS)
+    assert feed.whole(SECOND)
+    assert feed.counts == {(POSE, NOT_JOINED): 1}
+    assert feed.whole(SECOND + 10 * MS)
+
+
+def test_a_jump_forward_is_nothing_special() -> None:
+    feed = Feed()
+    assert feed.whole(SECOND)
+    assert feed.whole(1000 * SECOND)
+    assert not feed.counts
+    assert not feed.notices
+
+
+def test_negative_stamps_are_stamps() -> None:
+    feed = Feed()
+    for stamp in (-2 ** 31 * SECOND, -SECOND, -1, 1, 2 ** 31 * SECOND - 1):
+        setpoint = feed.whole(stamp)
+        assert setpoint is not None
+        assert setpoint.stamp == stamp
+    assert not feed.counts
+
+
+# Without stamps
+
+@pytest.mark.parametrize('order', ORDERS)
+def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[str]) -> None:
+    feed = Feed()
+    for topic in order[:2]:
+        for mark in (1.0, 2.0, 3.0):
+            assert feed.sample(topic, 0, mark) is None
+    for mark in (1.0, 2.0, 3.0):
+        setpoint = feed.sample(order[2], 0, mark)
+        assert setpoint is not None
+        assert setpoint.stamp == NOW
+        assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (mark,) * 3
+    assert not feed.counts
+    assert len(feed.notices) == 1
+    assert 'zero' in feed.notices[0]
+
+
+@pytest.mark.parametrize('source', ['combined', 'pose'])
+def test_a_single_topic_needs_no_stamp(source: str) -> None:
+    feed = Feed(source=source)
+    for _ in range(3):
+        setpoint = feed.sample(feed.setpoints.topics[0], 0)
+        assert setpoint is not None
+        assert setpoint.stamp == NOW
+    assert len(feed.notices) == 1
+
+
+# Bounds
+
+@pytest.mark.parametrize('silent', TOPICS)
+@pytest.mark.parametrize('stamped', [True, False])
+def test_what_waits_is_bounded(silent: str, stamped: bool) -> None:
+    feed = Feed()
+    many = WAITING + 50
+    for n in range(1, many + 1):
+        for topic in TOPICS:
+            if topic != silent:
+                feed.sample(topic, n * MS if stamped else 0, float(n))
+    assert feed.counts == {(topic, NOT_JOINED): 50 for topic in TOPICS if topic != silent}
+    # the oldest are given up, the newest are still there
+    answers = [feed.sample(silent, n * MS if stamped else 0) for n in range(1, many + 1)]
+    used = [answer.motion[0 if silent != POSE else 12] for answer in answers if answer]
+    assert used == [float(n) for n in range(51, many + 1)]
+
+
+@pytest.mark.parametrize('stamped', [True, False])
+def test_memory_does_not_grow_while_a_topic_is_silent(stamped: bool) -> None:
+    setpoints = Setpoints(PARAMETERS, lambda refusal, details: None, lambda text: None)
+
+    def feed(first: int, end: int) -> None:
+        for n in range(first, end):
+            for topic in (POSE, TWIST):
+                data = WRITERS[topic](n * MS if stamped else 0)
+                assert setpoints.take(topic, data, NOW) is None
+
+    feed(1, 1000)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    feed(1000, 2000)
+    whole = tracemalloc.get_traced_memory()[0] - before
+    feed(2000, 8000)
+    grown = tracemalloc.get_traced_memory()[0] - before - whole
+    tracemalloc.stop()
+    assert abs(grown) < 30_000
+    assert sum(setpoints.counts.values()) == 2 * (7999 - WAITING)
+
+
+# Quaternions
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 1e-3),
+       st.floats(1 - 0.999e-3, 1 + 0.999e-3))
+@example((1.0, 0.0, 0.0, 0.0), 1.0)
+@example((0.5, -0.5, 0.5, -0.5), 1.0009)
+def test_a_quaternion_is_brought_to_unit_length(
+        direction: tuple[float, ...], length: float) -> None:
+    factor = length / math.hypot(*direction)
+    quaternion = [factor * number for number in direction]
+    setpoint = Feed(source='pose')(POSE, messages.pose(SECOND, HOME, quaternion))
+    assert setpoint is not None
+    rotation = np.array(setpoint.motion[3:12]).reshape(3, 3)
+    # some roundings of the numbers in it, none of the length
+    assert np.max(np.abs(rotation @ rotation.T - np.eye(3))) < 2e-15
+    assert np.linalg.det(rotation) == pytest.approx(1.0, abs=3e-15)
+    assert np.allclose(rotation, Rotation.from_quat(direction).as_matrix(), rtol=0, atol=3e-15)
+    other = Feed(source='pose')(POSE, messages.pose(SECOND, HOME, [-x for x in quaternion]))
+    assert other == setpoint
+
+
+# Any input at all
+
+def _garbage(random: np.random.Generator, good: bytes) -> bytes:
+    spoiled = bytearray(good)
+    for at in random.integers(0, len(good), 4):
+        spoiled[at] = random.integers(0, 256)
+    return bytes(spoiled[:random.integers(0, len(good) + 1)])
+
+
+_FAULTS: dict[str, Callable[[str, int], bytes]] = {
+    'good': lambda topic, stamp: WRITERS[topic](stamp, _marked(topic, stamp)),
+    'nan': lambda topic, stamp: WRITERS[topic](stamp, (NAN, 0, 0, 0, 0, 0)[:_width(topic)]),
+    'frame': lambda topic, stamp: WRITERS[topic](stamp, frame='elsewhere'),
+    'quaternion': lambda topic, stamp: messages.pose(stamp, HOME, (1, 1, 1, 1)),
+    'cut': lambda topic, stamp: WRITERS[topic](stamp)[:-3],
+    'garbage': lambda topic, stamp: _garbage(rng(abs(stamp)), WRITERS[topic](stamp)),
+    'another type': lambda topic, stamp: messages.combined(stamp),
+}
+
+
+def _width(topic: str) -> int:
+    return 3 if topic in (POSE, COMBINED) else 6
+
+
+def _marked(topic: str, stamp: int) -> tuple[float, ...]:
+    """Return numbers of which the first says the stamp."""
+    return (float(stamp), *(HOME if topic in (POSE, COMBINED) else REST)[1:])
+
+
+samples = st.lists(st.tuples(
+    st.sampled_from(TOPICS),
+    # steps of 10 ms around zero, many of them twice; a few jumps beyond the timeout
+    st.integers(-3, 25).map(lambda n: n * 10 * MS) | st.integers(-500, 500).map(
+        lambda n: n * 7 * MS),
+    st.sampled_from(['good'] * 12 + list(_FAULTS))), max_size=80)
+
+
+def _drained(feed: Feed, answers: list[Setpoint]) -> None:
+    """Bring what waits to an end: used, or given up."""
+    far = 2 ** 31 * SECOND - 1
+    final = [answer for topic in TOPICS if (answer := feed.sample(topic, far))]
+    assert len(final) == 1
+    answers += final
+    # who lacks a partner among those without a stamp gets one
+    for topic in TOPICS:
+        for _ in range(WAITING):
+            used = len(answers) + sum(n for (t, _), n in feed.counts.items() if t == topic)
+            if used == feed.given[topic]:
+                break
+            for other in TOPICS:
+                waits = feed.given[other] - len(answers) - sum(
+                    n for (t, _), n in feed.counts.items() if t == other)
+                if other != topic and not waits and (answer := feed.sample(other, 0)):
+                    answers.append(answer)
+
+
+@settings(derandomize=True, deadline=None, max_examples=250)
+@given(samples, st.sampled_from([0.0, 0.005, 0.02]))
+def test_every_message_is_accounted_for(
+        sequence: list[tuple[str, int, str]], tolerance: float) -> None:
+    feed = Feed(sync_tolerance=tolerance)
+    answers: list[Setpoint] = []
+    for topic, stamp, fault in sequence:
+        if (answer := feed(topic, _FAULTS[fault](topic, stamp))) is not None:
+            answers.append(answer)
+        waiting = {t: feed.given[t] - len(answers) - sum(
+            n for (of, _), n in feed.counts.items() if of == t) for t in TOPICS}
+        assert min(waiting.values()) >= 0
+    for answer in answers:
+        assert len(answer.motion) == 24
+        assert np.all(np.isfinite(answer.motion))
+    stamps = [answer.stamp for answer in answers if answer.stamp != NOW]
+    back = [(a, b) for a, b in zip(stamps, stamps[1:], strict=False) if b <= a]
+    assert all(a - b > 100 * MS for a, b in back)
+    assert sum('restart' in notice for notice in feed.notices) == len(back)
+    assert sum('zero' in notice for notice in feed.notices) <= 1
+    _drained(feed, answers)
+    for topic in TOPICS:
+        refused = sum(n for (of, _), n in feed.counts.items() if of == topic)
+        assert feed.given[topic] == len(answers) + refused
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(samples, st.sampled_from([0, 5, 20]))
+def test_only_stamps_within_the_tolerance_meet(
+        sequence: list[tuple[str, int, str]], tolerance: int) -> None:
+    feed = Feed(sync_tolerance=tolerance * 1e-3)
+    for topic, stamp, _ in sequence:
+        answer = feed(topic, _FAULTS['good'](topic, stamp))
+        if answer is not None:
+            marks = [answer.motion[0], answer.motion[12], answer.motion[18]]
+            assert answer.stamp in (NOW, *marks)
+            assert max(marks) - min(marks) <= 2 * tolerance * MS
+            assert answer.stamp != NOW or marks == [0.0, 0.0, 0.0]
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(st.lists(st.tuples(st.sampled_from([POSE, COMBINED]), st.binary(max_size=240)),
+                max_size=20))
+def test_no_bytes_raise(sequence: list[tuple[str, bytes]]) -> None:
+    for source, of in (('pose', POSE), ('combined', COMBINED)):
+        feed = Feed(source=source)
+        answered = sum(feed(of, b'\0\1\0\0' + data) is not None
+                       for topic, data in sequence if topic == of)
+        assert answered + sum(feed.counts.values()) == feed.given[of]
+
+
+def test_wrenches_of_any_bytes_never_raise() -> None:
+    random = rng()
+    setpoints = Setpoints(PARAMETERS, lambda refusal, details: None, lambda text: None)
+    good = messages.wrench(SECOND, (1, 2, 3, 4, 5, 6))
+    for _ in range(500):
+        setpoints.take_wrench(_garbage(random, good))
+        assert np.all(np.isfinite(setpoints.wrench))
+    assert sum(setpoints.counts.values()) > 100
