@@ -73,7 +73,7 @@ _RESULT = _WRENCH + WRENCH * LANES
 _EIGENVALUE = _RESULT + RESULT * LANES  # of two matrices: J J^T and its inverse
 _TRIDIAGONAL = _EIGENVALUE + 2 * LANES
 _TILE = _TRIDIAGONAL + 22 * LANES
-# Laguerre's iteration takes 4 to 7 steps, with a double eigenvalue up to 30.
+# Laguerre's iteration takes 4 to 7 steps, with a fourfold eigenvalue up to 42.
 _MOST_STEPS = 64
 
 

@@ -36,13 +36,19 @@ Symmetric = tuple[Vector, ...]
 Tridiagonal = tuple[float, float, float, float, float, float, float, float, float, float, float]
 
 # A smaller pivot of a matrix whose rows are of length one is taken as this: far below what
-# rounding leaves of a zero, it keeps inverse and adjugate finite on a singularity.
+# rounding leaves of a zero, it keeps the inverse finite on a singularity, and the adjugate,
+# determinant times inverse, right.
 SMALLEST_PIVOT = 1e-32
 
 
 @inlined
 def _exchange(swap: bool, a: Vector6, b: Vector6) -> tuple[Vector6, Vector6]:
     return choose6(swap, b, a), choose6(swap, a, b)
+
+
+@inlined
+def _nonzero(pivot: float) -> float:
+    return pivot if abs(pivot) > SMALLEST_PIVOT else SMALLEST_PIVOT
 
 
 @inlined
@@ -59,7 +65,7 @@ def _eliminate(a: Vector6, b: Vector6, c: Vector6, d: Vector6, e: Vector6, f: Ve
 
     After six steps every row and column stands where it stood, and the rows hold the inverse.
     """
-    i = 1.0 / (a[0] if abs(a[0]) > SMALLEST_PIVOT else SMALLEST_PIVOT)
+    i = 1.0 / _nonzero(a[0])
     p = (1.0, i * a[1], i * a[2], i * a[3], i * a[4], i * a[5])
     return (_clear(b, p, i), _clear(c, p, i), _clear(d, p, i), _clear(e, p, i), _clear(f, p, i),
             (p[1], p[2], p[3], p[4], p[5], i))
@@ -88,27 +94,27 @@ def inverse_and_determinant(
     det, s03, a, d = _pivot(det, a, d)
     det, s04, a, e = _pivot(det, a, e)
     det, s05, a, f = _pivot(det, a, f)
-    det *= a[0]
+    det *= _nonzero(a[0])
     a, b, c, d, e, f = _eliminate(a, b, c, d, e, f)
     det, s12, a, b = _pivot(det, a, b)
     det, s13, a, c = _pivot(det, a, c)
     det, s14, a, d = _pivot(det, a, d)
     det, s15, a, e = _pivot(det, a, e)
-    det *= a[0]
+    det *= _nonzero(a[0])
     a, b, c, d, e, f = _eliminate(a, b, c, d, e, f)
     det, s23, a, b = _pivot(det, a, b)
     det, s24, a, c = _pivot(det, a, c)
     det, s25, a, d = _pivot(det, a, d)
-    det *= a[0]
+    det *= _nonzero(a[0])
     a, b, c, d, e, f = _eliminate(a, b, c, d, e, f)
     det, s34, a, b = _pivot(det, a, b)
     det, s35, a, c = _pivot(det, a, c)
-    det *= a[0]
+    det *= _nonzero(a[0])
     a, b, c, d, e, f = _eliminate(a, b, c, d, e, f)
     det, s45, a, b = _pivot(det, a, b)
-    det *= a[0]
+    det *= _nonzero(a[0])
     a, b, c, d, e, f = _eliminate(a, b, c, d, e, f)
-    det *= a[0]
+    det *= _nonzero(a[0])
     a, b, c, d, e, f = _eliminate(a, b, c, d, e, f)
     # The swaps of rows, undone in reverse order as swaps of the inverse's columns.
     u, v, w, x, y, z = _transpose(a, b, c, d, e, f)

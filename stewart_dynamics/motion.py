@@ -169,7 +169,7 @@ def _array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
         return np.zeros(tail)
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as exc:
+    except (OverflowError, TypeError, ValueError) as exc:
         raise MotionError(f'{name}: not an array of numbers: {exc}') from exc
     if array.shape[-len(tail):] != tail:
         raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')

@@ -61,7 +61,7 @@ _TYPES: dict[str, Any] = {
 # So many messages of a topic may wait in the middleware, so many joined setpoints here.
 # When more setpoints wait the node has fallen behind: only the newest is answered.
 _QUEUE = 1000
-_BACKLOG = 10
+_BACKLOG = 100
 
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0

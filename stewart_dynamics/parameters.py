@@ -155,6 +155,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
 )})
 
+_DEEPEST = 8
+
 _PYTHON_TYPES = {'string': str, 'double': float, 'bool': bool}
 
 
@@ -180,9 +182,11 @@ class ParameterSet(Mapping[str, Any]):
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters') -> None:
         for name in values:
             self._declared(name, source)
-        self.given: Mapping[str, Any] = MappingProxyType(dict(values))
+        # What YAML leaves empty is not given.
+        self.given: Mapping[str, Any] = MappingProxyType(
+            {name: value for name, value in values.items() if value is not None})
         self._values = {
-            name: _checked(parameter, values.get(name, parameter.default), source)
+            name: _checked(parameter, self.given.get(name, parameter.default), source)
             for name, parameter in self.table.items()}
         self._check_together(source)
 
@@ -306,7 +310,8 @@ def read_document(path: str | Path) -> dict[Any, Any]:
     except (OSError, UnicodeDecodeError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
         raise ParameterError(f'{path}: cannot be read: {reason}') from exc
-    except (YAMLError, ValueError, RecursionError) as exc:
+    except (YAMLError, ValueError, LookupError, RecursionError) as exc:
+        # ruamel.yaml lets bare errors through for a tag whose text does not fit it.
         raise ParameterError(f'{path}: not YAML: {" ".join(str(exc).split())}') from exc
     if not isinstance(document, dict):
         raise ParameterError(f"{path}: must begin with '/**:' or a node's name")
@@ -314,6 +319,8 @@ def read_document(path: str | Path) -> dict[Any, Any]:
 
 
 def _flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
+    if prefix.count('.') > _DEEPEST:
+        raise ParameterError(f'{source}: {prefix[:40]}...: names nest deeper than {_DEEPEST}')
     if not isinstance(tree, dict):
         raise ParameterError(f'{source}: {prefix or "ros__parameters"}: {tree!r}: must hold '
                              'names and values')
@@ -331,7 +338,7 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
         if parameter.required:
             raise ParameterError(f'{source}: {parameter.name}: missing, it has no default')
         return None
-    if isinstance(value, np.ndarray) or hasattr(value, 'tolist'):
+    if hasattr(value, 'tolist'):
         value = value.tolist()
     is_array = isinstance(value, list | tuple)
     entries = list(value) if is_array else [value]
@@ -360,8 +367,8 @@ def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
     given = type(entry)
     if given is not _PYTHON_TYPES[parameter.kind]:
         if parameter.kind == 'double' and given is int:
-            raise _broken(parameter, entry, source,
-                          f'is an integer, must be a double: write {entry}.0')
+            written = f': write {entry}.0' if abs(entry) < 1e15 else ''
+            raise _broken(parameter, entry, source, f'is an integer, must be a double{written}')
         raise _broken(parameter, entry, source, f'must be a {parameter.kind}')
     if parameter.choices and entry not in parameter.choices:
         raise _broken(parameter, entry, source, f'must be {parameter.rule}')
@@ -374,5 +381,9 @@ def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
 
 def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> ParameterError:
     unit = f' {parameter.unit}' if parameter.unit and isinstance(value, float) else ''
-    shown = f'{value!r}' if len(f'{value!r}') < 80 else f'{value!r:.77}...'
+    try:
+        shown = f'{value!r}'
+    except ValueError:  # an integer of more digits than Python writes
+        shown = f'an integer of {value.bit_length()} bits'
+    shown = shown if len(shown) < 80 else f'{shown:.77}...'
     return ParameterError(f'{source}: {parameter.name}: {shown}{unit}: {rule}')

@@ -135,8 +135,9 @@ class StewartPlatform:
         This is the runtime path itself, laid out as ``inverse_dynamics`` (the module) says;
         large batches use all processors.
         """
-        if wrenches is None:
-            wrenches = self._no_wrench
+        # Another layout in memory would be compiled for anew, for seconds.
+        rows = np.ascontiguousarray(rows)
+        wrenches = self._no_wrench if wrenches is None else np.ascontiguousarray(wrenches)
         results = np.empty((len(rows), runtime.RESULT))
         threads = min(_CPUS, len(rows) // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
         if threads < 2:
@@ -206,8 +207,8 @@ class StewartPlatform:
             return self._no_wrench
         try:
             rows = np.array(np.broadcast_to(
-                np.asarray(wrench, dtype=float), (*motion.shape, runtime.WRENCH)))
-        except (TypeError, ValueError) as exc:
+                np.asarray(wrench, dtype=float), (*motion.shape, runtime.WRENCH)), order='C')
+        except (OverflowError, TypeError, ValueError) as exc:
             raise MotionError(f'wrench: shape {np.shape(wrench)}: must broadcast to '
                               f'{(*motion.shape, runtime.WRENCH)}') from exc
         if not np.all(np.isfinite(rows)):

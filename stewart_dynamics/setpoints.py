@@ -166,7 +166,7 @@ class Setpoints:
         if not cdr.finite(values):
             self._refuse(topic, NOT_FINITE, str(values))
             return None
-        if topic is POSE or topic is COMBINED:
+        if topic in (POSE, COMBINED):
             x, y, z, w = values[3:7]
             length = math.hypot(x, y, z, w)
             if not abs(length - 1.0) <= QUATERNION_TOLERANCE:

@@ -40,8 +40,9 @@ from stewart_dynamics import (
     InverseDynamics, lagrange, Motion, MotionError, Parameters, SingularityError, StewartError,
     StewartPlatform)
 from stewart_dynamics import platform as platform_module
+from stewart_dynamics.compiled import COMPILED
 from stewart_dynamics.inverse_dynamics import (
-    CONDITION, DETERMINANT, FORCES, LANES, MOTION, RESULT)
+    CONDITION, DETERMINANT, FORCES, LANES, MOTION, RESULT, solve)
 
 Array = NDArray[np.float64]
 
@@ -375,6 +376,45 @@ def test_results_are_finite_where_many_legs_fail_at_once(legs: str) -> None:
     assert np.all(np.isfinite(platform.solve(motion.rows.reshape(1, MOTION))))
     with pytest.raises(SingularityError, match='sample 0'):
         platform.inverse_dynamics(motion)
+
+
+def test_determinant_rate_holds_where_a_pivot_is_exactly_zero() -> None:
+    p = symmetric_parameters()
+    base, moving = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
+    # legs 1 and 2 on one vertical line
+    base[:2] = [[0.5, 0.0, 0.0], [0.5, 0.0, -1.0]]
+    moving[:2] = [[0.5, 0.0, 0.0], [0.5, 0.0, 0.5]]
+    platform = StewartPlatform(p.replaced({
+        'geometry.base_joints': base.ravel().tolist(),
+        'geometry.platform_joints': moving.ravel().tolist()}))
+
+    omega = np.array([0.1, 0.2, 0.3])
+    speed = float(np.linalg.norm(omega))
+
+    def determinant(time: float) -> float:
+        motion = Motion(np.array([0.0, 0.0, 1.0]) + time * np.array([0.3, 0.2, 0.1]),
+                        rotation_about(omega / speed, speed * time))
+        return float(np.linalg.det(platform.jacobian(motion.position, motion.rotation)))
+
+    motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.3, 0.2, 0.1], omega)
+    found = platform.solve(motion.rows[None])[0]
+    assert abs(found[DETERMINANT]) < 1e-30
+    h = 1e-5
+    truth = (determinant(h) - determinant(-h)) / (2.0 * h)
+    assert found[DETERMINANT + 1] == pytest.approx(truth, rel=1e-8)
+
+
+def test_no_layout_of_arrays_is_compiled_for_anew() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    rows = samples_of_all_kinds(40)[1]
+    motion = Motion([[0.0, 0.0, 1.0]] * 5, np.eye(3))
+    one_by_one = platform.inverse_dynamics(motion, np.tile(np.arange(6.0), (5, 1)))
+    for_all = platform.inverse_dynamics(motion, np.arange(6.0))
+    assert np.array_equal(one_by_one.forces, for_all.forces)
+    assert np.array_equal(platform.solve(rows[::2]), platform.solve(rows)[::2])
+    assert np.array_equal(platform.solve(np.asfortranarray(rows)), platform.solve(rows))
+    if COMPILED:
+        assert len(solve.signatures) == 1
 
 
 def test_a_singular_sample_is_named() -> None:

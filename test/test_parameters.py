@@ -323,15 +323,37 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
         assert parameter.ros_type.startswith(parameter.kind)
 
 
+@pytest.mark.parametrize('text, said', [
+    ('x: &a {b: *a}', 'nest deeper'), ('a: !!bool foo', 'not YAML'),
+    ('a: !!float ""', 'not YAML'), ('a: !!int ""', 'not YAML'),
+    ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
+def test_yaml_that_its_library_chokes_on_is_refused_in_one_line(
+        tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / 'machine.yaml'
+    path.write_text(f'/**:\n  ros__parameters:\n    {text}\n')
+    with pytest.raises(ParameterError, match=said) as caught:
+        Parameters.check_file(path)
+    assert str(path) in str(caught.value)
+    assert '\n' not in str(caught.value)
+    assert len(str(caught.value)) < 400 + len(str(path))
+
+
+def test_what_yaml_leaves_empty_takes_its_default() -> None:
+    parameters = Parameters({**GIVEN, 'gravity': None, 'joints': None,
+                             'singularity.warn_condition': None, 'limits.force_max': None})
+    assert dict(parameters.given) == GIVEN
+    assert parameters['gravity'].tolist() == [0.0, 0.0, -9.80665]
+    assert parameters['joints'] == tuple(f'leg_{n}' for n in range(1, 7))
+
+
 # Whatever is given
 
 NAMES = sorted(PARAMETERS)
 GIVEN = {'geometry.base_joints': [0.1 * n for n in range(18)],
          'geometry.platform_joints': [0.2 * n for n in range(18)],
          'platform.mass': 1.0, 'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]}
-# An empty value (null) is left to tests of its own.
 plain = st.one_of(
-    st.booleans(), st.integers(-10 ** 30, 10 ** 30), st.floats(), st.text(max_size=8),
+    st.none(), st.booleans(), st.integers(-10 ** 30, 10 ** 30), st.floats(), st.text(max_size=8),
     st.sampled_from(['warn', 'base', '/**', 'ros__parameters', 'x' * 300]),
     st.dates(), st.binary(max_size=8))
 values = st.recursive(plain, lambda inner: st.one_of(
