@@ -1,0 +1,859 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The replay: its bags and tables as other readers see them, and every way in which it ends."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable
+import csv
+import math
+from pathlib import Path
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from typing import Any, NamedTuple
+
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+from mcap_ros2.decoder import DecoderFactory
+import messages
+from messages import STORE, UPRIGHT
+import numpy as np
+import pytest
+from referees import ROOT
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
+from scipy.spatial.transform import Rotation
+
+from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
+from stewart_dynamics.replay import (
+    BAD_INPUT, DONE, LIMIT_MET, main, NODE, PARTLY_READ, replay)
+from stewart_dynamics.rotation import from_quaternion
+from stewart_dynamics.setpoints import (
+    ACCEL, COMBINED, INPUT_TYPES, MALFORMED, NOT_FINITE, NOT_JOINED, POSE, Refusal, TOO_OLD,
+    TWICE, TWIST, WRENCH)
+from stewart_dynamics.step import OUTPUT_TYPES
+
+PARAMS = ROOT / 'config' / 'platform.yaml'
+PARAMETERS = Parameters.from_yaml(PARAMS)
+PLATFORM = StewartPlatform(PARAMETERS)
+BAGS = ('clear', 'singular', 'flawed')
+TOPICS = (POSE, TWIST, ACCEL)
+MS = 1_000_000
+SECOND = 1000 * MS
+RECORDED = 1_700_000_000 * SECOND
+
+Recorded = tuple[str, int, bytes]
+
+
+class Outputs(NamedTuple):
+    """What a replay wrote of one bag, as the independent reader of MCAP gives it."""
+
+    messages: dict[str, list[tuple[int, Any]]]
+    """Of each topic: record times and messages."""
+    rows: list[dict[str, str]]
+    """Of legs.csv."""
+    folder: Path
+
+
+def run(bag: Path, folder: Path, *options: str) -> int:
+    """Run the program in this process."""
+    return main([str(bag), '--params', str(PARAMS), '--output', str(folder), *options])
+
+
+def run_apart(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run the program in a process of its own."""
+    return subprocess.run(
+        [sys.executable, '-m', 'stewart_dynamics.replay', *map(str, arguments)],
+        capture_output=True, text=True, timeout=60, check=False, **options)
+
+
+def decoded(bag: Path) -> list[tuple[str, int, Any]]:
+    """Return a bag's messages as mcap and its own decoder read them: topic, time, message."""
+    with bag.open('rb') as file:
+        return [(channel.topic, message.log_time, of) for _, channel, message, of in make_reader(
+            file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()]
+
+
+def outputs_of(folder: Path) -> Outputs:
+    found: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+    for topic, when, message in decoded(folder / 'bag' / 'bag.mcap'):
+        found[topic].append((when, message))
+    with (folder / 'legs.csv').open(newline='', encoding='utf-8') as file:
+        return Outputs(found, list(csv.DictReader(file)), folder)
+
+
+def recorded(bag: Path) -> list[Recorded]:
+    """Return a bag's messages as mcap reads them: topic, time, bytes."""
+    with bag.open('rb') as file:
+        return [(channel.topic.removeprefix(f'{NODE}/'), message.log_time, message.data)
+                for _, channel, message in make_reader(file).iter_messages()]
+
+
+def nanoseconds(message: Any) -> int:
+    return int(message.header.stamp.sec) * SECOND + int(message.header.stamp.nanosec)
+
+
+def write_bag(folder: Path, of: Iterable[Recorded], node: str = NODE,
+              plugin: StoragePlugin = StoragePlugin.MCAP, **types: str) -> Path:
+    """Write a rosbag2; topics are made as they come, ``types`` overrides what they are."""
+    with Writer(folder, version=9, storage_plugin=plugin) as writer:
+        connections: dict[str, Any] = {}
+        for topic, when, data in of:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic if topic.startswith('/') else f'{node}/{topic}',
+                    types.get(topic.rpartition('/')[2]) or INPUT_TYPES[topic], typestore=STORE)
+            writer.write(connections[topic], when, data)
+    return folder
+
+
+def motion(number: int) -> list[Recorded]:
+    """Return setpoints 10 ms apart: a slow heave."""
+    found: list[Recorded] = []
+    for n in range(1, number + 1):
+        t, stamp, when = 0.01 * n, n * 10 * MS, RECORDED + n * 10 * MS
+        found += [
+            (POSE, when, messages.pose(stamp, (0.0, 0.0, 1.1 + 0.05 * math.sin(t)))),
+            (TWIST, when + 1, messages.twist(stamp, (0.0, 0.0, 0.05 * math.cos(t), 0, 0, 0))),
+            (ACCEL, when + 2, messages.accel(stamp, (0.0, 0.0, -0.05 * math.sin(t), 0, 0, 0)))]
+    return found
+
+
+@pytest.fixture(scope='module')
+def replayed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outputs]:
+    """Return what a replay of the repository's bags wrote."""
+    folder = tmp_path_factory.mktemp('replayed') / 'made' / 'for us'
+    assert main([*(str(ROOT / 'bags' / name) for name in BAGS), '--params', str(PARAMS),
+                 '--output', str(folder)]) == DONE
+    return {name: outputs_of(folder / name) for name in BAGS}
+
+
+def bag_file(name: str) -> Path:
+    return ROOT / 'bags' / name / f'{name}.mcap'
+
+
+def setpoints_of(name: str) -> dict[int, tuple[int, Any, Any, Any]]:
+    """Return of each stamp that all topics have: last record time, pose, twist, accel."""
+    of: dict[str, dict[int, tuple[int, Any]]] = defaultdict(dict)
+    for topic, when, message in decoded(bag_file(name)):
+        of[topic.removeprefix(f'{NODE}/')].setdefault(nanoseconds(message), (when, message))
+    return {stamp: (max(of[topic][stamp][0] for topic in TOPICS),
+                    of[POSE][stamp][1].pose, of[TWIST][stamp][1].twist, of[ACCEL][stamp][1].accel)
+            for stamp in sorted(set.intersection(*(set(of[topic]) for topic in TOPICS)))}
+
+
+def three(vector: Any) -> list[float]:
+    return [vector.x, vector.y, vector.z]
+
+
+def library_motion(name: str) -> Motion:
+    """Return a bag's motion, read and put together without the package's joining."""
+    parts = [(three(p.position), [p.orientation.x, p.orientation.y, p.orientation.z,
+                                  p.orientation.w],
+              three(t.linear), three(t.angular), three(a.linear), three(a.angular))
+             for _, p, t, a in setpoints_of(name).values()]
+    position, quaternion, *rates = (np.array(part) for part in zip(*parts, strict=True))
+    rotation = [from_quaternion(*(q / math.hypot(*q)).tolist()) for q in quaternion]
+    assert np.allclose(np.reshape(rotation, (-1, 3, 3)),
+                       Rotation.from_quat(quaternion).as_matrix(), rtol=0, atol=3e-15)
+    return Motion(position, np.reshape(rotation, (-1, 3, 3)), *rates)
+
+
+# What it writes
+
+@pytest.mark.parametrize('name', BAGS)
+def test_the_bag_has_the_topics_and_types_of_the_node(
+        name: str, replayed: dict[str, Outputs]) -> None:
+    with AnyReader([replayed[name].folder / 'bag']) as reader:
+        assert {c.topic: c.msgtype for c in reader.connections} == {
+            f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
+    assert not list(replayed[name].folder.parent.glob('.*'))
+
+
+@pytest.mark.parametrize('name', ['clear', 'singular'])
+def test_every_setpoint_is_answered_as_the_library_does(
+        name: str, replayed: dict[str, Outputs]) -> None:
+    given, outputs = setpoints_of(name), replayed[name]
+    result = PLATFORM.inverse_dynamics(library_motion(name))
+    assert len(given) == len(outputs.rows) == 1001
+    of = {topic: outputs.messages[f'{NODE}/{topic}'] for topic in OUTPUT_TYPES}
+    assert all(len(of[topic]) == 1001 for topic in of if topic != 'singularity_warning')
+    bound = PARAMETERS['limits.force_max']
+    clipped = np.clip(result.forces, -bound, bound)
+    for n, (stamp, (when, *_)) in enumerate(given.items()):
+        # the input's stamp and time of recording
+        state = of['leg_states'][n][1]
+        assert nanoseconds(state) == stamp
+        assert {of[topic][n][0] for topic in (
+            'leg_states', 'leg_lengths', 'leg_forces', 'jacobian_determinant')} == {when}
+        # the library's numbers, to the bit
+        assert tuple(state.name) == PARAMETERS['joints']
+        assert np.array_equal(
+            state.position, result.lengths[n] - PARAMETERS['geometry.zero_length'])
+        assert np.array_equal(state.velocity, result.rates[n])
+        assert np.array_equal(state.effort, clipped[n])
+        assert np.array_equal(of['leg_lengths'][n][1].data, result.lengths[n])
+        assert np.array_equal(of['leg_forces'][n][1].data, clipped[n])
+        assert of['jacobian_determinant'][n][1].data == result.determinant[n]
+
+
+@pytest.mark.parametrize('name', BAGS)
+def test_the_table_has_the_same_numbers_exactly(
+        name: str, replayed: dict[str, Outputs]) -> None:
+    outputs = replayed[name]
+    of = {topic: outputs.messages[f'{NODE}/{topic}'] for topic in OUTPUT_TYPES}
+    zero = PARAMETERS['geometry.zero_length']
+    for n, row in enumerate(outputs.rows):
+        state = of['leg_states'][n][1]
+        assert int(row['stamp (ns)']) == nanoseconds(state)
+
+        def six(quantity: str, row: dict[str, str] = row) -> list[float]:
+            return [float(row[f'{leg} {quantity}']) for leg in PARAMETERS['joints']]
+
+        assert six('length (m)') == list(of['leg_lengths'][n][1].data)
+        assert np.array_equal(np.array(six('length (m)')) - zero, state.position)
+        assert six('rate (m/s)') == list(state.velocity)
+        assert six('force (N)') == list(state.effort) == list(of['leg_forces'][n][1].data)
+        assert float(row['det(J) (m^3)']) == of['jacobian_determinant'][n][1].data
+        assert all(repr(float(text)) == text for key, text in row.items()
+                   if key not in ('stamp (ns)', 'singularity warning'))
+
+
+@pytest.mark.parametrize('name', ['clear', 'singular'])
+def test_the_table_has_what_no_topic_has(name: str, replayed: dict[str, Outputs]) -> None:
+    result = PLATFORM.inverse_dynamics(library_motion(name))
+    for n, row in enumerate(replayed[name].rows):
+        assert [float(row[f'{leg} demanded force (N)'])
+                for leg in PARAMETERS['joints']] == result.forces[n].tolist()
+        assert float(row['d(det(J))/dt (m^3/s)']) == result.determinant_rate[n]
+        assert float(row['condition number']) == result.condition_number[n]
+
+
+@pytest.mark.parametrize('name', BAGS)
+def test_rosbags_reads_what_mcap_reads(name: str, replayed: dict[str, Outputs]) -> None:
+    outputs = replayed[name]
+    by_rosbags: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+    with AnyReader([outputs.folder / 'bag']) as reader:
+        for connection, when, data in reader.messages():
+            by_rosbags[connection.topic].append(
+                (when, reader.deserialize(data, connection.msgtype)))
+    assert {t: [when for when, _ in of] for t, of in by_rosbags.items()} == {
+        t: [when for when, _ in of] for t, of in outputs.messages.items()}
+    for topic, of in by_rosbags.items():
+        for (_, ours), (_, theirs) in zip(of, outputs.messages[topic], strict=True):
+            if hasattr(ours, 'effort'):
+                assert nanoseconds(ours) == nanoseconds(theirs)
+                for field in ('position', 'velocity', 'effort'):
+                    assert np.array_equal(getattr(ours, field), getattr(theirs, field))
+            else:
+                assert np.array_equal(ours.data, theirs.data)
+
+
+def test_the_warning_is_written_at_every_change(replayed: dict[str, Outputs]) -> None:
+    topic = f'{NODE}/singularity_warning'
+    assert [m.data for _, m in replayed['clear'].messages[topic]] == [False]
+    of = replayed['singular']
+    assert [m.data for _, m in of.messages[topic]] == [False, True]
+    column = [row['singularity warning'] for row in of.rows]
+    first = column.index('1')
+    assert column == ['0'] * first + ['1'] * (1001 - first)
+    assert of.messages[topic][1][0] == of.messages[f'{NODE}/leg_states'][first][0]
+    # it comes before the sign of det(J) changes
+    signs = np.sign([float(row['det(J) (m^3)']) for row in of.rows])
+    change = int(np.flatnonzero(signs[1:] != signs[:-1])[0])
+    assert first < change - 10
+
+
+# The flawed bag
+
+def expected_of(name: str) -> tuple[list[int], Counter[tuple[str, str]]]:
+    """Return stamps answered and refusals, by the rules of bad input written down anew."""
+    sound: dict[str, list[int]] = {topic: [] for topic in TOPICS}
+    refused: Counter[tuple[str, str]] = Counter()
+    answered: list[int] = []
+    for topic, _, data in recorded(bag_file(name)):
+        message = STORE.deserialize_cdr(data, INPUT_TYPES[topic])
+        body = getattr(message, topic.rpartition('/')[2])
+        numbers = [getattr(v, axis) for v in vars(body).values() if hasattr(v, 'x')
+                   for axis in 'xyzw' if hasattr(v, axis)]
+        stamp = nanoseconds(message)
+        if not np.all(np.isfinite(numbers)):
+            refused[topic, NOT_FINITE] += 1
+        elif answered and stamp < answered[-1]:
+            refused[topic, TOO_OLD] += 1
+        elif stamp in sound[topic]:
+            refused[topic, TWICE] += 1
+        else:
+            sound[topic].append(stamp)
+            if all(stamp in sound[other] for other in TOPICS):
+                answered.append(stamp)
+    for topic in TOPICS:
+        refused[topic, NOT_JOINED] = len(set(sound[topic]) - set(answered))
+    return answered, +refused
+
+
+def test_the_flaws_are_counted_as_they_are_in_the_bag(tmp_path: Path) -> None:
+    result = replay(ROOT / 'bags' / 'flawed', PARAMETERS, tmp_path / 'flawed')
+    answered, refused = expected_of('flawed')
+    assert {tuple(refusal): n for refusal, n in result.refusals.items()} == refused
+    assert [int(row['stamp (ns)']) for row in outputs_of(tmp_path / 'flawed').rows] == answered
+    # every message of the bag is in a setpoint or in a count
+    held = Counter(topic for topic, _, _ in recorded(bag_file('flawed')))
+    for topic in TOPICS:
+        assert held[topic] == len(answered) + sum(
+            n for refusal, n in result.refusals.items() if refusal.topic == topic)
+    reasons = {refusal.reason for refusal in result.refusals}
+    assert reasons == {NOT_FINITE, TOO_OLD, TWICE, NOT_JOINED}
+
+
+def test_the_flawed_bag_gives_the_numbers_of_the_whole_one(
+        replayed: dict[str, Outputs]) -> None:
+    # the same motion, recorded at other times: its columns at t since the start are the same
+    def by_time(name: str) -> dict[int, list[str]]:
+        rows = replayed[name].rows
+        first = min(int(row['stamp (ns)']) for row in rows)
+        return {int(row['stamp (ns)']) - first: list(row.values())[1:25] for row in rows}
+
+    flawed, clear = by_time('flawed'), by_time('clear')
+    assert len(flawed) > 900
+    offset = next(o for o in range(0, 100 * MS, 10 * MS) if flawed[0] == clear.get(o))
+    assert all(clear[when + offset] == row for when, row in flawed.items())
+
+
+def test_what_a_bag_leaves_waiting_is_counted(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(10)[:-2] + [(POSE, RECORDED + SECOND, b'\0\1')])
+    result = replay(bag, PARAMETERS, tmp_path / 'out')
+    assert result.refusals == {Refusal(POSE, NOT_JOINED): 1, Refusal(POSE, MALFORMED): 1}
+    assert result.summary is not None
+    assert result.summary.samples == 9
+
+
+# Other bags
+
+def test_a_wrench_in_the_bag_is_used(tmp_path: Path) -> None:
+    load = (10.0, -20.0, 300.0, 4.0, -5.0, 6.0)
+    of = motion(20)
+    at = 3 * 10
+    of.insert(at, (WRENCH, of[at][1] - 1, messages.wrench(0, load)))
+    assert run(write_bag(tmp_path / 'loaded', of), tmp_path / 'out') == DONE
+    rows = outputs_of(tmp_path / 'out' / 'loaded').rows
+    heave = Motion(
+        [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 21)], np.eye(3),
+        [(0.0, 0.0, 0.05 * math.cos(0.01 * n)) for n in range(1, 21)], None,
+        [(0.0, 0.0, -0.05 * math.sin(0.01 * n)) for n in range(1, 21)])
+    free = PLATFORM.inverse_dynamics(heave).forces
+    loaded = PLATFORM.inverse_dynamics(heave, load).forces
+    forces = [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']] for row in rows]
+    assert np.array_equal(forces[:10], free[:10])
+    assert np.array_equal(forces[10:], loaded[10:])
+    assert np.min(np.max(np.abs(free - loaded), axis=1)) > 10.0
+
+
+def parameter_file(folder: Path, text: str) -> Path:
+    file = folder / 'platform.yaml'
+    file.write_text(PARAMS.read_text(encoding='utf-8') + f'\n    {text}\n', encoding='utf-8')
+    return file
+
+
+def test_a_combined_bag_gives_the_numbers_of_the_separate_one(tmp_path: Path) -> None:
+    separate = write_bag(tmp_path / 'separate', motion(30))
+    combined = write_bag(tmp_path / 'combined', [
+        (COMBINED, RECORDED + n * 10 * MS, messages.combined(
+            n * 10 * MS, (0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)), UPRIGHT,
+            (0.0, 0.0, 0.05 * math.cos(0.01 * n), 0, 0, 0),
+            (0.0, 0.0, -0.05 * math.sin(0.01 * n), 0, 0, 0), names=['élan']))
+        for n in range(1, 31)])
+    params = parameter_file(tmp_path, 'setpoint: {source: combined}')
+    assert run(separate, tmp_path / 'out') == DONE
+    assert main([str(combined), '--params', str(params), '--output', str(tmp_path / 'out')
+                 ]) == DONE
+    out = tmp_path / 'out'
+    assert outputs_of(out / 'combined').rows == outputs_of(out / 'separate').rows
+
+
+def test_a_bag_of_poses_is_quasi_static(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'poses', motion(30)[::3])
+    params = parameter_file(tmp_path, 'setpoint: {source: pose}')
+    assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out')]) == DONE
+    still = PLATFORM.inverse_dynamics(Motion(
+        [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 31)], np.eye(3)))
+    rows = outputs_of(tmp_path / 'out' / 'poses').rows
+    assert [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']]
+            for row in rows] == still.forces.tolist()
+
+
+def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
+    for plugin in (StoragePlugin.MCAP, StoragePlugin.SQLITE3):
+        bag = write_bag(tmp_path / plugin.name, motion(30), plugin=plugin)
+        assert run(bag, tmp_path / 'out') == DONE
+    # and without its metadata, by the file alone
+    assert run(tmp_path / 'SQLITE3' / 'SQLITE3.db3', tmp_path / 'alone') == DONE
+    mcap, sqlite, alone = (outputs_of(folder) for folder in (
+        tmp_path / 'out' / 'MCAP', tmp_path / 'out' / 'SQLITE3', tmp_path / 'alone' / 'SQLITE3'))
+    assert len(mcap.rows) == 30
+    assert mcap.rows == sqlite.rows == alone.rows
+    times = [[when for when, _ in of.messages[f'{NODE}/leg_states']]
+             for of in (mcap, sqlite, alone)]
+    assert times[0] == times[1] == times[2] == [
+        RECORDED + n * 10 * MS + 2 for n in range(1, 31)]
+
+
+def test_a_bag_without_metadata_is_read_by_its_file(
+        tmp_path: Path, replayed: dict[str, Outputs]) -> None:
+    shutil.copy(bag_file('clear'), tmp_path / 'alone.mcap')
+    assert run(tmp_path / 'alone.mcap', tmp_path / 'out') == DONE
+    assert outputs_of(tmp_path / 'out' / 'alone').rows == replayed['clear'].rows
+
+
+def test_setpoints_without_stamps_are_stamped_as_they_were_recorded(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', [
+        (topic, RECORDED + n * 10 * MS, write(0)) for n in range(5) for topic, write in (
+            (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))])
+    assert run(bag, tmp_path / 'out') == DONE
+    assert [int(row['stamp (ns)']) for row in outputs_of(tmp_path / 'out' / 'bag').rows] == [
+        RECORDED + n * 10 * MS for n in range(5)]
+
+
+def test_a_time_that_no_stamp_can_hold_is_counted(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    late = 2 ** 31 * SECOND
+    bag = write_bag(tmp_path / 'bag', [
+        (topic, late + n, write(0)) for n in (-1, 0) for topic, write in (
+            (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))])
+    assert run(bag, tmp_path / 'out') == DONE
+    assert 'refused, setpoint: 1 out of range' in capsys.readouterr().out
+    assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 1
+
+
+def test_a_bag_that_loops_is_followed_and_said(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lap = motion(50)
+    bag = write_bag(tmp_path / 'bag', lap + [(t, when + SECOND, d) for t, when, d in lap])
+    assert run(bag, tmp_path / 'out') == DONE
+    printed = capsys.readouterr().out
+    assert printed.count('restart') == 1
+    assert 'refused' not in printed
+    assert '100 setpoints in 0.98 s' in printed
+    assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 100
+
+
+def test_other_topics_do_not_matter(tmp_path: Path) -> None:
+    of = motion(5)
+    of.insert(2, ('/elsewhere/chatter', RECORDED, b'\0\1\0\0\1\0\0\0\0'))
+    bag = write_bag(tmp_path / 'bag', of, chatter='std_msgs/msg/String')
+    assert run(bag, tmp_path / 'out') == DONE
+    assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 5
+
+
+def test_another_name_of_the_node(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/machine')
+    assert run(bag, tmp_path / 'out', '--node', 'cell/machine') == DONE
+    assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
+        f'/cell/machine/{topic}' for topic in OUTPUT_TYPES}
+
+
+def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
+    # the platform's joints in the plane of the base's
+    of = [(topic, when, messages.pose(20 * MS, (0.0, 0.0, 0.0))
+           if topic == POSE and when == RECORDED + 20 * MS else data)
+          for topic, when, data in motion(3)]
+    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
+    outputs = outputs_of(tmp_path / 'out' / 'bag')
+    assert [row['leg_1 force (N)'] != '' for row in outputs.rows] == [True, False, True]
+    assert all(outputs.rows[1][f'leg_{leg} demanded force (N)'] == '' for leg in range(1, 7))
+    assert len(outputs.messages[f'{NODE}/leg_forces']) == 2
+    assert [len(m.effort) for _, m in outputs.messages[f'{NODE}/leg_states']] == [6, 0, 6]
+
+
+# Exit codes
+
+def test_nothing_that_can_be_answered_is_said(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cut = [(topic, when, data[:-1]) for topic, when, data in motion(3)]
+    bag = write_bag(tmp_path / 'bag', cut)
+    assert run(bag, tmp_path / 'out', '--strict') == DONE
+    printed = capsys.readouterr().out
+    assert 'no setpoint could be answered' in printed
+    for topic in TOPICS:
+        assert f'refused, {topic}: 3 {MALFORMED}' in printed
+    assert not outputs_of(tmp_path / 'out' / 'bag').rows
+
+
+@pytest.mark.parametrize(('name', 'options', 'code'), [
+    ('clear', (), DONE), ('clear', ('--strict',), DONE), ('singular', (), DONE),
+    ('singular', ('--strict',), LIMIT_MET)])
+def test_strict_is_for_limits_and_warnings(
+        name: str, options: tuple[str, ...], code: int, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(ROOT / 'bags' / name, tmp_path, *options) == code
+    printed = capsys.readouterr()
+    assert '1001 setpoints in 10.00 s' in printed.out
+    assert ('crossed zero at t = 8.4' in printed.out) == (name == 'singular')
+    assert not printed.err
+    assert (tmp_path / name / 'legs.csv').exists()
+
+
+def test_strict_minds_a_limit_without_a_warning(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(3))
+    params = tmp_path / 'platform.yaml'
+    params.write_text(PARAMS.read_text(encoding='utf-8').replace(
+        'force_max: 6000.0', 'force_max: 100.0'), encoding='utf-8')
+    assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out'),
+                 '--strict']) == LIMIT_MET
+    for row in outputs_of(tmp_path / 'out' / 'bag').rows:
+        assert {abs(float(row[f'{leg} force (N)'])) for leg in PARAMETERS['joints']} == {100.0}
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Return the one line that is said of bad arguments; the code is 2, stdout empty."""
+    assert main([str(argument) for argument in arguments]) == BAD_INPUT
+    printed = capsys.readouterr()
+    assert not printed.out
+    assert printed.err.count('\n') == 1
+    assert printed.err.startswith('stewart_replay: ')
+    return printed.err
+
+
+def test_a_missing_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, tmp_path / 'none', '--params', PARAMS, '--output', tmp_path / 'out')
+    assert str(tmp_path / 'none') in said
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize('content', [b'', b'no bag', b'\x89MCAP0\r\n', bytes(range(256)) * 20])
+@pytest.mark.parametrize('suffix', ['.mcap', '.db3', '.bag', '.txt'])
+def test_a_file_that_is_no_bag(
+        content: bytes, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / f'file{suffix}'
+    file.write_bytes(content)
+    assert str(file) in refused(
+        capsys, file, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_folder_that_is_no_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert 'metadata' in refused(
+        capsys, tmp_path, '--params', PARAMS, '--output', tmp_path / 'out')
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('/**: *x', 'not YAML'), ('a: b', "no parameters under '/**:'"),
+    (PARAMS.read_text(encoding='utf-8').replace('mass: 150.0', 'mass: -1.0'),
+     'platform.mass: -1.0 kg: must be more than 0'),
+    ('/**: {ros__parameters: {platform: {mas: 1.0}}}', 'platform.mass'),
+    ('/**: {ros__parameters: {autostart: true}}', 'missing')],
+    ids=['no YAML', 'no parameters', 'a rule broken', 'unknown', 'missing'])
+def test_bad_parameters(text: str, words: str, tmp_path: Path,
+                        capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'machine.yaml'
+    file.write_text(text, encoding='utf-8')
+    said = refused(capsys, ROOT / 'bags' / 'clear', '--params', file, '--output',
+                   tmp_path / 'out')
+    assert str(file) in said
+    assert words in said
+    assert not (tmp_path / 'out').exists()
+
+
+def test_missing_parameters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert 'none.yaml: cannot be read' in refused(
+        capsys, ROOT / 'bags' / 'clear', '--params', tmp_path / 'none.yaml')
+
+
+def test_a_missing_topic_lists_what_the_bag_holds(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(3)[:2])
+    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert f'has no topic {NODE}/{ACCEL}' in said
+    assert f'{NODE}/{POSE} (geometry_msgs/msg/PoseStamped)' in said
+    assert f'{NODE}/{TWIST} (geometry_msgs/msg/TwistStamped)' in said
+    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out', '--node', 'x')
+    assert f'/x/{POSE}, /x/{TWIST}, /x/{ACCEL}' in said
+    assert not (tmp_path / 'out').exists()
+
+
+def test_an_empty_bag_holds_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, write_bag(tmp_path / 'bag', []), '--params', PARAMS)
+    assert 'holds nothing' in said
+
+
+@pytest.mark.parametrize('topic', [*TOPICS, WRENCH])
+def test_a_topic_of_another_type(
+        topic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = [*motion(1), (WRENCH, RECORDED + SECOND, messages.wrench(0))]
+    bag = write_bag(tmp_path / 'bag', of, **{
+        topic.rpartition('/')[2]: 'geometry_msgs/msg/PointStamped'})
+    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert (f'{NODE}/{topic}: is a geometry_msgs/msg/PointStamped, must be a '
+            f'{INPUT_TYPES[topic]}') in said
+    assert not (tmp_path / 'out').exists()
+
+
+def test_an_output_folder_that_exists_is_left_alone(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = tmp_path / 'out' / 'clear' / 'legs.csv'
+    kept.parent.mkdir(parents=True)
+    kept.write_text('kept')
+    said = refused(capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output',
+                   tmp_path / 'out')
+    assert f'{kept.parent}: exists already' in said
+    assert kept.read_text() == 'kept'
+    assert [path.name for path in (tmp_path / 'out').iterdir()] == ['clear']
+
+
+def test_an_output_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'out').write_text('a file')
+    assert str(tmp_path / 'out') in refused(
+        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out')
+
+
+def test_a_bag_of_ros_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Writer1(tmp_path / 'old.bag') as writer:
+        for topic in TOPICS:
+            writer.add_connection(f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store)
+    assert 'ROS 1' in refused(capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output',
+                              tmp_path / 'out')
+
+
+@pytest.mark.parametrize('arguments', [
+    [], ['bag'], ['--params', 'x.yaml'], ['bag', '--params', 'x.yaml', '--nonsense']])
+def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == BAD_INPUT
+    assert 'usage: stewart_replay' in capsys.readouterr().err
+
+
+# Several bags
+
+def test_bags_of_one_name_are_refused_before_anything_is_written(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for folder in ('a', 'b'):
+        write_bag(tmp_path / folder / 'x', motion(3))
+    a, b, out = tmp_path / 'a' / 'x', tmp_path / 'b' / 'x', tmp_path / 'out'
+    for second in (b, a, tmp_path / 'a' / '..' / 'a' / 'x', a / 'x.mcap'):
+        said = refused(capsys, a, second, '--params', PARAMS, '--output', out)
+        assert f'{a}, {second}: the results of both would be {out / "x"}' in said
+        assert not out.exists()
+
+
+def test_a_point_in_a_name_is_no_suffix(tmp_path: Path) -> None:
+    bags = [write_bag(tmp_path / name, motion(3)) for name in (
+        'run_2024-05-01-12.00.01', 'run_2024-05-01-12.00.02')]
+    assert main([*map(str, bags), '--params', str(PARAMS), '--output', str(tmp_path / 'out')
+                 ]) == DONE
+    assert sorted(path.name for path in (tmp_path / 'out').iterdir()) == [
+        bag.name for bag in bags]
+
+
+def test_the_current_folder_has_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(write_bag(tmp_path / 'here', motion(3)))
+    assert run(Path('.'), tmp_path / 'out') == DONE
+    assert (tmp_path / 'out' / 'here' / 'legs.csv').exists()
+
+
+def test_a_bad_bag_among_good_ones_is_told_and_the_rest_done(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good = [write_bag(tmp_path / name, motion(3)) for name in ('one', 'two')]
+    assert main([str(good[0]), str(tmp_path / 'none'), str(good[1]), '--params', str(PARAMS),
+                 '--output', str(tmp_path / 'out')]) == BAD_INPUT
+    printed = capsys.readouterr()
+    assert printed.out.count('3 setpoints') == 2
+    assert str(tmp_path / 'none') in printed.err
+    assert sorted(path.name for path in (tmp_path / 'out').iterdir()) == ['one', 'two']
+
+
+# Damaged bags
+
+def damaged_bag(file: Path) -> Path:
+    """Write a bag of 100 setpoints in chunks, and spoil a byte of a chunk in the middle."""
+    with file.open('wb') as stream:
+        writer = McapWriter(stream, chunk_size=4000, compression=CompressionType.NONE)
+        writer.start('ros2')
+        channels = {}
+        for topic in TOPICS:
+            definition, _ = STORE.generate_msgdef(INPUT_TYPES[topic], ros_version=2)
+            schema = writer.register_schema(INPUT_TYPES[topic], 'ros2msg', definition.encode())
+            channels[topic] = writer.register_channel(f'{NODE}/{topic}', 'cdr', schema)
+        for topic, when, data in motion(100):
+            writer.add_message(channels[topic], when, data, when)
+        writer.finish()
+    with file.open('rb') as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    chunks = summary.chunk_indexes
+    assert len(chunks) > 5
+    middle = chunks[len(chunks) // 2]
+    content = bytearray(file.read_bytes())
+    content[middle.chunk_start_offset + middle.chunk_length // 2] ^= 0x40
+    file.write_bytes(content)
+    return file
+
+
+def test_what_comes_before_a_damage_is_done(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = damaged_bag(tmp_path / 'damaged.mcap')
+    assert run(bag, tmp_path / 'out') == PARTLY_READ
+    printed = capsys.readouterr()
+    assert f'{bag}: the rest could not be read: ' in printed.err
+    assert 'checksum' in printed.err
+    rows = outputs_of(tmp_path / 'out' / 'damaged').rows
+    assert 30 < len(rows) < 70
+    whole = write_bag(tmp_path / 'whole', motion(100))
+    assert run(whole, tmp_path / 'out') == DONE
+    assert outputs_of(tmp_path / 'out' / 'whole').rows[:len(rows)] == rows
+
+
+@pytest.mark.parametrize('order', [(0, 1, 2), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
+def test_of_several_bags_the_gravest_decides(order: tuple[int, ...], tmp_path: Path) -> None:
+    found = [ROOT / 'bags' / 'singular', damaged_bag(tmp_path / 'damaged.mcap'),
+             ROOT / 'bags' / 'clear']
+    bags = [str(found[n]) for n in order]
+    assert main([*bags, '--params', str(PARAMS), '--output', str(tmp_path / 'out'), '--strict'
+                 ]) == PARTLY_READ
+    assert main([*bags, str(tmp_path / 'none'), '--params', str(PARAMS), '--output',
+                 str(tmp_path / 'again'), '--strict']) == BAD_INPUT
+
+
+@pytest.mark.parametrize('plugin', list(StoragePlugin))
+def test_a_bag_cut_off_is_never_a_crash(
+        plugin: StoragePlugin, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
+    file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
+    whole = file.read_bytes()
+    for n, length in enumerate(range(0, len(whole), len(whole) // 12)):
+        file.write_bytes(whole[:length])
+        assert run(bag, tmp_path / 'out' / str(n)) in (BAD_INPUT, PARTLY_READ)
+        assert capsys.readouterr().err.count('\n') == 1
+
+
+@pytest.mark.parametrize('plugin', list(StoragePlugin))
+def test_a_spoiled_bag_is_never_a_crash(plugin: StoragePlugin, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
+    file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
+    whole = file.read_bytes()
+    for n, at in enumerate(range(0, len(whole), len(whole) // 25)):
+        file.write_bytes(whole[:at] + bytes(b ^ 0xa5 for b in whole[at:at + 64])
+                         + whole[at + 64:])
+        assert run(bag, tmp_path / 'out' / str(n)) in (DONE, BAD_INPUT, PARTLY_READ)
+
+
+# In a process of its own
+
+def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> None:
+    done = run_apart(*(ROOT / 'bags' / name for name in BAGS), '--params', PARAMS, '--output',
+                     tmp_path / 'out', '--strict')
+    assert (done.returncode, done.stderr) == (LIMIT_MET, '')
+    assert done.stdout.count('setpoints in') == 3
+    for name in BAGS:
+        again = outputs_of(tmp_path / 'out' / name)
+        assert again.rows == replayed[name].rows
+        assert (again.folder / 'legs.csv').read_bytes() == (
+            replayed[name].folder / 'legs.csv').read_bytes()
+    refusal = run_apart(tmp_path / 'none', '--params', PARAMS)
+    assert (refusal.returncode, refusal.stdout) == (BAD_INPUT, '')
+    assert refusal.stderr.count('\n') == 1
+    partly = run_apart(damaged_bag(tmp_path / 'damaged.mcap'), '--params', PARAMS, '--output',
+                       tmp_path / 'out')
+    assert partly.returncode == PARTLY_READ
+
+
+def test_the_results_are_readable_by_all(tmp_path: Path) -> None:
+    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
+    for path in (tmp_path / 'clear', tmp_path / 'clear' / 'bag'):
+        assert path.stat().st_mode & 0o777 == 0o755
+
+
+def test_it_needs_no_ros() -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', 'import sys, stewart_dynamics.replay; '
+         'print([n for n in sys.modules if n.startswith(("rclpy", "rcl_interfaces", "rosidl", '
+         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node", '
+         '"stewart_dynamics.ros"))])'],
+        capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == '[]'
+
+
+@pytest.fixture(scope='module')
+def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a bag that takes seconds."""
+    return write_bag(tmp_path_factory.mktemp('bags') / 'long', motion(12000))
+
+
+def begun(bag: Path, out: Path) -> subprocess.Popen[str]:
+    """Return a replay that is in the middle of its work."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'stewart_dynamics.replay', str(bag), '--params', str(PARAMS),
+         '--output', str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 30.0
+    while not any(path.stat().st_size for path in out.glob('.*/legs.csv')):
+        assert time.monotonic() < end
+        assert process.poll() is None
+        time.sleep(0.005)
+    return process
+
+
+def test_a_killed_replay_leaves_nothing_under_the_final_name(
+        long_bag: Path, tmp_path: Path) -> None:
+    with begun(long_bag, tmp_path / 'out') as process:
+        process.send_signal(signal.SIGKILL)
+        assert process.wait(30) == -signal.SIGKILL
+    assert not (tmp_path / 'out' / 'long').exists()
+    # what it left does not stand in the way of another
+    assert run(ROOT / 'bags' / 'clear', tmp_path / 'out') == DONE
+
+
+def test_an_interrupted_replay_leaves_nothing(long_bag: Path, tmp_path: Path) -> None:
+    with begun(long_bag, tmp_path / 'out') as process:
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=30)
+        assert process.returncode == 130
+    assert 'Traceback' not in said
+    assert not list((tmp_path / 'out').iterdir())
+
+
+@pytest.mark.parametrize('size', [0, 100, 20_000, 100_000])
+def test_a_full_disk_leaves_nothing(size: int, tmp_path: Path) -> None:
+    # writing a file beyond this size fails, as on a disk without room
+    done = run_apart(
+        ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out',
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
+    assert done.returncode == BAD_INPUT
+    assert 'Traceback' not in done.stderr
+    assert done.stderr.count('\n') == 1
+    assert 'too large' in done.stderr
+    assert not list((tmp_path / 'out').iterdir())
+
+
+# As a library
+
+def test_the_library_raises_what_the_program_says(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match='none'):
+        replay(tmp_path / 'none', PARAMETERS, tmp_path / 'out')
+    (tmp_path / 'there').mkdir()
+    with pytest.raises(BagError, match='exists already'):
+        replay(ROOT / 'bags' / 'clear', PARAMETERS, tmp_path / 'there')
+    result = replay(ROOT / 'bags' / 'clear', PARAMETERS, tmp_path / 'out')
+    assert (result.bag, result.unread, result.notices) == (ROOT / 'bags' / 'clear', '', ())
+    assert not result.limit_met
+    assert result.refusals == {}
