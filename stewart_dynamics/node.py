@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from functools import partial
 import time
 import traceback
@@ -82,7 +83,7 @@ class DynamicsNode(LifecycleNode):
         self._settings = declare_parameters(self, Parameters)
         self._active = False
         self._configured = False
-        self._io: list[Any] = []
+        self._close_io: list[Callable[[], Any]] = []
         self._said: dict[Refusal, tuple[float, int]] = {}
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._answer_impossible_transitions()
@@ -155,8 +156,11 @@ class DynamicsNode(LifecycleNode):
         # A steady clock: ROS time may stand still or jump.
         watch = self.create_timer(_WATCH_SECONDS, self._on_watch,
                                   clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._io = [*subscriptions, watch, *self._publishers_of.values(),
-                    self._diagnostics_publisher]
+        self._close_io = [
+            partial(self.destroy_timer, watch),
+            *(partial(self.destroy_subscription, each) for each in subscriptions),
+            *(partial(self.destroy_publisher, each) for each in (
+                *self._publishers_of.values(), self._diagnostics_publisher))]
         self._configured = True
 
     def _subscribe(self, topic: str, callback: Any) -> Any:
@@ -170,9 +174,9 @@ class DynamicsNode(LifecycleNode):
 
     def _close(self) -> None:
         self._configured = False
-        for entity in self._io:
-            entity.destroy()
-        self._io = []
+        for close in self._close_io:
+            close()
+        self._close_io = []
 
     def _answer_impossible_transitions(self) -> None:
         """
