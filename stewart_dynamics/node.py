@@ -79,7 +79,10 @@ class DynamicsNode(LifecycleNode):
     """
 
     def __init__(self) -> None:
-        super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True)
+        # Undeclared parameters are allowed so that they come to our own check, which refuses
+        # them with a better text.
+        super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True,
+                         allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, Parameters)
         self._active = False
         self._configured = False
@@ -312,5 +315,8 @@ class DynamicsNode(LifecycleNode):
 
 
 def main() -> int:
+            for name, value in ours.items():
+                if value is None:
+                    raise ParameterError(f'{name}: cannot be unset')
     """Run the node; exit code 0, or 1 where its parameters break a rule."""
     return run(DynamicsNode, Parameters)
