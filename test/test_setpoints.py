@@ -145,8 +145,21 @@ def test_stamps_within_the_tolerance_are_joined(order: Sequence[str]) -> None:
         assert feed.sample(topic, stamps[topic]) is None
     setpoint = feed.sample(order[2], stamps[order[2]])
     assert setpoint is not None
-    assert setpoint.stamp in stamps.values()
+    assert setpoint.stamp == stamps[POSE]
     assert not feed.counts
+
+
+@pytest.mark.parametrize('apart', [-2 * MS, -1, 0, 1, 2 * MS])
+def test_what_counts_as_used_is_the_stamp_of_the_setpoint(apart: int) -> None:
+    feed = Feed(sync_tolerance=0.002)
+    feed.sample(POSE, SECOND)
+    feed.sample(TWIST, SECOND)
+    assert feed.sample(ACCEL, SECOND + apart)
+    assert feed.sample(POSE, SECOND) is None
+    assert feed.sample(POSE, SECOND - 1) is None
+    assert feed.counts == {(POSE, TWICE): 1, (POSE, TOO_OLD): 1}
+    assert feed.sample(POSE, SECOND + 1) is None
+    assert feed.counts == {(POSE, TWICE): 1, (POSE, TOO_OLD): 1}
 
 
 @pytest.mark.parametrize('late', [TWIST, ACCEL])
