@@ -43,7 +43,7 @@ from stewart_dynamics.compiled import COMPILED, UNCOMPILED_COST
 from stewart_dynamics.diagnostics import Diagnostics
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.ros import declare_parameters, is_ours, run
+from stewart_dynamics.ros import declare_parameters, is_ours, run, until_shutdown
 from stewart_dynamics.setpoints import Refusal, Setpoints
 from stewart_dynamics.step import NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Step
 
@@ -152,12 +152,13 @@ class DynamicsNode(LifecycleNode):
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
         subscriptions = [self._subscribe(topic, partial(self._on_setpoint, topic))
+        self._answer_task = until_shutdown(self, self._answer)
                          for topic in topics]
         subscriptions.append(self._subscribe(inputs.WRENCH, self._on_wrench))
         self._topic_names = {topic: subscription.topic_name for topic, subscription
                              in zip(topics, subscriptions, strict=False)}
         # A steady clock: ROS time may stand still or jump.
-        watch = self.create_timer(_WATCH_SECONDS, self._on_watch,
+        watch = self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
                                   clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._close_io = [
             partial(self.destroy_timer, watch),
@@ -168,12 +169,16 @@ class DynamicsNode(LifecycleNode):
 
     def _subscribe(self, topic: str, callback: Any) -> Any:
         return self.create_subscription(
-            _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', callback, QoSProfile(depth=_QUEUE),
-            raw=True, qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', until_shutdown(self, callback),
+            QoSProfile(depth=_QUEUE), raw=True,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=lambda event: self.get_logger().error(
-                    f'{topic}: a publisher offers an incompatible quality of service, policy '
-                    f'{event.last_policy_kind}: it is not heard')))
+                incompatible_qos=partial(self._on_incompatible_qos, topic)))
+
+    def _on_incompatible_qos(self, topic: str, event: Any) -> None:
+        self.get_logger().error(
+            f'{topic}: a publisher offers an incompatible quality of service, policy '
+            f'{event.last_policy_kind}: it is not heard')
 
     def _close(self) -> None:
         self._configured = False
@@ -215,7 +220,8 @@ class DynamicsNode(LifecycleNode):
         self._waiting.append(setpoint)
         if len(self._waiting) == 1:
             # Runs behind the messages that have come already: it sees what waits.
-            self.executor.create_task(self._answer)
+            executor: Any = self.executor
+            executor.create_task(self._answer_task)
 
     def _on_wrench(self, data: bytes) -> None:
         if self._active:

@@ -17,8 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+import signal
 import sys
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
@@ -27,7 +28,6 @@ from rclpy.exceptions import ROSInterruptException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 
 from stewart_dynamics.errors import StewartError
@@ -62,8 +62,8 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     ParameterError, for an unknown name as well.
     """
     source = ', '.join(parameter_files(sys.argv)) or 'command line'
-    given = {name: parameter.value
-             for name, parameter in node.get_parameters_by_prefix('').items() if is_ours(name)}
+    declared: dict[str, Any] = node.get_parameters_by_prefix('')
+    given = {name: parameter.value for name, parameter in declared.items() if is_ours(name)}
     parameters = kind(given, source)
     for name, parameter in kind.table.items():
         if node.has_parameter(name):
@@ -81,6 +81,22 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     return ParameterDescriptor(
         description=parameter.text + unit, additional_constraints=parameter.rule,
         dynamic_typing=True)
+
+
+def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., None]:
+    """
+    Return a callback that ends in silence where ROS is shut down while it runs.
+
+    A signal does so in the middle of whatever runs; what then asks ROS for anything raises.
+    """
+    def guarded(*arguments: Any) -> None:
+        try:
+            callback(*arguments)
+        except RCLError:
+            if node.context.ok():
+                raise
+
+    return guarded
 
 
 def _executor() -> Executor:
@@ -111,6 +127,19 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
     """
     stop = done or Future()
     executor = node = None
+    starting = True
+    signals: list[int] = []
+
+    def on_signal(number: int, frame: Any) -> None:
+        # rclpy's handlers, which init sets, shut ROS down before they call this one, and that
+        # ends the spinning. An exception would strike in the middle of whatever callback runs,
+        # and be logged as an error of it.
+        signals.append(number)
+        if starting:
+            raise KeyboardInterrupt
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
     try:
         for path in parameter_files(sys.argv):
             kind.check_file(path)
@@ -118,17 +147,20 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         node = make_node()
         executor = _executor()
         executor.add_node(node)
+        starting = False
         while rclpy.ok() and not stop.done():
             executor.spin_until_future_complete(stop, _SPIN_SECONDS)
         return int(stop.result() or 0) if stop.done() else 0
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         return 0
     except (StewartError, RCLError, UnknownROSArgsError) as exc:
-        if node is not None and not rclpy.ok():
+        starting = False
+        if not rclpy.ok() and signals:
             return 0  # cut short by a signal
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
         return 1
     finally:
+        starting = False
         # On this thread and before the end, else rclpy 7.1 crashes at exit.
         if executor is not None:
             executor.shutdown()

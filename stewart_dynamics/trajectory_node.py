@@ -32,7 +32,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.inverse_dynamics import MOTION
-from stewart_dynamics.ros import declare_parameters, run
+from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.rotation import to_quaternion
 from stewart_dynamics.trajectory import (
     motion_at, sample_time, sample_times, TrajectoryParameters)
@@ -57,7 +57,8 @@ class TrajectoryNode(Node):
     """
 
     def __init__(self, done: Future) -> None:
-        super().__init__('stewart_trajectory', automatically_declare_parameters_from_overrides=True)
+        super().__init__(
+            'stewart_trajectory', automatically_declare_parameters_from_overrides=True)
         self._settings = declare_parameters(self, TrajectoryParameters)
         self._done = done
         self._loop = self._settings['loop']
@@ -80,7 +81,7 @@ class TrajectoryNode(Node):
             self._publish = self._publish_separate
         self._begun = self._subscribed = False
         self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * 1e9)
-        self.create_timer(1.0 / self._settings['rate'], self._on_timer,
+        self.create_timer(1.0 / self._settings['rate'], until_shutdown(self, self._on_timer),
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
         motion, rate = self._settings['motion.type'], self._settings['rate']
         self.get_logger().info(
