@@ -29,6 +29,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
@@ -151,12 +152,13 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics_publisher = self.create_publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
-        subscriptions = [self._subscribe(topic, partial(self._on_setpoint, topic))
         self._answer_task = until_shutdown(self, self._answer)
+        subscriptions = [self._subscribe(topic, partial(self._on_setpoint, topic))
                          for topic in topics]
         subscriptions.append(self._subscribe(inputs.WRENCH, self._on_wrench))
-        self._topic_names = {topic: subscription.topic_name for topic, subscription
-                             in zip(topics, subscriptions, strict=False)}
+        self._inputs = dict(zip(topics, subscriptions, strict=False))
+        self._topic_names = {topic: subscription.topic_name
+                             for topic, subscription in self._inputs.items()}
         # A steady clock: ROS time may stand still or jump.
         watch = self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
                                   clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -231,6 +233,8 @@ class DynamicsNode(LifecycleNode):
         """Answer what waits: all of it, or the newest where the node has fallen behind."""
         if not self._active:
             return
+        if isinstance(self.executor, SingleThreadedExecutor):
+            self._take_what_has_come()
         while len(self._waiting) > _BACKLOG:
             for _ in range(len(self._waiting) - 1):
                 passed = self._waiting.popleft()
@@ -243,18 +247,27 @@ class DynamicsNode(LifecycleNode):
                     'setpoint', inputs.OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
                 continue
             for topic, message in self._step.messages(output):
-                self._publish(self._publishers_of[topic], message)
+                self._publishers_of[topic].publish(message)
             self._last = output
             if self._diagnostics.answered(output, time.monotonic()):
                 self._report()
 
-    def _publish(self, publisher: Publisher, message: Any) -> None:
-        try:
-            publisher.publish(message)
-        except RCLError:
-            # A signal shuts ROS down in the middle of whatever runs: nobody listens then.
-            if self.context.ok():
-                raise
+    def _take_what_has_come(self) -> None:
+        """
+        Take the setpoint messages that wait in the middleware.
+
+        The events executor has taken them when it comes to a task; the single-threaded one runs
+        a task first, and would answer one setpoint after the other, however late.
+        """
+        came = True
+        while came:
+            came = False
+            for topic, subscription in self._inputs.items():
+                with subscription.handle:
+                    taken = subscription.handle.take_message(subscription.msg_type, True)
+                if taken is not None:
+                    came = True
+                    self._on_setpoint(topic, taken[0])
 
     def _last_singularity(self) -> Any:
         return None if self._last is None else self._last.singularity
@@ -294,7 +307,7 @@ class DynamicsNode(LifecycleNode):
                 values=[KeyValue(key=key, value=value) for key, value in status.values])
             for status in self._diagnostics.report(now)])
         array.header.stamp = self.get_clock().now().to_msg()
-        self._publish(self._diagnostics_publisher, array)
+        self._diagnostics_publisher.publish(array)
 
     # -- parameters -----------------------------------------------------------------------
 
@@ -302,6 +315,9 @@ class DynamicsNode(LifecycleNode):
         """Take all of these, between two setpoints, or none."""
         ours = {change.name: change.value for change in changes if is_ours(change.name)}
         try:
+            for name, value in ours.items():
+                if value is None:
+                    raise ParameterError(f'{name}: cannot be unset')
             if self._configured:
                 fixed = [name for name in ours if name in Parameters.table
                          and not Parameters.table[name].while_active]
@@ -321,8 +337,5 @@ class DynamicsNode(LifecycleNode):
 
 
 def main() -> int:
-            for name, value in ours.items():
-                if value is None:
-                    raise ParameterError(f'{name}: cannot be unset')
     """Run the node; exit code 0, or 1 where its parameters break a rule."""
     return run(DynamicsNode, Parameters)

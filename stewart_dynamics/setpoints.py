@@ -50,8 +50,9 @@ _READERS: dict[str, Callable[[bytes], cdr.Stamped]] = {
 
 # A quaternion's length may be this far from one; it is brought to one.
 QUATERNION_TOLERANCE = 1e-3
-# Samples of a topic that wait for those of the others; beyond it the oldest is given up.
-WAITING = 256
+# Samples of a topic that wait for those of the others; beyond it the oldest is given up. As many
+# as may wait in the node's middleware: it hands over one topic's after the other's.
+WAITING = 1000
 
 _STANDSTILL = (0.0,) * 6
 
