@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-import math
 from typing import NamedTuple
 
 from stewart_dynamics.parameters import Parameters
@@ -175,7 +174,7 @@ class Diagnostics:
         return Status('singularity', level, message or 'clear', (
             ('det(J) (m^3)', f'{output.determinant:.9g}'),
             ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
-            ('time to crossing (s)', f'{crossing:.3f}' if math.isfinite(crossing) else 'none'),
+            ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
             ('crossings', str(output.singularity.crossings)),
             ('condition number', f'{output.condition:.6g}'),
             ('worst condition number since the last report', f'{self._worst_condition:.6g}'),

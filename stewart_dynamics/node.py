@@ -141,7 +141,7 @@ class DynamicsNode(LifecycleNode):
         self._step = Step(self._settings)
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
-        self._step(Setpoint(0, (0.0,) * 24), NO_WRENCH, None)
+        self._step(Setpoint(0, (0.0,) * 24), None)
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
         self._publishers_of: dict[str, Publisher] = {}
         for topic, name in OUTPUT_TYPES.items():
@@ -241,7 +241,7 @@ class DynamicsNode(LifecycleNode):
                 self._setpoints.refuse('setpoint', PASSED_OVER, f'stamp {passed.stamp} ns')
         while self._waiting:
             setpoint = self._waiting.popleft()
-            output = self._step(setpoint, self._setpoints.wrench, self._last_singularity())
+            output = self._step(setpoint, self._last_singularity())
             if output is None:
                 self._setpoints.refuse(
                     'setpoint', inputs.OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')

@@ -370,6 +370,8 @@ def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
             written = f': write {entry}.0' if abs(entry) < 1e15 else ''
             raise _broken(parameter, entry, source, f'is an integer, must be a double{written}')
         raise _broken(parameter, entry, source, f'must be a {parameter.kind}')
+    if parameter.kind == 'string' and not entry.isprintable():
+        raise _broken(parameter, entry, source, 'must be printable text')
     if parameter.choices and entry not in parameter.choices:
         raise _broken(parameter, entry, source, f'must be {parameter.rule}')
     if parameter.kind == 'double':

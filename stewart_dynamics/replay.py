@@ -225,7 +225,7 @@ def replay(
                     if setpoint is None:
                         continue
                     joined += 1
-                    output = step(setpoint, setpoints.wrench, state)
+                    output = step(setpoint, state)
                     if output is None:
                         setpoints.refuse('setpoint', inputs.OUT_OF_RANGE, '')
                         continue

@@ -101,11 +101,11 @@ class Setpoints:
         self._timeout = round(parameters['setpoint.timeout'] * 1e9)
         self._refused = refused
         self._noticed = noticed
-        self._last: int | None = None
+        self._last: dict[str, int] = {}
         self._waiting: dict[str, dict[int, tuple[float, ...]]] = {t: {} for t in self.topics}
-        self._unstamped: dict[str, deque[tuple[float, ...]]] = {
-            t: deque(maxlen=WAITING) for t in self.topics}
-        self._unstamped_said = False
+        self._unstamped: dict[str, deque[tuple[int, tuple[float, ...]]]] = {
+            t: deque() for t in self.topics}
+        self._unstamped_said = self._unstamped_joined = False
 
     def take_wrench(self, data: bytes) -> None:
         """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
@@ -183,12 +183,13 @@ class Setpoints:
         if stamp in self._waiting[topic]:
             self._refuse(topic, TWICE, f'stamp {stamp} ns')
             return False
-        if self._last is None or not 0 <= self._last - stamp <= self._timeout:
+        last = self._last.get(topic)
+        if last is None or not 0 <= last - stamp <= self._timeout:
             return True
-        if stamp == self._last:
+        if stamp == last:
             self._refuse(topic, TWICE, f'stamp {stamp} ns')
         else:
-            self._refuse(topic, TOO_OLD, f'stamp {stamp} ns is {(self._last - stamp) / 1e9:g} s '
+            self._refuse(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
                          f'older than the last used')
         return False
 
@@ -206,42 +207,51 @@ class Setpoints:
             if abs(near - stamp) > self._tolerance:
                 return None
             stamps.append(near)
+        self._give_up(dict(zip(self.topics, stamps, strict=True)))
         values = [self._waiting[topic].pop(at)
                   for topic, at in zip(self.topics, stamps, strict=True)]
-        self._give_up(stamps[0])
-        self._last = stamps[0]
-        return Setpoint(stamps[0], self._motion(values))
+        return Setpoint(stamps[0], self._motion(values), self.wrench)
 
-    def _give_up(self, stamp: int) -> None:
-        """Drop and count what waits and can no longer be used once this stamp is."""
-        last = self._last
-        restart = last is not None and last - stamp > self._timeout
-        if restart and last is not None:
-            self._noticed(f'stamps jumped back by {(last - stamp) / 1e9:g} s: followed as a '
-                          'restart')
-        for topic in self.topics:
+    def _give_up(self, stamps: dict[str, int]) -> None:
+        """Drop and count what waits and can no longer be used once these stamps are."""
+        first = self.topics[0]
+        jump = self._last[first] - stamps[first] if self._last else 0
+        if jump > self._timeout:
+            self._noticed(f'stamps jumped back by {jump / 1e9:g} s: followed as a restart')
+        for topic, stamp in stamps.items():
             waiting = self._waiting[topic]
-            if not waiting:
-                continue
-            for other in [other for other in waiting if other <= stamp or (
-                    restart and last is not None and other > last - self._timeout)]:
-                del waiting[other]
-                self._refuse(topic, NOT_JOINED, f'stamp {other} ns')
+            if len(waiting) > 1:
+                # After a restart, what is left of the time before it lies in the future.
+                future = (self._last[topic] - self._timeout if jump > self._timeout
+                          else math.inf)
+                for other in [other for other in waiting if other < stamp or other > future]:
+                    del waiting[other]
+                    self._refuse(topic, NOT_JOINED, f'stamp {other} ns')
+        self._last = stamps
 
     def _join_unstamped(
             self, topic: str, values: tuple[float, ...], now: int) -> Setpoint | None:
-        """Join samples without a stamp in their order of arrival."""
+        """
+        Join samples without a stamp in their order of arrival.
+
+        None waits for longer than the timeout, and before the first join only the newest: a
+        topic that speaks earlier or faster than the others would be joined late for ever.
+        """
         if not self._unstamped_said:
             self._unstamped_said = True
             self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
                           'of arrival and stamped with the clock')
-        queue = self._unstamped[topic]
-        if len(queue) == queue.maxlen:
-            self._refuse(topic, NOT_JOINED, 'stamp 0')
-        queue.append(values)
+        self._unstamped[topic].append((now, values))
+        for name, queue in self._unstamped.items():
+            while queue and (now - queue[0][0] > self._timeout or len(queue) > WAITING or (
+                    len(queue) > 1 and not self._unstamped_joined)):
+                queue.popleft()
+                self._refuse(name, NOT_JOINED, 'stamp 0')
         if not all(self._unstamped.values()):
             return None
-        return Setpoint(now, self._motion([self._unstamped[t].popleft() for t in self.topics]))
+        self._unstamped_joined = True
+        values_of_all = [self._unstamped[t].popleft()[1] for t in self.topics]
+        return Setpoint(now, self._motion(values_of_all), self.wrench)
 
     def _motion(self, values: list[tuple[float, ...]]) -> tuple[float, ...]:
         """Return a row of motion: what the topics give, and zeros for what they do not."""

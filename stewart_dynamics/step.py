@@ -51,6 +51,8 @@ class Setpoint(NamedTuple):
     """[ns]"""
     motion: tuple[float, ...]
     """A row of motion, laid out as ``inverse_dynamics`` says."""
+    wrench: Six = NO_WRENCH
+    """Load on the platform at its origin, base axes [N, N m]."""
 
 
 class Excess(NamedTuple):
@@ -102,8 +104,7 @@ class Step:
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = cdr.JointState(parameters['joints'])
 
-    def __call__(
-            self, setpoint: Setpoint, wrench: Six, before: Singularity | None) -> Output | None:
+    def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
         """
         Return the output, or None where numbers overflow, the stamp's own among them.
 
@@ -111,14 +112,12 @@ class Step:
         ----------
         setpoint : Setpoint
             A finite one, its rotation a rotation.
-        wrench : six numbers
-            Load on the platform at its origin, base axes [N, N m].
         before : Singularity, optional
             The output's before this one; none for the first.
 
         """
         result = self._platform.solve(
-            np.array((setpoint.motion,)), np.array((wrench,)))[0].tolist()
+            np.array((setpoint.motion,)), np.array((setpoint.wrench,)))[0].tolist()
         if not cdr.finite(result) or not cdr.is_stamp(setpoint.stamp):
             return None
         lengths: Six = tuple(result[0:6])

@@ -27,7 +27,7 @@ from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 from stewart_dynamics.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.setpoints import ACCEL, NOT_FINITE, POSE, Refusal, TWICE, TWIST
 from stewart_dynamics.singularity import Cause, Singularity
-from stewart_dynamics.step import Excess, NO_WRENCH, Output, Setpoint, Step
+from stewart_dynamics.step import Excess, Output, Setpoint, Step
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -39,7 +39,7 @@ def output_of(setpoint: Setpoint = HOME, before: Singularity | None = None,
     """Return what a setpoint gives."""
     step = Step(PARAMETERS.replaced({
         name.replace('__', '.'): value for name, value in limits.items()}))
-    output = step(setpoint, NO_WRENCH, before)
+    output = step(setpoint, before)
     assert output is not None
     return output
 
@@ -351,7 +351,7 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
     _check_values(diagnostics, now)
     for position, rotation, rates, pause in motions:
         now += pause
-        output = step(Setpoint(0, (*position, *rotation, *rates)), NO_WRENCH, state)
+        output = step(Setpoint(0, (*position, *rotation, *rates)), state)
         if output is None:
             diagnostics.refused(Refusal('setpoint', 'out of range'), '', now)
         else:

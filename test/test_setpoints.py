@@ -126,7 +126,7 @@ def test_messages_of_rclpy_are_joined() -> None:
     feed = Feed(source='pose')
     setpoint = feed(POSE, serialize_message(message))
     assert setpoint == (SECOND, (0.0,) * 3 + (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                        + (0.0,) * 12)
+                        + (0.0,) * 12, NO_WRENCH)
 
 
 def test_stamps_a_nanosecond_apart_are_not_joined() -> None:
@@ -186,7 +186,8 @@ def test_a_combined_message_is_a_setpoint() -> None:
     assert feed.setpoints.topics == (COMBINED,)
     setpoint = feed(COMBINED, messages.combined(
         SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
-    assert setpoint == (SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)))
+    assert setpoint == (SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)),
+                        NO_WRENCH)
     assert feed.sample(COMBINED, SECOND) is None
     assert feed.counts == {(COMBINED, TWICE): 1}
 
@@ -195,7 +196,8 @@ def test_a_pose_alone_stands_still() -> None:
     feed = Feed(source='pose')
     assert feed.setpoints.topics == (POSE,)
     setpoint = feed.sample(POSE, SECOND, 0.25)
-    assert setpoint == (SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12)
+    assert setpoint == (SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12,
+                        NO_WRENCH)
 
 
 # Refusing
@@ -385,6 +387,9 @@ def test_negative_stamps_are_stamps() -> None:
 @pytest.mark.parametrize('order', ORDERS)
 def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[str]) -> None:
     feed = Feed()
+    for topic in order:
+        first = feed.sample(topic, 0, 0.0)
+    assert first is not None
     for topic in order[:2]:
         for mark in (1.0, 2.0, 3.0):
             assert feed.sample(topic, 0, mark) is None
@@ -396,6 +401,52 @@ def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[s
     assert not feed.counts
     assert len(feed.notices) == 1
     assert 'zero' in feed.notices[0]
+
+
+@pytest.mark.parametrize('order', ORDERS)
+def test_a_topic_that_speaks_earlier_is_not_joined_late(order: Sequence[str]) -> None:
+    feed = Feed()
+    early, last = order[:2], order[2]
+    for mark in (1.0, 2.0, 3.0):
+        for topic in early:
+            assert feed.sample(topic, 0, mark) is None
+    setpoint = feed.sample(last, 0, 3.0)
+    assert setpoint is not None
+    assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (3.0,) * 3
+    assert feed.counts == {(topic, NOT_JOINED): 2 for topic in early}
+
+
+def test_a_sample_without_a_stamp_waits_no_longer_than_the_timeout() -> None:
+    setpoints = Setpoints(PARAMETERS, lambda refusal, details: None, lambda text: None)
+    timeout = round(PARAMETERS['setpoint.timeout'] * 1e9)
+
+    def take(topic: str, mark: float, now: int) -> Setpoint | None:
+        values = HOME if topic == POSE else REST
+        return setpoints.take(topic, WRITERS[topic](0, (mark, *values[1:])), now)
+
+    for topic in TOPICS:
+        take(topic, 0.0, NOW)
+    for n in (1, 2, 3):
+        assert take(POSE, float(n), NOW + n * timeout) is None
+    assert take(TWIST, 3.0, NOW + 3 * timeout + 1) is None
+    setpoint = take(ACCEL, 3.0, NOW + 3 * timeout + 2)
+    assert setpoint is not None
+    assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (3.0,) * 3
+    assert setpoints.counts == {(POSE, NOT_JOINED): 2}
+
+
+def test_a_sample_used_within_the_tolerance_is_not_used_again() -> None:
+    feed = Feed(sync_tolerance=0.005)
+    assert feed.sample(POSE, 1000 * MS) is None
+    assert feed.sample(ACCEL, 1000 * MS) is None
+    assert feed.sample(TWIST, 1004 * MS) is not None
+    assert feed.sample(TWIST, 1004 * MS) is None
+    assert feed.counts == {(TWIST, TWICE): 1}
+    assert feed.sample(POSE, 1008 * MS) is None
+    assert feed.sample(ACCEL, 1008 * MS) is None
+    assert feed.sample(TWIST, 1003 * MS) is None
+    assert feed.counts == {(TWIST, TWICE): 1, (TWIST, TOO_OLD): 1}
+    assert feed.sample(TWIST, 1012 * MS) is not None
 
 
 @pytest.mark.parametrize('source', ['combined', 'pose'])
@@ -415,6 +466,9 @@ def test_a_single_topic_needs_no_stamp(source: str) -> None:
 def test_what_waits_is_bounded(silent: str, stamped: bool) -> None:
     feed = Feed()
     many = WAITING + 50
+    if not stamped:
+        for topic in TOPICS:
+            feed.sample(topic, 0)
     for n in range(1, many + 1):
         for topic in TOPICS:
             if topic != silent:
@@ -436,6 +490,9 @@ def test_memory_does_not_grow_while_a_topic_is_silent(stamped: bool) -> None:
                 data = WRITERS[topic](n * MS if stamped else 0)
                 assert setpoints.take(topic, data, NOW) is None
 
+    if not stamped:
+        for topic in TOPICS:
+            setpoints.take(topic, WRITERS[topic](0), NOW)
     feed(1, 1000)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]

@@ -75,7 +75,7 @@ def numbers_of(messages: dict[str, Any]) -> list[float]:
 
 def answered(step: Step, setpoint: Setpoint, wrench: Six = NO_WRENCH,
              before: Singularity | None = None) -> Output:
-    output = step(setpoint, wrench, before)
+    output = step(setpoint._replace(wrench=wrench), before)
     assert output is not None
     return output
 
@@ -147,10 +147,10 @@ def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
 def test_it_holds_no_state() -> None:
     given = rows(PARAMETERS, 30)
     states = [None, Singularity(), Singularity(warning=True, stopped=True, determinant=-1.0)]
-    first = [STEP(setpoint, wrench, state) for setpoint, wrench in given for state in states]
-    again = [STEP(setpoint, wrench, state) for setpoint, wrench in given for state in states]
+    first = [STEP(setpoint._replace(wrench=wrench), state) for setpoint, wrench in given for state in states]
+    again = [STEP(setpoint._replace(wrench=wrench), state) for setpoint, wrench in given for state in states]
     other = Step(PARAMETERS)
-    backward = [other(setpoint, wrench, state)
+    backward = [other(setpoint._replace(wrench=wrench), state)
                 for setpoint, wrench in reversed(given) for state in reversed(states)]
     assert first == again == backward[::-1]
     for output in first:
@@ -277,12 +277,12 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Setp
     HOME._replace(stamp=2 ** 31 * 10 ** 9), HOME._replace(stamp=-2 ** 63)],
     ids=['far', 'farther', 'turning', 'accelerated', 'after 2038', 'before 1901'])
 def test_what_overflows_gives_nothing(setpoint: Setpoint) -> None:
-    assert STEP(setpoint, NO_WRENCH, None) is None
-    assert STEP(HOME, NO_WRENCH, None) is not None
+    assert STEP(setpoint, None) is None
+    assert STEP(HOME, None) is not None
 
 
 def test_a_wrench_that_overflows_gives_nothing() -> None:
-    assert STEP(HOME, (1e308,) * 6, None) is None
+    assert STEP(HOME._replace(wrench=(1e308,) * 6), None) is None
 
 
 huge = st.floats(allow_nan=False, allow_infinity=False)
@@ -294,10 +294,10 @@ rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
 
 
 def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
-    output = step(setpoint, wrench, None)
+    output = step(setpoint._replace(wrench=wrench), None)
     if output is None:
         return
-    after = step(setpoint, wrench, output.singularity)
+    after = step(setpoint._replace(wrench=wrench), output.singularity)
     assert after is not None
     for of in (output, after):
         read = decoded(step.messages(of))
