@@ -46,7 +46,7 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.ros import declare_parameters, is_ours, run, until_shutdown
 from stewart_dynamics.setpoints import Refusal, Setpoints
-from stewart_dynamics.step import NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.step import Output, OUTPUT_TYPES, Setpoint, Step
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,

@@ -201,8 +201,7 @@ BAD = {
         'platform.mass', 'True', 'must be a double']),
     'number for a string': ('joints: [a,', 'joints: [1,', ['joints', '1', 'must be a string']),
     'a joint that no message can name': (
-        'visualization_rate: 25.0', 'joints: ["a\\0", b, c, d, e, f]', [
-            'joints', 'printable']),
+        'joints: [a,', 'joints: ["a\\0",', ['joints', 'printable']),
     'number for a bool': ('visualization_rate: 25.0', 'autostart: 1', [
         'autostart', '1', 'must be a bool']),
     'array for a single value': ('mass: 150.0', 'mass: [150.0, 1.0]', [

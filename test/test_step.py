@@ -145,13 +145,13 @@ def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
 
 
 def test_it_holds_no_state() -> None:
-    given = rows(PARAMETERS, 30)
+    given = [setpoint._replace(wrench=wrench) for setpoint, wrench in rows(PARAMETERS, 30)]
     states = [None, Singularity(), Singularity(warning=True, stopped=True, determinant=-1.0)]
-    first = [STEP(setpoint._replace(wrench=wrench), state) for setpoint, wrench in given for state in states]
-    again = [STEP(setpoint._replace(wrench=wrench), state) for setpoint, wrench in given for state in states]
+    first = [STEP(setpoint, state) for setpoint in given for state in states]
+    again = [STEP(setpoint, state) for setpoint in given for state in states]
     other = Step(PARAMETERS)
-    backward = [other(setpoint._replace(wrench=wrench), state)
-                for setpoint, wrench in reversed(given) for state in reversed(states)]
+    backward = [other(setpoint, state)
+                for setpoint in reversed(given) for state in reversed(states)]
     assert first == again == backward[::-1]
     for output in first:
         assert output is not None
