@@ -1,0 +1,533 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the tests of the executables stand on: the real programs, in processes of their own.
+
+Nothing is mocked: setpoints go in and answers come out over ROS 2 topics, each test in a domain
+that no other has. What is awaited is waited for with a deadline that a loaded machine keeps,
+and nothing else depends on time.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, ExitStack, suppress
+import fcntl
+import math
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import (
+    Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
+    Vector3, Wrench, WrenchStamped)
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.time import Time
+from referees import ROOT
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics.platform import InverseDynamics
+from stewart_dynamics.rotation import from_quaternion
+
+PLATFORM = ROOT / 'config' / 'platform.yaml'
+NODE = '/stewart_dynamics'
+
+# Nothing here takes seconds on a machine at rest: this is for one that is not.
+DEADLINE = 60.0
+
+QOS = QoSProfile(depth=2000)
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+INPUTS: dict[str, Any] = {
+    'setpoint/pose': PoseStamped, 'setpoint/twist': TwistStamped, 'setpoint/accel': AccelStamped,
+    'setpoint/combined': MultiDOFJointTrajectory, 'wrench': WrenchStamped}
+OUTPUTS: dict[str, Any] = {
+    'leg_states': JointState, 'leg_lengths': Float64MultiArray, 'leg_forces': Float64MultiArray,
+    'jacobian_determinant': Float64, 'singularity_warning': Bool}
+SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
+
+# What a program may say on stderr: lines of ROS's log. Fast DDS complains there of what other
+# programs, killed ones, have left in shared memory.
+LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[\w+\]: \S|.*\[RTPS_')
+
+_DOMAINS = range(1, 101)
+
+
+def executable(name: str) -> str:
+    """Return the path of an executable of the package, that of this Python's environment."""
+    return str(Path(sys.executable).with_name(name))
+
+
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """Give a ROS domain that no other test on this machine has, in whatever process."""
+    for attempt in range(len(_DOMAINS)):
+        domain = _DOMAINS[(os.getpid() + attempt) % len(_DOMAINS)]
+        path = Path(tempfile.gettempdir()) / f'stewart_dynamics_test_domain_{domain}'
+        with suppress(PermissionError), path.open('w') as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield domain
+            return
+    raise RuntimeError('all ROS domains are taken')
+
+
+def log_lines(text: str, level: str = '') -> list[str]:
+    """Return the lines of ROS's log in what a program said, those of a level or all."""
+    return [line for line in text.splitlines() if line.startswith(f'[{level}')
+            and '[RTPS_' not in line]
+
+
+def assert_only_log_lines(text: str) -> None:
+    """Check that a program said nothing on stderr but lines of ROS's log."""
+    strange = [line for line in text.splitlines() if not LOG_LINE.match(line)]
+    assert not strange, text
+
+
+class Program:
+    """
+    One of the executables in a process of its own.
+
+    Parameters
+    ----------
+    command : sequence of str
+        What is run, ROS arguments included.
+    domain : int
+        Its ROS domain.
+    folder : Path
+        Gets what it writes, on stdout and stderr and as log files.
+    environment : mapping, optional
+        What it has beside the environment of this process.
+
+    """
+
+    def __init__(self, command: Sequence[str | Path], domain: int, folder: Path,
+                 **environment: str) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._out, self._err = folder / 'stdout', folder / 'stderr'
+        with self._out.open('wb') as out, self._err.open('wb') as err:
+            self.process = subprocess.Popen(
+                [str(part) for part in command], stdin=subprocess.DEVNULL, stdout=out,
+                stderr=err, cwd=folder, env={
+                    **os.environ, 'ROS_DOMAIN_ID': str(domain), 'ROS_LOG_DIR': str(folder / 'log'),
+                    **environment})
+
+    @property
+    def stderr(self) -> str:
+        """What it has said on stderr so far."""
+        return self._err.read_text(errors='replace')
+
+    @property
+    def stdout(self) -> str:
+        """What it has said on stdout so far."""
+        return self._out.read_text(errors='replace')
+
+    @property
+    def ended(self) -> bool:
+        """Whether it runs no more."""
+        return self.process.poll() is not None
+
+    def wait(self) -> int:
+        """Return its exit code once it has ended."""
+        try:
+            return self.process.wait(DEADLINE)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f'it does not end:\n{self.stderr}') from None
+
+    def stop(self, number: int = signal.SIGINT) -> int:
+        """Send it a signal and return its exit code."""
+        self.process.send_signal(number)
+        return self.wait()
+
+    def kill(self) -> None:
+        """End it if it still runs: after a test that has failed."""
+        if not self.ended:
+            self.process.kill()
+            self.process.wait()
+
+
+class Peer:
+    """A ROS node in this process that talks with the program under test."""
+
+    def __init__(self, domain: int, name: str = 'peer') -> None:
+        self.context = Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node(name, context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self.watched: Program | None = None
+
+    def listen(self, topic: str, kind: Any, qos: QoSProfile = QOS) -> list[bytes]:
+        """Return a list that gets every message of a topic, as it came."""
+        received: list[bytes] = []
+        self.node.create_subscription(kind, topic, received.append, qos, raw=True)
+        return received
+
+    def writer(self, topic: str, kind: Any) -> Publisher:
+        """Return a publisher."""
+        return self.node.create_publisher(kind, topic, QOS)
+
+    def spin(self, seconds: float = 0.05) -> None:
+        """Take one message if one comes."""
+        self._executor.spin_once(timeout_sec=seconds)
+
+    def until(self, condition: Callable[[], Any], what: str) -> None:
+        """Take messages until a condition holds; fail at the deadline or with the program."""
+        end = time.monotonic() + DEADLINE
+        while not condition():
+            if self.watched is not None and self.watched.ended:
+                raise AssertionError(f'{what}: the program has ended with exit code '
+                                     f'{self.watched.process.returncode}:\n{self.watched.stderr}')
+            if time.monotonic() > end:
+                said = self.watched.stderr if self.watched else ''
+                raise AssertionError(f'{what}: not within {DEADLINE:g} s\n{said}')
+            self.spin()
+
+    def call(self, kind: Any, service: str, request: Any) -> Any:
+        """Return the answer of a service."""
+        client = self.node.create_client(kind, service)
+        try:
+            self.until(client.service_is_ready, f'{service} is there')
+            future = client.call_async(request)
+            self.until(future.done, f'{service} answers')
+            return future.result()
+        finally:
+            self.node.destroy_client(client)
+
+    def close(self) -> None:
+        """Leave ROS."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+
+class Sample(NamedTuple):
+    """A setpoint's numbers; by default the machine rests at home."""
+
+    position: tuple[float, ...] = (0.0, 0.0, 1.1)
+    quaternion: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
+    twist: tuple[float, ...] = (0.0,) * 6
+    accel: tuple[float, ...] = (0.0,) * 6
+
+    def motion(self) -> Motion:
+        """Return the motion as the library has it."""
+        length = math.hypot(*self.quaternion)
+        x, y, z, w = (number / length for number in self.quaternion)
+        return Motion(self.position, np.reshape(from_quaternion(x, y, z, w), (3, 3)),
+                      self.twist[:3], self.twist[3:], self.accel[:3], self.accel[3:])
+
+    def messages(self, stamp: int, frame: str = 'base') -> dict[str, Any]:
+        """Return the messages on the three topics."""
+        head = header(stamp, frame)
+        return {
+            'setpoint/pose': PoseStamped(header=head, pose=Pose(
+                position=Point(**_xyz(self.position)),
+                orientation=Quaternion(**_xyzw(self.quaternion)))),
+            'setpoint/twist': TwistStamped(header=head, twist=_twist(self.twist)),
+            'setpoint/accel': AccelStamped(header=head, accel=Accel(
+                linear=_vector(self.accel[:3]), angular=_vector(self.accel[3:])))}
+
+    def combined(self, stamp: int, frame: str = 'base') -> MultiDOFJointTrajectory:
+        """Return the one message on the combined topic."""
+        return MultiDOFJointTrajectory(
+            header=header(stamp, frame), joint_names=['platform'],
+            points=[MultiDOFJointTrajectoryPoint(
+                transforms=[Transform(translation=_vector(self.position),
+                                      rotation=Quaternion(**_xyzw(self.quaternion)))],
+                velocities=[_twist(self.twist)], accelerations=[_twist(self.accel)])])
+
+
+HOME = Sample()
+
+
+def header(stamp: int, frame: str = 'base') -> Header:
+    """Return a header with a stamp in ns."""
+    return Header(stamp=Time(nanoseconds=stamp).to_msg(), frame_id=frame)
+
+
+def wrench_message(wrench: Sequence[float], frame: str = 'base') -> WrenchStamped:
+    """Return a load on the platform."""
+    return WrenchStamped(header=header(1, frame), wrench=Wrench(
+        force=_vector(wrench[:3]), torque=_vector(wrench[3:])))
+
+
+def nanoseconds(stamp: Any) -> int:
+    """Return a stamp in ns."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _xyz(three: Sequence[float]) -> dict[str, float]:
+    return dict(zip('xyz', three, strict=True))
+
+
+def _xyzw(four: Sequence[float]) -> dict[str, float]:
+    return dict(zip('xyzw', four, strict=True))
+
+
+def _vector(three: Sequence[float]) -> Vector3:
+    return Vector3(**_xyz(three))
+
+
+def _twist(six: Sequence[float]) -> Twist:
+    return Twist(linear=_vector(six[:3]), angular=_vector(six[3:]))
+
+
+class DynamicsNode:
+    """
+    The node in a process of its own, and a peer that feeds it and keeps what it answers.
+
+    Parameters
+    ----------
+    folder : Path
+        Gets what it writes.
+    overrides : str
+        Parameters on the command line, ``name:=value``.
+    file : Path
+        Its parameter file.
+    command : sequence of str, optional
+        How it is started; by default its executable.
+    environment
+        What its environment has beside.
+
+    """
+
+    def __init__(self, folder: Path, *overrides: str, file: Path = PLATFORM,
+                 command: Sequence[str | Path] | None = None, **environment: str) -> None:
+        self._stack = ExitStack()
+        self.domain = self._stack.enter_context(own_domain())
+        self.peer = Peer(self.domain)
+        self._stack.callback(self.peer.close)
+        self._stamp = 1_700_000_000_000_000_000
+        self.expected: Counter[str] = Counter()
+        self.platform = StewartPlatform.from_yaml(file)
+        self._statuses: dict[str, DiagnosticStatus] = {}
+        self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
+                        for topic, kind in INPUTS.items()}
+        self.raw = {topic: self.peer.listen(
+            f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
+            for topic, kind in OUTPUTS.items()}
+        self._decoded: dict[str, list[Any]] = defaultdict(list)
+        # The last that is made, so the last that is discovered: when it hears the node, the
+        # others are heard as well.
+        self.peer.node.create_subscription(
+            DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
+        arguments = [part for override in overrides for part in ('-p', override)]
+        self.program = Program(
+            [*(command or [executable('stewart_dynamics')]), '--ros-args', '--params-file', file,
+             *arguments], self.domain, folder, **environment)
+        self._stack.callback(self.program.kill)
+        self.peer.watched = self.program
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self._statuses.update({
+            status.name.rpartition(': ')[2]: status for status in message.status})
+
+    # -- what is awaited -------------------------------------------------------------------
+
+    def until(self, condition: Callable[[], Any], what: str) -> None:
+        """Take messages until a condition holds."""
+        self.peer.until(condition, what)
+
+    def until_active(self) -> None:
+        """
+        Wait until the node answers: it hears us and we hear it.
+
+        Its first diagnostics tell that it is active, those of a second later how many writers
+        it has found on each topic.
+        """
+        self._statuses.clear()
+        writers = re.compile('setpoint/.*: writers')
+
+        def heard() -> bool:
+            values = self.values('setpoints')
+            found = [number for key, number in values.items() if writers.fullmatch(key)]
+            return bool(found) and set(found) == {'1'} and all(
+                self.writers[topic].get_subscription_count() for topic in self.topics)
+
+        self.until(heard, 'the node is active and hears us')
+
+    @property
+    def topics(self) -> list[str]:
+        """The topics that the node listens to, as it says."""
+        return [topic for topic in INPUTS if f'{topic}: writers' in self.values('setpoints')]
+
+    def received(self, topic: str) -> list[Any]:
+        """Return the messages of an output topic so far."""
+        decoded = self._decoded[topic]
+        decoded += [deserialize_message(raw, OUTPUTS[topic])
+                    for raw in self.raw[topic][len(decoded):]]
+        return decoded
+
+    def status(self, name: str) -> DiagnosticStatus:
+        """Return the last diagnostics of a name, empty ones where there are none."""
+        return self._statuses.get(name, DiagnosticStatus())
+
+    def values(self, name: str) -> dict[str, str]:
+        """Return the keys and values of the last diagnostics of a name."""
+        return {pair.key: pair.value for pair in self.status(name).values}
+
+    def until_status(self, name: str, level: bytes, text: str) -> str:
+        """Return the message of the diagnostics once they have a level and a text in it."""
+        self.until(lambda: self.status(name).level == level and text in self.status(name).message,
+                   f'diagnostics of {name} have level {level!r} and {text!r}')
+        return str(self.status(name).message)
+
+    # -- setpoints -------------------------------------------------------------------------
+
+    def stamp(self, step: int = 10_000_000) -> int:
+        """Return the next setpoint's stamp [ns], 10 ms after the one before."""
+        self._stamp += step
+        return self._stamp
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish a message, or bytes in the place of one."""
+        self.writers[topic].publish(message)
+
+    def send(self, sample: Sample = HOME, stamp: int | None = None,
+             frame: str = 'base') -> int:
+        """Publish a setpoint on all topics that the node listens to, and return its stamp."""
+        stamp = self.stamp() if stamp is None else stamp
+        messages = {**sample.messages(stamp, frame),
+                    'setpoint/combined': sample.combined(stamp, frame)}
+        for topic in self.topics:
+            self.publish(topic, messages[topic])
+        return stamp
+
+    def state_of(self, stamp: int) -> JointState:
+        """Return the leg states that carry a stamp, once they and all others have come."""
+        found: list[JointState] = []
+
+        def answered() -> bool:
+            found[:] = [state for state in self.received('leg_states')
+                        if nanoseconds(state.header.stamp) == stamp]
+            return bool(found) and len(self.raw['leg_lengths']) == len(
+                self.raw['jacobian_determinant']) == len(self.raw['leg_states'])
+
+        self.until(answered, f'the setpoint with stamp {stamp} is answered')
+        assert len(found) == 1
+        return found[0]
+
+    def result_of(self, sample: Sample, wrench: Sequence[float] | None = None,
+                  platform: StewartPlatform | None = None) -> InverseDynamics:
+        """Return the library's numbers for a setpoint."""
+        return (platform or self.platform).inverse_dynamics(sample.motion(), wrench)
+
+    def answer(self, sample: Sample = HOME, wrench: Sequence[float] | None = None,
+               platform: StewartPlatform | None = None, stamp: int | None = None) -> JointState:
+        """Send a setpoint and check that it is answered, with the library's bits."""
+        before = len(self.received('leg_states'))
+        stamp = self.send(sample, stamp)
+        state = self.state_of(stamp)
+        assert len(self.received('leg_states')) == before + 1, 'more than this one was answered'
+        self.check(state, self.result_of(sample, wrench, platform), platform)
+        return state
+
+    def check(self, state: JointState, result: InverseDynamics,
+              platform: StewartPlatform | None = None) -> None:
+        """Check leg states, all of their bits, against the library's numbers."""
+        parameters = (platform or self.platform).parameters
+        bound = parameters['limits.force_max']
+        assert state.name == list(parameters['joints'])
+        assert bits(state.position) == bits(result.lengths - parameters['geometry.zero_length'])
+        assert bits(state.velocity) == bits(result.rates)
+        assert bits(state.effort) == bits(np.clip(result.forces, -bound, bound))
+
+    def refuses(self, topic: str, reason: str, number: int = 1) -> None:
+        """Expect that the diagnostics count so many more refusals."""
+        self.expected[f'refused, {topic}: {reason}'] += number
+
+    def until_counted(self) -> None:
+        """Wait until the diagnostics count the refusals that are expected, and no others."""
+        def counted() -> Counter[str]:
+            return Counter({key: int(number) for key, number in self.values('setpoints').items()
+                            if key.startswith('refused, ')})
+
+        try:
+            self.until(lambda: counted() == self.expected, 'refusals are counted')
+        except AssertionError as exc:
+            raise AssertionError(f'counted {counted()}, expected {self.expected}: {exc}') from exc
+
+    # -- parameters ------------------------------------------------------------------------
+
+    def set_parameters(self, **changes: Any) -> SetParametersResult:
+        """Set parameters, all or none, ``__`` in a name for a point."""
+        return self.set_atomically([
+            RosParameter(name.replace('__', '.'), value=value)
+            for name, value in changes.items()])
+
+    def set_atomically(self, changes: Sequence[RosParameter]) -> SetParametersResult:
+        """Set parameters through the node's service, all or none."""
+        return self.peer.call(
+            SetParametersAtomically, f'{NODE}/set_parameters_atomically',
+            SetParametersAtomically.Request(
+                parameters=[change.to_parameter_msg() for change in changes])).result
+
+    # -- the end ---------------------------------------------------------------------------
+
+    def stop(self, number: int = signal.SIGINT) -> None:
+        """Stop the node with a signal and check how it ends, and all that it has said."""
+        code = self.program.stop(number)
+        assert code == 0, self.program.stderr
+        assert_only_log_lines(self.program.stderr)
+        assert self.program.stdout == ''
+        self.check_finite()
+
+    def check_finite(self) -> None:
+        """Check that no output had a number that is not finite."""
+        for topic in OUTPUTS:
+            for message in self.received(topic):
+                numbers = ([*message.position, *message.velocity, *message.effort]
+                           if topic == 'leg_states' else np.atleast_1d(message.data))
+                assert np.all(np.isfinite(numbers)), (topic, message)
+
+    def close(self) -> None:
+        """Leave ROS, and stop the node if it still runs."""
+        try:
+            if not self.program.ended:
+                self.stop()
+        finally:
+            self._stack.close()
+
+
+def bits(numbers: Any) -> bytes:
+    """Return the bits of float64 numbers."""
+    return np.ascontiguousarray(numbers, dtype=np.float64).tobytes()
+
+
+def raw(message: Any) -> bytes:
+    """Return a message's bytes as they are sent."""
+    return bytes(serialize_message(message))

@@ -1,0 +1,228 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The publisher of motions: in a process of its own, over real topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+import signal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from rclpy.serialization import deserialize_message
+from running import (
+    assert_only_log_lines, executable, INPUTS, log_lines, nanoseconds, Peer, Program, ROOT,
+    SEPARATE)
+
+from stewart_dynamics.rotation import to_quaternion
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+
+MOTION = """\
+stewart_trajectory:
+  ros__parameters:
+    rate: 200.0
+    {more}
+    motion:
+      type: {kind}
+      duration: 1.5  # [s]
+      initial: [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
+      final: [0.2, -0.15, 1.15, 0.2, -0.15, 0.8]
+      amplitude: [0.1, 0.1, 0.08, 0.12, 0.12, 0.25]
+"""
+
+
+class Trajectory:
+    """The publisher in a process of its own, and a peer that keeps what it sends."""
+
+    def __init__(self, domain: int, folder: Path, file: Path, *overrides: str) -> None:
+        self.peer = Peer(domain)
+        self._raw = {topic: self.peer.listen(f'/stewart_dynamics/{topic}', kind)
+                     for topic, kind in INPUTS.items()}
+        arguments = [part for override in overrides for part in ('-p', override)]
+        self.program = Program([executable('stewart_trajectory'), '--ros-args', '--params-file',
+                                file, *arguments], domain, folder)
+
+    def received(self, topic: str) -> list[Any]:
+        """Return the messages on a topic so far."""
+        return [deserialize_message(data, INPUTS[topic]) for data in self._raw[topic]]
+
+    def until(self, numbers: dict[str, int]) -> None:
+        """Wait until so many messages have come on these topics."""
+        self.peer.until(lambda: all(len(self._raw[topic]) >= number
+                                    for topic, number in numbers.items()), f'{numbers} come')
+
+    def close(self) -> None:
+        """Leave ROS, and end the program if it still runs."""
+        self.program.kill()
+        self.peer.close()
+
+
+Start = Callable[..., Trajectory]
+
+
+@pytest.fixture
+def start(domain: int, tmp_path: Path) -> Iterator[Start]:
+    """Return a function that starts the publisher with a parameter file's text."""
+    started: list[Trajectory] = []
+
+    def begin(text: str, *overrides: str) -> Trajectory:
+        file = tmp_path / 'trajectory.yaml'
+        file.write_text(text, encoding='utf-8')
+        started.append(Trajectory(domain, tmp_path / 'run', file, *overrides))
+        return started[-1]
+
+    yield begin
+    for each in started:
+        each.close()
+
+
+def _separate(trajectory: Trajectory) -> tuple[list[int], NDArray[np.float64]]:
+    """Return stamps (N,) and rows of pose, twist and acceleration (N, 19) of three topics."""
+    rows, stamps = [], []
+    for pose, twist, accel in zip(*map(trajectory.received, SEPARATE), strict=True):
+        assert pose.header == twist.header == accel.header
+        assert pose.header.frame_id == 'base'
+        stamps.append(nanoseconds(pose.header.stamp))
+        rows.append(_row(pose.pose.position, pose.pose.orientation, twist.twist, accel.accel))
+    return stamps, np.array(rows)
+
+
+def _combined(trajectory: Trajectory) -> tuple[list[int], NDArray[np.float64]]:
+    """Return stamps (N,) and rows of pose, twist and acceleration (N, 19) of the one topic."""
+    rows, stamps = [], []
+    for message in trajectory.received('setpoint/combined'):
+        assert message.header.frame_id == 'base'
+        stamps.append(nanoseconds(message.header.stamp))
+        point, = message.points
+        (transform,), (twist,), (accel,) = (
+            point.transforms, point.velocities, point.accelerations)
+        rows.append(_row(transform.translation, transform.rotation, twist, accel))
+    return stamps, np.array(rows)
+
+
+def _row(position: Any, quaternion: Any, twist: Any, accel: Any) -> list[float]:
+    vectors = (twist.linear, twist.angular, accel.linear, accel.angular)
+    return [position.x, position.y, position.z, quaternion.x, quaternion.y, quaternion.z,
+            quaternion.w, *(number for v in vectors for number in (v.x, v.y, v.z))]
+
+
+def _expected(parameters: TrajectoryParameters, times: Any) -> NDArray[np.float64]:
+    motion = motion_at(parameters, np.asarray(times) * 1e-9)
+    return np.concatenate([
+        motion.position, to_quaternion(motion.rotation), motion.linear_velocity,
+        motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration], axis=1)
+
+
+@pytest.mark.parametrize('output, kind', [
+    ('separate', 'paper'), ('separate', 'quintic'), ('separate', 'sine'), ('combined', 'paper')])
+def test_what_is_sent_is_the_motion_and_then_it_is_done(
+        start: Start, tmp_path: Path, output: str, kind: str) -> None:
+    trajectory = start(MOTION.format(kind=kind, more=f'output: {output}'))
+    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    times = sample_times(parameters)
+    assert len(times) == 301
+    topics = ('setpoint/combined',) if output == 'combined' else SEPARATE
+    trajectory.until(dict.fromkeys(topics, len(times)))
+    assert trajectory.program.wait() == 0
+    assert {topic for topic in INPUTS if trajectory.received(topic)} == set(topics)
+    stamps, rows = _combined(trajectory) if output == 'combined' else _separate(trajectory)
+    assert [stamp - stamps[0] for stamp in stamps] == times.tolist()
+    np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
+    lines = log_lines(trajectory.program.stderr)
+    assert len(lines) == 2
+    assert f'{kind} motion at 200 Hz to stewart_dynamics, 301 setpoints' in lines[0]
+    assert '301 setpoints published' in lines[1]
+    assert_only_log_lines(trajectory.program.stderr)
+    assert trajectory.program.stdout == ''
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
+def test_looped_it_goes_to_and_fro_until_it_is_told_to_stop(
+        start: Start, tmp_path: Path, number: signal.Signals) -> None:
+    trajectory = start(MOTION.format(kind='quintic', more='loop: true'))
+    trajectory.until(dict.fromkeys(SEPARATE, 650))  # twice 1.5 s at 200 Hz, and some
+    assert trajectory.program.stop(number) == 0
+    assert_only_log_lines(trajectory.program.stderr)
+    assert 'until stopped' in trajectory.program.stderr
+    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    # What was on its way when it ended may lack a topic.
+    whole = min(len(trajectory.received(topic)) for topic in SEPARATE)
+    for topic in SEPARATE:
+        del trajectory._raw[topic][whole:]
+    stamps, rows = _separate(trajectory)
+    times = np.arange(whole) * 5_000_000
+    assert [stamp - stamps[0] for stamp in stamps] == times.tolist()
+    np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
+    assert rows[600, 0] == pytest.approx(0.0, abs=1e-15)
+    assert rows[300, 0] == pytest.approx(0.2, abs=1e-15)
+
+
+def test_it_begins_without_subscribers_after_start_timeout(
+        domain: int, tmp_path: Path, start: Start) -> None:
+    # They are on another node's topics: nobody hears these.
+    trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
+                       'target:=nobody', 'motion.duration:=0.1')
+    assert trajectory.program.wait() == 0
+    assert 'hold motion at 200 Hz to nobody, 21 setpoints' in trajectory.program.stderr
+    assert '21 setpoints published' in trajectory.program.stderr
+
+
+def test_a_signal_ends_it_while_it_waits_for_subscribers(start: Start) -> None:
+    trajectory = start(MOTION.format(kind='paper', more='start_timeout: 1000.0'),
+                       'target:=nobody')
+    trajectory.peer.until(lambda: log_lines(trajectory.program.stderr), 'it has started')
+    assert trajectory.program.stop() == 0
+    assert_only_log_lines(trajectory.program.stderr)
+
+
+BROKEN = {
+    'no motion': ('      initial: [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]\n', '',
+                  'motion.initial: missing, it has no default'),
+    'no end': ('      final: [0.2, -0.15, 1.15, 0.2, -0.15, 0.8]\n', '',
+               'motion.final: missing, motion.type quintic needs it'),
+    'unknown name': ('rate: 200.0', 'rates: 200.0',
+                     'rates: unknown parameter; do you mean rate?'),
+    'integer': ('rate: 200.0', 'rate: 200', 'rate: 200: is an integer, must be a double'),
+    'zero': ('rate: 200.0', 'rate: 0.0', 'rate: 0.0 Hz: must be more than 0'),
+    'no choice': ('type: quintic', 'type: jump',
+                  "motion.type: 'jump': must be one of paper, quintic, sine, hold"),
+    'length': ('[0.2, -0.15, 1.15, 0.2, -0.15, 0.8]', '[0.2, -0.15, 1.15]',
+               'motion.final: [0.2, -0.15, 1.15]: must have 6 entries, has 3'),
+    'not YAML': ('motion:', 'motion: }', 'not YAML: '),
+}
+
+
+@pytest.mark.parametrize('case', BROKEN)
+def test_a_broken_rule_is_said_in_one_line(start: Start, tmp_path: Path, case: str) -> None:
+    text = MOTION.format(kind='quintic', more='output: separate')
+    good, bad, said = BROKEN[case]
+    assert good in text
+    program = start(text.replace(good, bad)).program
+    assert program.wait() == 1, program.stderr
+    lines = program.stderr.splitlines()
+    assert len(lines) == 1, program.stderr
+    assert lines[0].startswith(f'stewart_trajectory: {tmp_path / "trajectory.yaml"}: {said}')
+
+
+def test_the_files_of_the_package_are_good(start: Start) -> None:
+    for file in sorted((ROOT / 'config').glob('trajectory_*.yaml')):
+        TrajectoryParameters.from_yaml(file)
+    trajectory = start((ROOT / 'config/trajectory_clear.yaml').read_text(encoding='utf-8'))
+    trajectory.until(dict.fromkeys(SEPARATE, 10))
+    assert trajectory.program.stop() == 0
+    assert_only_log_lines(trajectory.program.stderr)
