@@ -96,6 +96,8 @@ class DynamicsNode(LifecycleNode):
         if self._settings['autostart']:
             if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
                 self.trigger_activate()
+        else:
+            self.get_logger().info('unconfigured: autostart is false')
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Compile the dynamics and open the topics."""
