@@ -41,9 +41,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import (
     Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
     Vector3, Wrench, WrenchStamped)
+from lifecycle_msgs.srv import ChangeState, GetState
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParametersAtomically
+from rcl_interfaces.msg import Log, SetParametersResult
+from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -76,6 +77,9 @@ INPUTS: dict[str, Any] = {
 OUTPUTS: dict[str, Any] = {
     'leg_states': JointState, 'leg_lengths': Float64MultiArray, 'leg_forces': Float64MultiArray,
     'jacobian_determinant': Float64, 'singularity_warning': Bool}
+SERVICES: dict[str, Any] = {
+    'change_state': ChangeState, 'get_state': GetState, 'describe_parameters': DescribeParameters,
+    'set_parameters': SetParameters, 'set_parameters_atomically': SetParametersAtomically}
 SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
 # What a program may say on stderr: lines of ROS's log. Fast DDS complains there of what other
@@ -217,17 +221,6 @@ class Peer:
                 raise AssertionError(f'{what}: not within {DEADLINE:g} s\n{said}')
             self.spin()
 
-    def call(self, kind: Any, service: str, request: Any) -> Any:
-        """Return the answer of a service."""
-        client = self.node.create_client(kind, service)
-        try:
-            self.until(client.service_is_ready, f'{service} is there')
-            future = client.call_async(request)
-            self.until(future.done, f'{service} answers')
-            return future.result()
-        finally:
-            self.node.destroy_client(client)
-
     def close(self) -> None:
         """Leave ROS."""
         self._executor.shutdown()
@@ -341,8 +334,13 @@ class DynamicsNode:
             f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
             for topic, kind in OUTPUTS.items()}
         self._decoded: dict[str, list[Any]] = defaultdict(list)
-        # The last that is made, so the last that is discovered: when it hears the node, the
-        # others are heard as well.
+        self._clients = {name: self.peer.node.create_client(kind, f'{NODE}/{name}')
+                         for name, kind in SERVICES.items()}
+        # The last that are made, so the last that the node discovers: when they hear it, it
+        # knows the others as well. A service whose answer finds no reader gives it up.
+        self._said: list[str] = []
+        self.peer.node.create_subscription(
+            Log, '/rosout', lambda message: self._said.append(message.msg), LATCHED)
         self.peer.node.create_subscription(
             DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
         arguments = [part for override in overrides for part in ('-p', override)]
@@ -379,6 +377,10 @@ class DynamicsNode:
                 self.writers[topic].get_subscription_count() for topic in self.topics)
 
         self.until(heard, 'the node is active and hears us')
+
+    def until_said(self, text: str) -> None:
+        """Wait until the node has logged a text: it is there and knows us."""
+        self.until(lambda: any(text in said for said in self._said), f'the node says {text!r}')
 
     @property
     def topics(self) -> list[str]:
@@ -481,7 +483,15 @@ class DynamicsNode:
         except AssertionError as exc:
             raise AssertionError(f'counted {counted()}, expected {self.expected}: {exc}') from exc
 
-    # -- parameters ------------------------------------------------------------------------
+    # -- services --------------------------------------------------------------------------
+
+    def call(self, name: str, request: Any) -> Any:
+        """Return the answer of one of the node's services."""
+        client = self._clients[name]
+        self.until(client.service_is_ready, f'{name} is there')
+        future = client.call_async(request)
+        self.until(future.done, f'{name} answers')
+        return future.result()
 
     def set_parameters(self, **changes: Any) -> SetParametersResult:
         """Set parameters, all or none, ``__`` in a name for a point."""
@@ -491,10 +501,8 @@ class DynamicsNode:
 
     def set_atomically(self, changes: Sequence[RosParameter]) -> SetParametersResult:
         """Set parameters through the node's service, all or none."""
-        return self.peer.call(
-            SetParametersAtomically, f'{NODE}/set_parameters_atomically',
-            SetParametersAtomically.Request(
-                parameters=[change.to_parameter_msg() for change in changes])).result
+        return self.call('set_parameters_atomically', SetParametersAtomically.Request(
+            parameters=[change.to_parameter_msg() for change in changes])).result
 
     # -- the end ---------------------------------------------------------------------------
 

@@ -679,7 +679,7 @@ def test_a_payload_is_picked_up_while_active(as_before: DynamicsNode) -> None:
     state = node.answer(MOVING, platform=laden)
     assert bits(state.effort) != bits(node.result_of(MOVING).forces)
     # One by one through the other service.
-    answer = node.peer.call(SetParameters, f'{NODE}/set_parameters', SetParameters.Request(
+    answer = node.call('set_parameters', SetParameters.Request(
         parameters=[RosParameter('platform.mass', value=150.0).to_parameter_msg()]))
     assert [each.successful for each in answer.results] == [True]
     lighter = StewartPlatform(laden.parameters.replaced({'platform.mass': 150.0}))
@@ -732,9 +732,8 @@ def test_a_bad_change_is_refused_with_its_reason(
 
 def test_parameters_are_described_with_text_and_unit(node: DynamicsNode) -> None:
     names = ['platform.mass', 'limits.force_max', 'singularity.action', 'singularity.warn_time']
-    mass, force, action, warn_time = node.peer.call(
-        DescribeParameters, f'{NODE}/describe_parameters',
-        DescribeParameters.Request(names=names)).descriptors
+    mass, force, action, warn_time = node.call(
+        'describe_parameters', DescribeParameters.Request(names=names)).descriptors
     assert mass.name == 'platform.mass'
     assert mass.description == 'mass of the platform with all that it carries [kg]'
     assert mass.additional_constraints == 'more than 0'
@@ -746,13 +745,12 @@ def test_parameters_are_described_with_text_and_unit(node: DynamicsNode) -> None
 # Lifecycle
 
 def _change(node: DynamicsNode, transition: int) -> bool:
-    return bool(node.peer.call(ChangeState, f'{NODE}/change_state', ChangeState.Request(
+    return bool(node.call('change_state', ChangeState.Request(
         transition=Transition(id=transition))).success)
 
 
 def _state(node: DynamicsNode) -> str:
-    return str(node.peer.call(
-        GetState, f'{NODE}/get_state', GetState.Request()).current_state.label)
+    return str(node.call('get_state', GetState.Request()).current_state.label)
 
 
 def _activate(node: DynamicsNode) -> None:
@@ -763,6 +761,7 @@ def _activate(node: DynamicsNode) -> None:
 
 def test_the_whole_lifecycle(start: Start) -> None:
     node = start('autostart:=false')
+    node.until_said('unconfigured: autostart is false')
     assert _state(node) == 'unconfigured'
     # What a state does not have is answered, and the node lives on.
     for impossible in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE,
