@@ -24,19 +24,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import hashlib
-import os
 from pathlib import Path
 from typing import Any, cast, TypeVar
 
-__all__ = ['COMPILED', 'UNCOMPILED_COST', 'compiled', 'entry_point', 'inlined',
-           'source_digest']
+__all__ = ['COMPILED', 'HINT', 'compiled', 'entry_point', 'inlined', 'source_digest']
 
 Function = TypeVar('Function', bound=Callable[..., Any])
+
+_UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a thousand times '
+               'slower, a millisecond or more for each setpoint')
+# What a user should hear once, on a log, of how the runtime path is compiled; empty where all
+# is well.
+HINT = ''
 
 try:
     import numba
 except ImportError:
     COMPILED = False
+    HINT = f'numba is not installed: {_UNCOMPILED}; pip install numba'
 
     def inlined(function: Function) -> Function:
         """Return the function as it is: there is no compiler."""
@@ -44,7 +49,9 @@ except ImportError:
 
     compiled = entry_point = inlined
 else:
-    COMPILED = os.environ.get('NUMBA_DISABLE_JIT', '0') in ('', '0')
+    COMPILED = not getattr(numba.config, 'DISABLE_JIT', 0)
+    if not COMPILED:
+        HINT = f'NUMBA_DISABLE_JIT is set: {_UNCOMPILED}'
 
     def inlined(function: Function) -> Function:
         """Compile a part of a loop's body; inlined, so that the loop becomes vector code."""
@@ -58,8 +65,14 @@ else:
 
     def entry_point(function: Function) -> Function:
         """Compile what Python calls; its machine code is kept on disk for the next start."""
+        global HINT
         kept = numba.njit(error_model='numpy', nogil=True, cache=True)
-        return cast('Function', kept(function))
+        try:
+            return cast('Function', kept(function))
+        except RuntimeError:  # no folder that numba may write to
+            HINT = ('the compiled dynamics cannot be kept on disk: every start takes seconds; '
+                    'let NUMBA_CACHE_DIR name a folder that can be written to')
+            return compiled(function)
 
 
 def source_digest(*modules: str) -> str:
@@ -74,8 +87,3 @@ def source_digest(*modules: str) -> str:
     for module in modules:
         digest.update(Path(__file__).with_name(f'{module}.py').read_bytes())
     return digest.hexdigest()
-
-
-UNCOMPILED_COST = (
-    'numba is not in use: the dynamics run uncompiled, with the same results but about a '
-    'thousand times slower (milliseconds for each setpoint); install it with pip install numba')

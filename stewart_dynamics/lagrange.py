@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
 Array = NDArray[np.float64]
@@ -52,10 +53,20 @@ def skew(vector: NDArray[np.floating[Any]]) -> Array:
 
 
 def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
-    """Return lengths, directions and arms at a pose: (1), (2)."""
+    """
+    Return lengths, directions and arms at a pose: (1), (2).
+
+    Raises MotionError where a leg has no length, or one that overflows.
+    """
     arms = np.einsum('...jk,ik->...ij', rotation, parameters['geometry.platform_joints'])
     vectors = position[..., None, :] + arms - parameters['geometry.base_joints']
-    lengths = np.linalg.norm(vectors, axis=-1)
+    with np.errstate(over='ignore'):
+        lengths = np.linalg.norm(vectors, axis=-1)
+    bad = ~((lengths > 0.0) & np.isfinite(lengths))
+    if bad.any():
+        at = tuple(map(int, np.argwhere(bad)[0]))
+        raise MotionError(f'leg {at[-1] + 1} would have a length of {lengths[at]} m'
+                          + (f' in sample {list(at[:-1])}' if at[:-1] else ''))
     return Legs(lengths, vectors / lengths[..., None], arms)
 
 

@@ -45,7 +45,8 @@ class Motion:
         Their time derivatives, base axes [m/s^2, rad/s^2]; zero by default.
 
     Leading shapes broadcast against each other. Raises MotionError where they cannot, and
-    for what is not finite or no rotation. The arrays are copied and read-only.
+    for what is not finite or no rotation. The arrays are copied, and read-only as properties;
+    ``rows`` (..., MOTION) holds them as the runtime path takes them.
 
     """
 
@@ -57,12 +58,12 @@ class Motion:
             angular_acceleration: ArrayLike | None = None,
     ) -> None:
         parts = {
-            'position': _array('position', position, (3,)),
-            'rotation': _array('rotation', rotation, (3, 3)),
-            'linear_velocity': _array('linear_velocity', linear_velocity, (3,)),
-            'angular_velocity': _array('angular_velocity', angular_velocity, (3,)),
-            'linear_acceleration': _array('linear_acceleration', linear_acceleration, (3,)),
-            'angular_acceleration': _array('angular_acceleration', angular_acceleration, (3,)),
+            'position': as_array('position', position, (3,)),
+            'rotation': as_array('rotation', rotation, (3, 3)),
+            'linear_velocity': as_array('linear_velocity', linear_velocity, (3,)),
+            'angular_velocity': as_array('angular_velocity', angular_velocity, (3,)),
+            'linear_acceleration': as_array('linear_acceleration', linear_acceleration, (3,)),
+            'angular_acceleration': as_array('angular_acceleration', angular_acceleration, (3,)),
         }
         leading = {name: part.shape[:-2] if name == 'rotation' else part.shape[:-1]
                    for name, part in parts.items()}
@@ -107,9 +108,9 @@ class Motion:
             second time derivatives.
 
         """
-        angle = _array('angles', angles, (3,))
-        rate = _array('angle_rates', angle_rates, (3,))
-        acceleration = _array('angle_accelerations', angle_accelerations, (3,))
+        angle = as_array('angles', angles, (3,))
+        rate = as_array('angle_rates', angle_rates, (3,))
+        acceleration = as_array('angle_accelerations', angle_accelerations, (3,))
         try:
             e = rotations.euler_rate_matrix(angle)
             omega = _apply(e, rate)
@@ -164,7 +165,8 @@ class Motion:
         return view
 
 
-def _array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
+def as_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
+    """Return a finite array whose shape ends so, zeros for none; else MotionError names it."""
     if value is None:
         return np.zeros(tail)
     try:

@@ -20,7 +20,6 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 import time
-import traceback
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -40,11 +39,11 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from stewart_dynamics import setpoints as inputs
-from stewart_dynamics.compiled import COMPILED, UNCOMPILED_COST
+from stewart_dynamics import compiled
 from stewart_dynamics.diagnostics import Diagnostics
-from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.ros import declare_parameters, is_ours, run, until_shutdown
+from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.setpoints import Refusal, Setpoints
 from stewart_dynamics.step import Output, OUTPUT_TYPES, Setpoint, Step
 
@@ -91,11 +90,13 @@ class DynamicsNode(LifecycleNode):
         self._said: dict[Refusal, tuple[float, int]] = {}
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._answer_impossible_transitions()
-        if not COMPILED:
-            self.get_logger().warning(UNCOMPILED_COST)
+        self._set_parameters_together()
+        if compiled.HINT:
+            self.get_logger().warning(compiled.HINT)
         if self._settings['autostart']:
-            if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
-                self.trigger_activate()
+            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                raise StewartError(f'cannot be configured: {self._fault}')
+            self.trigger_activate()
         else:
             self.get_logger().info('unconfigured: autostart is false')
 
@@ -103,9 +104,10 @@ class DynamicsNode(LifecycleNode):
         """Compile the dynamics and open the topics."""
         try:
             self._configure()
-        except Exception:
+        except Exception as exc:
             # rclpy turns an exception in a transition into ERROR without a word.
-            self.get_logger().error(f'cannot be configured: {traceback.format_exc()}')
+            self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
+            self.get_logger().error(f'cannot be configured: {self._fault}')
             self._close()
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
@@ -113,8 +115,7 @@ class DynamicsNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer, as if nothing had come before."""
         now = time.monotonic()
-        self._setpoints = Setpoints(
-            self._settings, self._on_refusal, self.get_logger().warning)
+        self._setpoints = Setpoints(self._settings, self._on_refusal, self._on_notice)
         self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now)
         self._waiting: deque[Setpoint] = deque()
         self._last: Output | None = None
@@ -150,34 +151,36 @@ class DynamicsNode(LifecycleNode):
             qos = QoSProfile(depth=10)
             if topic == 'singularity_warning':
                 qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-            self._publishers_of[topic] = self.create_publisher(_TYPES[name], f'~/{topic}', qos)
-        self._diagnostics_publisher = self.create_publisher(
+            self._publishers_of[topic] = self._publisher(_TYPES[name], f'~/{topic}', qos)
+        self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
         self._answer_task = until_shutdown(self, self._answer)
-        subscriptions = [self._subscribe(topic, partial(self._on_setpoint, topic))
-                         for topic in topics]
-        subscriptions.append(self._subscribe(inputs.WRENCH, self._on_wrench))
-        self._inputs = dict(zip(topics, subscriptions, strict=False))
+        self._inputs = {topic: self._subscribe(topic, partial(self._on_setpoint, topic))
+                        for topic in topics}
+        self._subscribe(inputs.WRENCH, self._on_wrench)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
         # A steady clock: ROS time may stand still or jump.
         watch = self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
                                   clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._close_io = [
-            partial(self.destroy_timer, watch),
-            *(partial(self.destroy_subscription, each) for each in subscriptions),
-            *(partial(self.destroy_publisher, each) for each in (
-                *self._publishers_of.values(), self._diagnostics_publisher))]
+        self._close_io.append(partial(self.destroy_timer, watch))
         self._configured = True
 
+    def _publisher(self, kind: Any, topic: str, qos: QoSProfile) -> Publisher:
+        publisher = self.create_publisher(kind, topic, qos)
+        self._close_io.append(partial(self.destroy_publisher, publisher))
+        return publisher
+
     def _subscribe(self, topic: str, callback: Any) -> Any:
-        return self.create_subscription(
+        subscription = self.create_subscription(
             _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', until_shutdown(self, callback),
             QoSProfile(depth=_QUEUE), raw=True,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=partial(self._on_incompatible_qos, topic)))
+        self._close_io.append(partial(self.destroy_subscription, subscription))
+        return subscription
 
     def _on_incompatible_qos(self, topic: str, event: Any) -> None:
         self.get_logger().error(
@@ -186,9 +189,8 @@ class DynamicsNode(LifecycleNode):
 
     def _close(self) -> None:
         self._configured = False
-        for close in self._close_io:
-            close()
-        self._close_io = []
+        while self._close_io:
+            self._close_io.pop()()
 
     def _answer_impossible_transitions(self) -> None:
         """
@@ -208,6 +210,22 @@ class DynamicsNode(LifecycleNode):
                 return response
 
         service.callback = answer
+
+    def _set_parameters_together(self) -> None:
+        """
+        Take all parameters of one request or none.
+
+        rclpy sets one after the other, and keeps the first when it refuses the second.
+        """
+        def set_together(request: Any, response: Any) -> Any:
+            result = self.set_parameters_atomically(
+                [RosParameter.from_parameter_msg(message) for message in request.parameters])
+            response.results = [result] * len(request.parameters)
+            return response
+
+        for service in self.services:
+            if service.srv_name.endswith('/set_parameters'):
+                service.callback = set_together
 
     # -- setpoints ------------------------------------------------------------------------
 
@@ -277,15 +295,25 @@ class DynamicsNode(LifecycleNode):
     # -- words ----------------------------------------------------------------------------
 
     def _on_refusal(self, refusal: Refusal, details: str) -> None:
+        self._diagnostics.refused(refusal, details, time.monotonic())
+        due, since = self._due_to_say(refusal)
+        if due:
+            more = f' (and {since} before it)' if since else ''
+            self.get_logger().warning(
+                f'{refusal.topic} refused: {refusal.reason}: {details}{more}')
+
+    def _on_notice(self, text: str) -> None:
+        # Two writers whose clocks differ restart with every setpoint.
+        if self._due_to_say(Refusal('notice', text[:20]))[0]:
+            self.get_logger().warning(text)
+
+    def _due_to_say(self, what: Refusal) -> tuple[bool, int]:
+        """Return whether this may be said again, and how often it was not since."""
         now = time.monotonic()
-        self._diagnostics.refused(refusal, details, now)
-        said, since = self._said.get(refusal, (-_SAY_AGAIN_SECONDS, 0))
-        if now - said < _SAY_AGAIN_SECONDS:
-            self._said[refusal] = said, since + 1
-            return
-        self._said[refusal] = now, 0
-        more = f' (and {since} before it)' if since else ''
-        self.get_logger().warning(f'{refusal.topic} refused: {refusal.reason}: {details}{more}')
+        said, since = self._said.get(what, (-_SAY_AGAIN_SECONDS, 0))
+        due = now - said >= _SAY_AGAIN_SECONDS
+        self._said[what] = (now, 0) if due else (said, since + 1)
+        return due, since
 
     def _on_watch(self) -> None:
         if not self._active:
@@ -315,7 +343,7 @@ class DynamicsNode(LifecycleNode):
 
     def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
         """Take all of these, between two setpoints, or none."""
-        ours = {change.name: change.value for change in changes if is_ours(change.name)}
+        ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
         try:
             for name, value in ours.items():
                 if value is None:

@@ -24,12 +24,14 @@ from collections.abc import Iterator, Mapping
 import difflib
 import math
 from pathlib import Path
+import re
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.tokens import AliasToken
 
 from stewart_dynamics.errors import ParameterError
 
@@ -42,8 +44,8 @@ class Parameter(NamedTuple):
     What is known of one parameter.
 
     ``sizes`` are the lengths an array may have, none for a single value; a length of one or
-    six may also be given as a single value, for all legs. ``minimum`` holds for
-    every entry, ``minimum`` itself not where ``above`` is set.
+    six may also be given as a single value, for all legs. ``minimum`` and ``maximum``
+    hold for every entry, ``minimum`` itself not where ``above`` is set.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Parameter(NamedTuple):
     required: bool = False
     sizes: tuple[int, ...] = ()
     minimum: float = -math.inf
+    maximum: float = math.inf
     above: bool = False
     choices: tuple[str, ...] = ()
     while_active: bool = False
@@ -70,9 +73,12 @@ class Parameter(NamedTuple):
         """The values it may have, in words."""
         if self.choices:
             return 'one of ' + ', '.join(self.choices)
+        rules = []
         if self.minimum > -math.inf:
-            return f'{"more than" if self.above else "at least"} {self.minimum:g}'
-        return ''
+            rules.append(f'{"more than" if self.above else "at least"} {self.minimum:g}')
+        if self.maximum < math.inf:
+            rules.append(f'at most {self.maximum:g}')
+        return ', '.join(rules)
 
 
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
@@ -156,8 +162,18 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
 )})
 
 _DEEPEST = 8
+_LARGEST = 1_000_000  # [bytes]
+
+# What ROS itself declares in every node.
+_OF_ROS = ('use_sim_time', 'start_type_description_service')
+_OF_ROS_PREFIX = 'qos_overrides.'
 
 _PYTHON_TYPES = {'string': str, 'double': float, 'bool': bool}
+
+
+def is_of_ros(name: str) -> bool:
+    """Return whether a parameter of this name is one that ROS itself declares in nodes."""
+    return name in _OF_ROS or name.startswith(_OF_ROS_PREFIX)
 
 
 class ParameterSet(Mapping[str, Any]):
@@ -182,11 +198,10 @@ class ParameterSet(Mapping[str, Any]):
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters') -> None:
         for name in values:
             self._declared(name, source)
-        # What YAML leaves empty is not given.
-        self.given: Mapping[str, Any] = MappingProxyType(
-            {name: value for name, value in values.items() if value is not None})
+        self._given = {name: _plain(value) for name, value in values.items()
+                       if value is not None}
         self._values = {
-            name: _checked(parameter, self.given.get(name, parameter.default), source)
+            name: _checked(parameter, self._given.get(name, parameter.default), source)
             for name, parameter in self.table.items()}
         self._check_together(source)
 
@@ -202,18 +217,46 @@ class ParameterSet(Mapping[str, Any]):
         """Return how many parameters there are."""
         return len(self._values)
 
+    def __eq__(self, other: object) -> bool:
+        """Return whether all values are equal."""
+        return isinstance(other, type(self)) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Return a hash of all values."""
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[type[Self], tuple[dict[str, Any]]]:
+        """Return how to make a copy: checked and read-only again."""
+        return type(self), (self._given,)
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """The values that are not defaults, as they were given."""
+        return MappingProxyType(self._given)
+
+    def _key(self) -> tuple[Any, ...]:
+        return tuple(tuple(value.ravel()) if isinstance(value, np.ndarray) else value
+                     for value in self._values.values())
+
     def replaced(self, changes: Mapping[str, Any], source: str = 'parameters') -> Self:
         """Return the parameters with these changed, checked as a whole again."""
-        return type(self)({**self.given, **changes}, source)
+        return type(self)({**self._given, **changes}, source)
 
     @classmethod
-    def from_yaml(cls, path: str | Path) -> Self:
+    def from_yaml(cls, path: str | Path, node: str = '') -> Self:
         """
         Read a ROS parameter file, ``/**:`` or the node's name, then ``ros__parameters:``.
 
+        Parameters
+        ----------
+        path : str or Path
+        node : str
+            The node's name, with its namespace if it has one, where it is not the usual one.
+
         Raises ParameterError, naming file, parameter, value and rule.
+
         """
-        return cls(read_yaml(path, cls.node), str(path))
+        return cls(read_yaml(path, node or cls.node), str(path))
 
     @classmethod
     def check_file(cls, path: str | Path) -> None:
@@ -224,7 +267,7 @@ class ParameterSet(Mapping[str, Any]):
     @classmethod
     def _declared(cls, name: str, source: str) -> Parameter:
         if name not in cls.table:
-            near = difflib.get_close_matches(name, cls.table, n=1)
+            near = difflib.get_close_matches(str(name), cls.table, n=1)
             raise ParameterError(f'{source}: {name}: unknown parameter'
                                  + (f'; do you mean {near[0]}?' if near else ''))
         return cls.table[name]
@@ -295,18 +338,33 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
 def _sections(path: str | Path, node: str) -> Iterator[tuple[str, Any]]:
     """Return the names and values that a file holds for a node, in the file's order."""
     for section, content in read_document(path).items():
-        if str(section).strip('/') not in ('**', node):
+        if not _is_meant(str(section), node):
             continue
         if not isinstance(content, dict) or 'ros__parameters' not in content:
             raise ParameterError(f"{path}: {section}: must hold 'ros__parameters:'")
-        yield from _flat(content['ros__parameters'] or {}, '', str(path))
+        for name, value in _flat(content['ros__parameters'] or {}, '', str(path)):
+            if value is None:
+                raise ParameterError(f'{path}: {name}: has no value')
+            if not is_of_ros(name):
+                yield name, value
+
+
+def _is_meant(section: str, node: str) -> bool:
+    """Return whether a section is for a node: by its name, * for one part of it, ** for any."""
+    pattern = re.escape(section.strip('/')).replace(r'\*\*', '.*').replace(r'\*', '[^/]*')
+    return re.fullmatch(pattern, node.strip('/')) is not None
 
 
 def read_document(path: str | Path) -> dict[Any, Any]:
     """Return what a YAML file holds, a mapping; ParameterError says why it cannot be read."""
     try:
-        with Path(path).open(encoding='utf-8') as file:
-            document = YAML(typ='safe', pure=True).load(file)
+        if Path(path).stat().st_size > _LARGEST:
+            raise ParameterError(f'{path}: larger than {_LARGEST} bytes')
+        text = Path(path).read_text(encoding='utf-8')
+        # ROS's own reader refuses aliases.
+        if any(isinstance(token, AliasToken) for token in YAML(typ='safe', pure=True).scan(text)):
+            raise ParameterError(f'{path}: has a YAML alias (*): write the value out')
+        document = YAML(typ='safe', pure=True).load(text)
     except (OSError, UnicodeDecodeError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
         raise ParameterError(f'{path}: cannot be read: {reason}') from exc
@@ -332,14 +390,21 @@ def _flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
+def _plain(value: Any) -> Any:
+    """Return a value that nobody else can change; arrays as tuples, of one axis."""
+    if isinstance(value, np.ndarray):
+        value = value.ravel() if value.ndim else value[()]
+    if hasattr(value, 'tolist'):
+        value = value.tolist()
+    return tuple(value) if isinstance(value, list) else value
+
+
 def _checked(parameter: Parameter, value: Any, source: str) -> Any:
     """Return the value as the package uses it, or raise ParameterError."""
     if value is None:
         if parameter.required:
             raise ParameterError(f'{source}: {parameter.name}: missing, it has no default')
         return None
-    if hasattr(value, 'tolist'):
-        value = value.tolist()
     is_array = isinstance(value, list | tuple)
     entries = list(value) if is_array else [value]
     if is_array and not parameter.sizes:
@@ -363,10 +428,13 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
     return array
 
 
+def _is_a(entry: Any, kind: str) -> bool:
+    return isinstance(entry, _PYTHON_TYPES[kind])
+
+
 def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
-    given = type(entry)
-    if given is not _PYTHON_TYPES[parameter.kind]:
-        if parameter.kind == 'double' and given is int:
+    if not _is_a(entry, parameter.kind):
+        if parameter.kind == 'double' and isinstance(entry, int) and not isinstance(entry, bool):
             written = f': write {entry}.0' if abs(entry) < 1e15 else ''
             raise _broken(parameter, entry, source, f'is an integer, must be a double{written}')
         raise _broken(parameter, entry, source, f'must be a {parameter.kind}')
@@ -377,12 +445,14 @@ def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
     if parameter.kind == 'double':
         if not math.isfinite(entry):
             raise _broken(parameter, entry, source, 'must be finite')
-        if entry < parameter.minimum or (parameter.above and entry == parameter.minimum):
+        if (entry < parameter.minimum or entry > parameter.maximum
+                or (parameter.above and entry == parameter.minimum)):
             raise _broken(parameter, entry, source, f'must be {parameter.rule}')
 
 
 def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> ParameterError:
     unit = f' {parameter.unit}' if parameter.unit and isinstance(value, float) else ''
+    value = list(value) if isinstance(value, tuple) else value
     try:
         shown = f'{value!r}'
     except ValueError:  # an integer of more digits than Python writes

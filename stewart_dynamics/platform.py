@@ -28,7 +28,7 @@ from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics import lagrange
 from stewart_dynamics.compiled import COMPILED
 from stewart_dynamics.errors import MotionError, SingularityError
-from stewart_dynamics.motion import Motion
+from stewart_dynamics.motion import as_array, Motion
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.singularity import time_to_crossing, UNSOLVABLE_CONDITION
 
@@ -101,7 +101,8 @@ class StewartPlatform:
             Of any leading shape (...).
         wrench : (..., 6), optional
             Force [N] and moment [N m] that the surroundings put on the platform at its
-            origin, base axes; broadcasts against the motion. None by default.
+            origin, base axes. None by default. The leading shapes of motion and wrench
+            broadcast against each other.
 
         Raises
         ------
@@ -111,8 +112,8 @@ class StewartPlatform:
             J_inv cannot be solved in a sample: it names the sample.
 
         """
-        rows = motion.rows.reshape(-1, runtime.MOTION)
-        results = self.solve(rows, self._wrench_rows(motion, wrench))
+        rows, wrenches, shape = self._rows(motion, wrench)
+        results = self.solve(rows, wrenches)
         finite = np.isfinite(results)
         if not finite.all():
             at = int(np.argmin(finite.all(axis=-1)))
@@ -126,7 +127,7 @@ class StewartPlatform:
                 f'sample {at}: J_inv cannot be solved: its condition number is '
                 f'{condition[at]:.3g}, must be under {UNSOLVABLE_CONDITION:g}; position '
                 f'{rows[at, :3].tolist()} m')
-        return self._named(results.reshape(*motion.shape, runtime.RESULT))
+        return self._named(results.reshape(*shape, runtime.RESULT))
 
     def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
         """
@@ -136,8 +137,8 @@ class StewartPlatform:
         large batches use all processors.
         """
         # Another layout in memory would be compiled for anew, for seconds.
-        rows = np.ascontiguousarray(rows)
-        wrenches = self._no_wrench if wrenches is None else np.ascontiguousarray(wrenches)
+        rows = np.require(rows, float, ['C', 'W'])
+        wrenches = self._no_wrench if wrenches is None else np.require(wrenches, float, ['C', 'W'])
         results = np.empty((len(rows), runtime.RESULT))
         threads = min(_CPUS, len(rows) // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
         if threads < 2:
@@ -160,6 +161,8 @@ class StewartPlatform:
         motion = Motion(position, rotation)
         results = self.solve(motion.rows.reshape(-1, runtime.MOTION))
         lengths = results[:, runtime.LENGTHS:runtime.LENGTHS + 6]
+        if not np.isfinite(lengths).all():
+            raise MotionError('position: out of range, the leg lengths overflow')
         return lengths.reshape(*motion.shape, 6).copy()
 
     def jacobian(self, position: ArrayLike, rotation: ArrayLike) -> Array:
@@ -202,18 +205,22 @@ class StewartPlatform:
     def _legs(self, motion: Motion) -> lagrange.Legs:
         return lagrange.legs(self.parameters, motion.position, motion.rotation)
 
-    def _wrench_rows(self, motion: Motion, wrench: ArrayLike | None) -> Array:
+    def _rows(self, motion: Motion, wrench: ArrayLike | None,
+              ) -> tuple[Array, Array, tuple[int, ...]]:
+        """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
+        rows = motion.rows.reshape(-1, runtime.MOTION)
         if wrench is None:
-            return self._no_wrench
+            return rows, self._no_wrench, motion.shape
+        load = as_array('wrench', wrench, (runtime.WRENCH,))
         try:
-            rows = np.array(np.broadcast_to(
-                np.asarray(wrench, dtype=float), (*motion.shape, runtime.WRENCH)), order='C')
-        except (OverflowError, TypeError, ValueError) as exc:
-            raise MotionError(f'wrench: shape {np.shape(wrench)}: must broadcast to '
-                              f'{(*motion.shape, runtime.WRENCH)}') from exc
-        if not np.all(np.isfinite(rows)):
-            raise MotionError('wrench: must be finite')
-        return rows.reshape(-1, runtime.WRENCH)
+            shape = np.broadcast_shapes(motion.shape, load.shape[:-1])
+        except ValueError as exc:
+            raise MotionError(f'wrench: shape {load.shape}: must broadcast against the '
+                              f"motion's {motion.shape}") from exc
+        if shape != motion.shape:
+            rows = np.array(np.broadcast_to(motion.rows, (*shape, runtime.MOTION)), order='C')
+        loads = np.array(np.broadcast_to(load, (*shape, runtime.WRENCH)), order='C')
+        return rows.reshape(-1, runtime.MOTION), loads.reshape(-1, runtime.WRENCH), shape
 
     @staticmethod
     def _named(results: Array) -> InverseDynamics:

@@ -38,7 +38,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics import setpoints as inputs
-from stewart_dynamics.compiled import COMPILED, UNCOMPILED_COST
+from stewart_dynamics import compiled
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.setpoints import Refusal, Setpoints
@@ -283,10 +283,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _arguments().parse_args(arguments)
     code = DONE
     try:
-        parameters = Parameters.from_yaml(options.params)
+        parameters = Parameters.from_yaml(options.params, options.node)
         folders = _folders(options.bags, options.output)
-        if not COMPILED:
-            print(f'stewart_replay: {UNCOMPILED_COST}', file=sys.stderr)
+        if compiled.HINT:
+            print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
         for path, folder in folders.items():
             code = max(code, _replay_one(path, folder, parameters, options), key=_GRAVITY)
     except StewartError as exc:

@@ -24,27 +24,19 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
-from rclpy.exceptions import ROSInterruptException
+from rclpy.exceptions import NameValidationException, ROSInterruptException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.task import Future
 
-from stewart_dynamics.errors import StewartError
-from stewart_dynamics.parameters import Parameter, ParameterSet
+from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
 
 # The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
 _SPIN_SECONDS = 10.0
 
 Kind = TypeVar('Kind', bound=ParameterSet)
-
-# What ROS itself declares in every node.
-_OF_ROS = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
-
-
-def is_ours(name: str) -> bool:
-    """Return whether a parameter of this name is not one that ROS itself declares."""
-    return not name.startswith(_OF_ROS)
 
 
 def parameter_files(arguments: Sequence[str]) -> list[str]:
@@ -61,9 +53,12 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     Types are left to the table's own check, whose texts say more than ROS's. Raises
     ParameterError, for an unknown name as well.
     """
-    source = ', '.join(parameter_files(sys.argv)) or 'command line'
+    sources = parameter_files(sys.argv)
+    if not sources or {'-p', '--param'} & set(sys.argv):
+        sources.append('command line')
+    source = ', '.join(sources)
     declared: dict[str, Any] = node.get_parameters_by_prefix('')
-    given = {name: parameter.value for name, parameter in declared.items() if is_ours(name)}
+    given = {name: parameter.value for name, parameter in declared.items() if not is_of_ros(name)}
     parameters = kind(given, source)
     for name, parameter in kind.table.items():
         if node.has_parameter(name):
@@ -141,6 +136,8 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
     try:
+        if parameter_files(sys.argv) and '--ros-args' not in sys.argv:
+            raise ParameterError('--params-file is read only behind --ros-args')
         for path in parameter_files(sys.argv):
             kind.check_file(path)
         rclpy.init()
@@ -153,7 +150,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         return int(stop.result() or 0) if stop.done() else 0
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         return 0
-    except (StewartError, RCLError, UnknownROSArgsError) as exc:
+    except (StewartError, RCLError, UnknownROSArgsError, NameValidationException) as exc:
         starting = False
         if not rclpy.ok() and signals:
             return 0  # cut short by a signal

@@ -20,7 +20,7 @@ Node and replay feed it the same bytes in the same order, so both refuse and joi
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 import math
 from typing import NamedTuple
@@ -103,9 +103,9 @@ class Setpoints:
         self._noticed = noticed
         self._last: dict[str, int] = {}
         self._waiting: dict[str, dict[int, tuple[float, ...]]] = {t: {} for t in self.topics}
-        self._unstamped: dict[str, deque[tuple[int, tuple[float, ...]]]] = {
-            t: deque() for t in self.topics}
-        self._unstamped_said = self._unstamped_joined = False
+        self._unstamped: dict[str, tuple[float, ...] | None] = {}
+        self._unstamped_said = False
+        self._stamped: set[str] = set()
 
     def take_wrench(self, data: bytes) -> None:
         """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
@@ -130,9 +130,16 @@ class Setpoints:
         """
         sample = self._sound(topic, data)
         if sample is None:
+            if self._unstamped_said and topic not in self._stamped:
+                self._join_unstamped(topic, None, now)  # it keeps its place in the order
             return None
-        if sample.stamp == 0:
-            return self._join_unstamped(topic, sample.values, now)
+        if topic not in self._stamped:
+            if sample.stamp == 0:
+                return self._join_unstamped(topic, sample.values, now)
+            # From now on zero is a time as others are.
+            self._stamped.add(topic)
+            if self._unstamped.pop(topic, None):
+                self.refuse(topic, NOT_JOINED, 'stamp 0')
         if not self._in_time(topic, sample.stamp):
             return None
         waiting = self._waiting[topic]
@@ -140,39 +147,36 @@ class Setpoints:
         if len(waiting) > WAITING:
             oldest = next(iter(waiting))
             del waiting[oldest]
-            self._refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
+            self.refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
         return self._join(sample.stamp)
 
     def refuse(self, topic: str, reason: str, details: str) -> None:
-        """Count what is not used for a reason that only the caller can know."""
-        self._refuse(topic, reason, details)
-
-    def _refuse(self, topic: str, reason: str, details: str) -> None:
+        """Count, and tell of, what is not used."""
         refusal = Refusal(topic, reason)
         self.counts[refusal] += 1
         self._refused(refusal, details)
 
     def _sound(self, topic: str, data: bytes) -> cdr.Stamped | None:
-        """Return the message, its quaternion in place of a rotation matrix, or refuse it."""
+        """Return the message, a rotation matrix in place of its quaternion, or refuse it."""
         try:
             sample = _READERS[topic](data)
         except cdr.MalformedError as exc:
-            self._refuse(topic, MALFORMED, str(exc))
+            self.refuse(topic, MALFORMED, str(exc))
             return None
         values = sample.values
         if sample.frame not in self._frames:
-            self._refuse(topic, WRONG_FRAME, f'{sample.frame.decode(errors="replace")!r}, must '
-                         f'be {max(self._frames).decode()!r} or empty')
+            self.refuse(topic, WRONG_FRAME, f'{sample.frame.decode(errors="replace")!r}, must '
+                        f'be {max(self._frames).decode()!r} or empty')
             return None
         if not cdr.finite(values):
-            self._refuse(topic, NOT_FINITE, str(values))
+            self.refuse(topic, NOT_FINITE, str(values))
             return None
         if topic in (POSE, COMBINED):
             x, y, z, w = values[3:7]
             length = math.hypot(x, y, z, w)
             if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
-                self._refuse(topic, NOT_UNIT, f'length {length:.6g}, must be within '
-                             f'{QUATERNION_TOLERANCE:g} of 1')
+                self.refuse(topic, NOT_UNIT, f'length {length:.6g}, must be within '
+                            f'{QUATERNION_TOLERANCE:g} of 1')
                 return None
             values = values[:3] + from_quaternion(
                 x / length, y / length, z / length, w / length) + values[7:]
@@ -181,41 +185,44 @@ class Setpoints:
     def _in_time(self, topic: str, stamp: int) -> bool:
         """Return whether a sample may still be used, or refuse it."""
         if stamp in self._waiting[topic]:
-            self._refuse(topic, TWICE, f'stamp {stamp} ns')
+            self.refuse(topic, TWICE, f'stamp {stamp} ns')
             return False
         last = self._last.get(topic)
         if last is None or not 0 <= last - stamp <= self._timeout:
             return True
         if stamp == last:
-            self._refuse(topic, TWICE, f'stamp {stamp} ns')
+            self.refuse(topic, TWICE, f'stamp {stamp} ns')
         else:
-            self._refuse(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
-                         f'older than the last used')
+            self.refuse(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
+                        f'older than the last used')
         return False
 
     def _join(self, stamp: int) -> Setpoint | None:
-        """Return the setpoint at a stamp if every topic has it."""
-        stamps = []
-        for topic in self.topics:
-            waiting = self._waiting[topic]
-            if stamp in waiting:
-                stamps.append(stamp)
-                continue
-            if not waiting or not self._tolerance:
-                return None
-            near = min(waiting, key=lambda other: abs(other - stamp))
-            if abs(near - stamp) > self._tolerance:
-                return None
-            stamps.append(near)
-        self._give_up(dict(zip(self.topics, stamps, strict=True)))
-        values = [self._waiting[topic].pop(at)
-                  for topic, at in zip(self.topics, stamps, strict=True)]
-        return Setpoint(stamps[0], self._motion(values), self.wrench)
+        """Return the setpoint that a sample completes, all its stamps within the tolerance."""
+        stamps = {}
+        # A setpoint has the stamp of the first topic: what is nearest to it belongs to it.
+        at = stamp
+        for other, waiting in self._waiting.items():
+            if at not in waiting:
+                if not waiting or not self._tolerance:
+                    return None
+                at = min(waiting, key=lambda candidate: abs(candidate - at))
+            stamps[other] = at
+            at = stamps[self.topics[0]]
+        if max(stamps.values()) - min(stamps.values()) > self._tolerance:
+            return None
+        restart = self._give_up(stamps)
+        values = [self._waiting[other].pop(at) for other, at in stamps.items()]
+        return Setpoint(at, self._motion(values), self.wrench, restart)
 
-    def _give_up(self, stamps: dict[str, int]) -> None:
-        """Drop and count what waits and can no longer be used once these stamps are."""
+    def _give_up(self, stamps: dict[str, int]) -> bool:
+        """
+        Drop and count what waits and can no longer be used once these stamps are.
+
+        Return whether time has jumped back.
+        """
         first = self.topics[0]
-        jump = self._last[first] - stamps[first] if self._last else 0
+        jump: int = self._last[first] - stamps[first] if self._last else 0
         if jump > self._timeout:
             self._noticed(f'stamps jumped back by {jump / 1e9:g} s: followed as a restart')
         for topic, stamp in stamps.items():
@@ -226,32 +233,41 @@ class Setpoints:
                           else math.inf)
                 for other in [other for other in waiting if other < stamp or other > future]:
                     del waiting[other]
-                    self._refuse(topic, NOT_JOINED, f'stamp {other} ns')
+                    self.refuse(topic, NOT_JOINED, f'stamp {other} ns')
         self._last = stamps
+        return bool(jump > self._timeout)
 
     def _join_unstamped(
-            self, topic: str, values: tuple[float, ...], now: int) -> Setpoint | None:
+            self, topic: str, values: tuple[float, ...] | None, now: int) -> Setpoint | None:
         """
-        Join samples without a stamp in their order of arrival.
+        Join samples without a stamp in their order of arrival; one without values was refused.
 
-        None waits for longer than the timeout, and before the first join only the newest: a
-        topic that speaks earlier or faster than the others would be joined late for ever.
+        What comes between two samples of one topic is one setpoint. What is incomplete when the
+        next sample comes is given up, all of it: else one lost sample would join the following
+        ones wrongly for ever.
         """
         if not self._unstamped_said:
             self._unstamped_said = True
             self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
                           'of arrival and stamped with the clock')
-        self._unstamped[topic].append((now, values))
-        for name, queue in self._unstamped.items():
-            while queue and (now - queue[0][0] > self._timeout or len(queue) > WAITING or (
-                    len(queue) > 1 and not self._unstamped_joined)):
-                queue.popleft()
-                self._refuse(name, NOT_JOINED, 'stamp 0')
-        if not all(self._unstamped.values()):
+        if topic in self._unstamped:
+            self._give_up_unstamped()
+        self._unstamped[topic] = values
+        if len(self._unstamped) < len(self.topics):
             return None
-        self._unstamped_joined = True
-        values_of_all = [self._unstamped[t].popleft()[1] for t in self.topics]
-        return Setpoint(now, self._motion(values_of_all), self.wrench)
+        in_order = [self._unstamped[other] for other in self.topics]
+        sound = [each for each in in_order if each is not None]
+        if len(sound) < len(in_order):
+            self._give_up_unstamped()
+            return None
+        self._unstamped.clear()
+        return Setpoint(now, self._motion(sound), self.wrench)
+
+    def _give_up_unstamped(self) -> None:
+        for topic, values in self._unstamped.items():
+            if values is not None:
+                self.refuse(topic, NOT_JOINED, 'stamp 0')
+        self._unstamped.clear()
 
     def _motion(self, values: list[tuple[float, ...]]) -> tuple[float, ...]:
         """Return a row of motion: what the topics give, and zeros for what they do not."""

@@ -53,6 +53,8 @@ class Setpoint(NamedTuple):
     """A row of motion, laid out as ``inverse_dynamics`` says."""
     wrench: Six = NO_WRENCH
     """Load on the platform at its origin, base axes [N, N m]."""
+    restart: bool = False
+    """Time has jumped back before it: what came before says nothing of it."""
 
 
 class Excess(NamedTuple):
@@ -125,8 +127,10 @@ class Step:
         determinant = result[runtime.DETERMINANT]
         determinant_rate = result[runtime.DETERMINANT_RATE]
         condition = result[runtime.CONDITION]
-        singularity = (before or Singularity()).after(
-            self.parameters, determinant, determinant_rate, condition)
+        past = before or Singularity()
+        if setpoint.restart:
+            past = Singularity(crossings=past.crossings)
+        singularity = past.after(self.parameters, determinant, determinant_rate, condition)
         demanded: Six | None = None
         forces: Six | None = None
         if condition < UNSOLVABLE_CONDITION:

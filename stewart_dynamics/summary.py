@@ -98,7 +98,9 @@ class Summary(NamedTuple):
             if on and not begun:
                 begun.append(seconds)
             elif not on and begun:
-                spans.append((begun.pop(), seconds))
+                # One that ends before it began was on when a bag began anew.
+                spans.append((begun[0], seconds if seconds >= begun[0] else np.inf))
+                begun.clear()
         spans += [(seconds, np.inf) for seconds in begun]
         # where stamps jump back a bag began anew: what it lasted is what went forward
         duration = int(np.diff(stamp).clip(0).sum()) * 1e-9

@@ -42,16 +42,18 @@ TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for
     Parameter('base_frame', 'string', 'frame in which the setpoints are given', default='base'),
     Parameter('output', 'string', 'pose, twist and accel on three topics, or all in one message',
               default='separate', choices=('separate', 'combined')),
-    Parameter('rate', 'double', 'setpoints in a second', 'Hz', 100.0, minimum=0.0, above=True),
+    Parameter('rate', 'double', 'setpoints in a second', 'Hz', 100.0, minimum=1e-3,
+              maximum=1e4),
     Parameter('start_timeout', 'double', 'it begins half a second after all its topics have '
-              'subscribers, or after this time without', 's', 5.0, minimum=0.0),
+              'subscribers, or after this time without', 's', 5.0, minimum=0.0,
+              maximum=86400.0),
     Parameter('loop', 'bool', 'go on until stopped: paper and quintic to and fro, sine and hold '
               'without an end', default=False),
     Parameter('motion.type', 'string', 'paper: from initial to final, each coordinate as a half '
               'cosine; quintic: on the straight line and about one axis; sine: about initial; '
               'hold: at initial', default='paper', choices=('paper', 'quintic', 'sine', 'hold')),
     Parameter('motion.duration', 'double', 'how long it lasts, one way', 's', 10.0, minimum=0.0,
-              above=True),
+              maximum=86400.0, above=True),
     Parameter('motion.initial', 'double', f'{_POSE} at the start; the center of a sine',
               'm, rad', required=True, sizes=(6,)),
     Parameter('motion.final', 'double', f'{_POSE} at the end; paper and quintic need it',
@@ -59,7 +61,7 @@ TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for
     Parameter('motion.amplitude', 'double', f'of {_POSE}; sine only', 'm, rad', (0.0,) * 6,
               sizes=(6,)),
     Parameter('motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
-              (0.5,), sizes=(1, 6), minimum=0.0),
+              (0.5,), sizes=(1, 6), minimum=0.0, maximum=1e3),
     Parameter('motion.phase', 'double', f'of {_POSE}; sine only', 'rad', (0.0,) * 6, sizes=(6,)),
 )})
 
@@ -84,10 +86,15 @@ def sample_times(parameters: TrajectoryParameters) -> NDArray[np.int64]:
     The last is at the duration or, where no sample falls on it, the next one after it: a
     motion that ends at rest is then seen to end.
     """
-    exact = parameters['motion.duration'] * parameters['rate']
+    return sample_time(parameters, np.arange(sample_count(parameters)))
+
+
+def sample_count(parameters: TrajectoryParameters) -> int:
+    """Return how many times ``sample_times`` has."""
+    exact: float = parameters['motion.duration'] * parameters['rate']
     near = round(exact)
-    last = near if math.isclose(exact, near, rel_tol=1e-12, abs_tol=1e-9) else math.ceil(exact)
-    return sample_time(parameters, np.arange(last + 1))
+    is_near = math.isclose(exact, near, rel_tol=1e-12, abs_tol=1e-9)
+    return 1 + (near if is_near else math.ceil(exact))
 
 
 def sample_time(parameters: TrajectoryParameters, index: ArrayLike) -> NDArray[np.int64]:

@@ -35,7 +35,7 @@ from stewart_dynamics.inverse_dynamics import MOTION
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.rotation import to_quaternion
 from stewart_dynamics.trajectory import (
-    motion_at, sample_time, sample_times, TrajectoryParameters)
+    motion_at, sample_count, sample_time, TrajectoryParameters)
 
 # Samples are computed so many at once: one by one they cost more than to publish.
 _BLOCK = 256
@@ -62,10 +62,11 @@ class TrajectoryNode(Node):
         self._settings = declare_parameters(self, TrajectoryParameters)
         self._done = done
         self._loop = self._settings['loop']
-        self._samples = len(sample_times(self._settings))
+        self._samples = sample_count(self._settings)
         self._frame = self._settings['base_frame']
         self._index = 0
         self._block: Any = None
+        self._row()  # what cannot be computed is said before anything moves
         target = self._settings['target']
         qos = QoSProfile(depth=1000)
         if self._settings['output'] == 'combined':
@@ -112,10 +113,11 @@ class TrajectoryNode(Node):
             if now < -_SETTLE:
                 self._start += now + _SETTLE
                 now = -_SETTLE
-        if now >= 0:
+        stamp = self.get_clock().now().nanoseconds
+        if now >= 0 and stamp:  # simulated time stands at zero until there is a clock
             self._begun = True
             self._start += now
-            self._stamp = self.get_clock().now().nanoseconds
+            self._stamp = stamp
 
     def _row(self) -> list[list[float]]:
         """Return position, quaternion and the four rates of the sample that is due."""

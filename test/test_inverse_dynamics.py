@@ -17,8 +17,10 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from pathlib import Path
+import pickle
 import re
 import shutil
 import subprocess
@@ -492,13 +494,71 @@ def test_no_samples_give_no_results() -> None:
 
 
 @pytest.mark.parametrize(('wrench', 'text'), [
-    (np.zeros(5), 'must broadcast to'), (np.zeros((4, 6)), 'must broadcast to'),
-    ('push', 'must broadcast to'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
+    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'must broadcast'),
+    ('push', 'not an array of numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
 ])
 def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
     platform = StewartPlatform(symmetric_parameters())
     with pytest.raises(MotionError, match=f'wrench.*{text}'):
         platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
+
+
+def test_many_loads_on_one_pose_are_many_samples() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    motion = turned(0.1)
+    pose = Motion(motion.position[0], motion.rotation[0])
+    loads = random_wrench(platform.parameters, rng(), 4)
+    forces = platform.inverse_dynamics(pose, loads).forces
+    assert forces.shape == (4, 6)
+    for n in range(4):
+        assert np.array_equal(forces[n], platform.inverse_dynamics(pose, loads[n]).forces)
+
+
+@pytest.mark.parametrize('position', [[1e200, 0.0, 1.0], None], ids=['far', 'no length'])
+def test_a_leg_without_a_length_is_refused(position: Any) -> None:
+    p = symmetric_parameters()
+    platform = StewartPlatform(p)
+    if position is None:
+        position = p['geometry.base_joints'][1] - p['geometry.platform_joints'][1]
+    for function in (platform.jacobian, platform.mass_matrix, platform.gravity_vector):
+        with pytest.raises(MotionError, match='leg [1-6] would have a length'):
+            function(position, np.eye(3))
+    with pytest.raises(MotionError, match='leg [1-6] would have a length'):
+        platform.coriolis_matrix(position, np.eye(3), np.ones(3), np.ones(3))
+
+
+def test_a_pose_that_overflows_has_no_lengths() -> None:
+    with pytest.raises(MotionError, match='overflow'):
+        StewartPlatform(symmetric_parameters()).inverse_kinematics([1e200, 0.0, 1.0], np.eye(3))
+
+
+def test_where_machine_code_cannot_be_kept_it_is_compiled_at_every_start(
+        tmp_path: Path) -> None:
+    shutil.copytree(PACKAGE, tmp_path / 'stewart_dynamics',
+                    ignore=shutil.ignore_patterns('__pycache__'))
+    code = """
+import numba.core.caching as caching
+caching.CacheImpl._locator_classes = []
+from stewart_dynamics import compiled, inverse_dynamics
+print(compiled.HINT)
+print(inverse_dynamics.solve.py_func.__name__)
+"""
+    printed = run(code, path=tmp_path).splitlines()
+    if COMPILED:
+        assert 'NUMBA_CACHE_DIR' in printed[0]
+        assert printed[1] == 'solve'
+
+
+def test_a_platform_can_be_copied_and_sent_to_another_process() -> None:
+    platform = StewartPlatform(random_parameters(rng()))
+    motion = random_motion(platform.parameters, rng(), 3)
+    truth = platform.inverse_dynamics(motion).forces
+    for other in (copy.deepcopy(platform), pickle.loads(pickle.dumps(platform))):
+        assert np.array_equal(other.inverse_dynamics(motion).forces, truth)
+        assert other.parameters == platform.parameters
+        assert hash(other.parameters) == hash(platform.parameters)
+        assert not other.parameters['geometry.base_joints'].flags.writeable
+    assert platform.parameters != platform.parameters.replaced({'platform.mass': 1.5})
 
 
 # Compiled and not

@@ -673,10 +673,16 @@ def test_a_payload_is_picked_up_while_active(as_before: DynamicsNode) -> None:
     laden = StewartPlatform(node.platform.parameters.replaced(payload))
     state = node.answer(MOVING, platform=laden)
     assert bits(state.effort) != bits(node.result_of(MOVING).forces)
-    # One by one through the other service.
-    answer = node.call('set_parameters', SetParameters.Request(
-        parameters=[RosParameter('platform.mass', value=150.0).to_parameter_msg()]))
-    assert [each.successful for each in answer.results] == [True]
+    # Through the other service as well it is all of a request or nothing.
+    def ask(**changes: Any) -> list[bool]:
+        answer = node.call('set_parameters', SetParameters.Request(parameters=[
+            RosParameter(f'platform.{name}', value=value).to_parameter_msg()
+            for name, value in changes.items()]))
+        return [each.successful for each in answer.results]
+
+    assert ask(mass=99.0, inertia=[1.0, 9.0, 0.0, 1.0, 0.0, 1.0]) == [False, False]
+    node.answer(MOVING, platform=laden)
+    assert ask(mass=150.0) == [True]
     lighter = StewartPlatform(laden.parameters.replaced({'platform.mass': 150.0}))
     node.answer(MOVING, platform=lighter)
 

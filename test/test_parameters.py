@@ -28,7 +28,7 @@ from referees import ROOT
 from ruamel.yaml import YAML
 
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.parameters import PARAMETERS
+from stewart_dynamics.parameters import PARAMETERS, read_yaml
 
 GOOD = """\
 /**:
@@ -261,7 +261,9 @@ BAD = {
     'a tab': ('      mass: 150.0', '\tmass: 150.0', ['not YAML', 'line']),
     'duplicate keys': ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n', [
         'not YAML', 'duplicate key', 'mass', 'line']),
-    'an anchor of nothing': ('mass: 150.0', 'mass: *m', ['not YAML', 'undefined alias', 'm']),
+    'an alias, which ROS refuses': (
+        'mass: 150.0', 'mass: *m', ['alias', 'write the value out']),
+    'a name without a value': ('mass: 150.0', 'mass:', ['platform.mass', 'has no value']),
     'a date that is none': ('mass: 150.0', 'mass: 2020-20-20', ['not YAML', 'month']),
     'two documents': ('/**:', 'a: 1\n---\n/**:', ['not YAML', 'single document']),
     'no section of ours': ('/**:', 'other_node:', [
@@ -326,7 +328,9 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
 
 
 @pytest.mark.parametrize('text, said', [
-    ('x: &a {b: *a}', 'nest deeper'), ('a: !!bool foo', 'not YAML'),
+    ('x: &a {b: *a}', 'alias'),
+    ('x: {y: {a: {b: {c: {d: {e: {f: {g: {h: 1.0}}}}}}}}}', 'nest deeper'),
+    ('a: !!bool foo', 'not YAML'),
     ('a: !!float ""', 'not YAML'), ('a: !!int ""', 'not YAML'),
     ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
 def test_yaml_that_its_library_chokes_on_is_refused_in_one_line(
@@ -343,7 +347,7 @@ def test_yaml_that_its_library_chokes_on_is_refused_in_one_line(
 def test_what_yaml_leaves_empty_takes_its_default() -> None:
     parameters = Parameters({**GIVEN, 'gravity': None, 'joints': None,
                              'singularity.warn_condition': None, 'limits.force_max': None})
-    assert dict(parameters.given) == GIVEN
+    assert set(parameters.given) == set(GIVEN)
     assert parameters['gravity'].tolist() == [0.0, 0.0, -9.80665]
     assert parameters['joints'] == tuple(f'leg_{n}' for n in range(1, 7))
 
@@ -397,3 +401,58 @@ def test_any_document_is_taken_or_refused_with_a_parameter_error(
         assert str(exc).startswith(f'{file}: ')
     else:
         assert set(parameters) == set(PARAMETERS)
+
+
+# Parameters of ROS, and of nodes with other names
+
+@pytest.mark.parametrize('name', [
+    'use_sim_time: false',
+    'qos_overrides: {/a/setpoint/pose: {subscription: {reliability: best_effort}}}'])
+def test_what_ros_declares_itself_is_left_to_it(tmp_path: Path, name: str) -> None:
+    path = tmp_path / 'machine.yaml'
+    path.write_text(f'/**:\n  ros__parameters:\n    platform.mass: 3.0\n    {name}\n')
+    assert read_yaml(path, 'stewart_dynamics') == {'platform.mass': 3.0}
+    Parameters.check_file(path)
+
+
+@pytest.mark.parametrize('section, node, meant', [
+    ('/**', 'stewart_dynamics', True), ('/**', '/a/b', True), ('stewart_dynamics', '', True),
+    ('/a/b', 'a/b', True), ('b', '/a/b', False), ('/*/b', '/a/b', True), ('/**/b', '/a/c/b', True),
+    ('/*/b', '/a/c/b', False), ('stewart.dynamics', '', False)])
+def test_sections_are_matched_as_ros_matches_them(
+        tmp_path: Path, section: str, node: str, meant: bool) -> None:
+    path = tmp_path / 'machine.yaml'
+    path.write_text(f"'{section}': {{ros__parameters: {{platform: {{mass: 7.0}}}}}}\n")
+    if meant:
+        assert read_yaml(path, node or Parameters.node) == {'platform.mass': 7.0}
+    else:
+        with pytest.raises(ParameterError, match='no parameters under'):
+            read_yaml(path, node or Parameters.node)
+
+
+def test_a_file_of_a_hundred_megabytes_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / 'machine.yaml'
+    with path.open('wb') as file:
+        file.truncate(100_000_000)
+    with pytest.raises(ParameterError, match='larger than 1000000 bytes'):
+        Parameters.from_yaml(path)
+
+
+def test_parameters_are_taken_from_numpy_and_from_parameters() -> None:
+    parameters = Parameters({name: np.array(value) if isinstance(value, list) else value
+                             for name, value in GIVEN.items()})
+    assert parameters == Parameters(GIVEN)
+    assert Parameters(dict(parameters)) == parameters
+    joints = list(parameters['geometry.base_joints'].ravel())
+    assert parameters.replaced({'geometry.base_joints': joints}) == parameters
+    assert parameters != 1
+
+
+def test_what_was_given_cannot_be_changed_behind_its_back() -> None:
+    given = {name: list(value) if isinstance(value, list) else value
+             for name, value in GIVEN.items()}
+    parameters = Parameters(given)
+    given['platform.inertia'].append(3.0)
+    assert parameters.replaced({'platform.mass': 2.0})['platform.mass'] == 2.0
+    with pytest.raises(TypeError):
+        parameters.given['platform.mass'] = 3.0  # type: ignore[index]

@@ -557,7 +557,7 @@ def test_a_folder_that_is_no_bag(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize(('text', 'words'), [
-    ('/**: *x', 'not YAML'), ('a: b', "no parameters under '/**:'"),
+    ('/**: [', 'not YAML'), ('a: b', "no parameters under '/**:'"),
     (PARAMS.read_text(encoding='utf-8').replace('mass: 150.0', 'mass: -1.0'),
      'platform.mass: -1.0 kg: must be more than 0'),
     ('/**: {ros__parameters: {platform: {mas: 1.0}}}', 'platform.mass'),

@@ -126,7 +126,7 @@ def test_messages_of_rclpy_are_joined() -> None:
     feed = Feed(source='pose')
     setpoint = feed(POSE, serialize_message(message))
     assert setpoint == (SECOND, (0.0,) * 3 + (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                        + (0.0,) * 12, NO_WRENCH)
+                        + (0.0,) * 12, NO_WRENCH, False)
 
 
 def test_stamps_a_nanosecond_apart_are_not_joined() -> None:
@@ -187,7 +187,7 @@ def test_a_combined_message_is_a_setpoint() -> None:
     setpoint = feed(COMBINED, messages.combined(
         SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
     assert setpoint == (SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)),
-                        NO_WRENCH)
+                        NO_WRENCH, False)
     assert feed.sample(COMBINED, SECOND) is None
     assert feed.counts == {(COMBINED, TWICE): 1}
 
@@ -197,7 +197,7 @@ def test_a_pose_alone_stands_still() -> None:
     assert feed.setpoints.topics == (POSE,)
     setpoint = feed.sample(POSE, SECOND, 0.25)
     assert setpoint == (SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12,
-                        NO_WRENCH)
+                        NO_WRENCH, False)
 
 
 # Refusing
@@ -387,13 +387,9 @@ def test_negative_stamps_are_stamps() -> None:
 @pytest.mark.parametrize('order', ORDERS)
 def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[str]) -> None:
     feed = Feed()
-    for topic in order:
-        first = feed.sample(topic, 0, 0.0)
-    assert first is not None
-    for topic in order[:2]:
-        for mark in (1.0, 2.0, 3.0):
-            assert feed.sample(topic, 0, mark) is None
     for mark in (1.0, 2.0, 3.0):
+        for topic in order[:2]:
+            assert feed.sample(topic, 0, mark) is None
         setpoint = feed.sample(order[2], 0, mark)
         assert setpoint is not None
         assert setpoint.stamp == NOW
@@ -416,23 +412,46 @@ def test_a_topic_that_speaks_earlier_is_not_joined_late(order: Sequence[str]) ->
     assert feed.counts == {(topic, NOT_JOINED): 2 for topic in early}
 
 
-def test_a_sample_without_a_stamp_waits_no_longer_than_the_timeout() -> None:
-    setpoints = Setpoints(PARAMETERS, lambda refusal, details: None, lambda text: None)
-    timeout = round(PARAMETERS['setpoint.timeout'] * 1e9)
+@pytest.mark.parametrize(('spoilt', 'arrives'), [
+    (TWIST, False), (ACCEL, False), (POSE, True), (TWIST, True), (ACCEL, True)])
+def test_a_lost_or_refused_sample_without_a_stamp_costs_its_setpoint_and_no_other(
+        spoilt: str, arrives: bool) -> None:
+    feed = Feed()
+    used = []
+    for n in range(1, 9):
+        for topic in TOPICS:
+            if n == 4 and topic == spoilt:
+                if arrives:
+                    assert feed.sample(topic, 0, math.nan) is None
+                continue
+            if (setpoint := feed.sample(topic, 0, float(n))) is not None:
+                marks = {setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]}
+                assert len(marks) == 1, marks
+                used += marks
+    assert used == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]
 
-    def take(topic: str, mark: float, now: int) -> Setpoint | None:
-        values = HOME if topic == POSE else REST
-        return setpoints.take(topic, WRITERS[topic](0, (mark, *values[1:])), now)
 
-    for topic in TOPICS:
-        take(topic, 0.0, NOW)
-    for n in (1, 2, 3):
-        assert take(POSE, float(n), NOW + n * timeout) is None
-    assert take(TWIST, 3.0, NOW + 3 * timeout + 1) is None
-    setpoint = take(ACCEL, 3.0, NOW + 3 * timeout + 2)
-    assert setpoint is not None
-    assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (3.0,) * 3
-    assert setpoints.counts == {(POSE, NOT_JOINED): 2}
+def test_a_zero_stamp_among_others_is_a_time() -> None:
+    feed = Feed()
+    assert feed.sample(POSE, 0) is None
+    assert feed.whole(20 * MS) is not None
+    assert feed.counts == {(POSE, NOT_JOINED): 1}
+    assert feed.sample(POSE, 0) is None
+    assert feed.counts == {(POSE, NOT_JOINED): 1, (POSE, TOO_OLD): 1}
+    assert not feed.notices[1:]
+
+
+def test_a_setpoint_after_a_jump_back_says_so() -> None:
+    feed = Feed()
+    setpoints = [feed.whole(stamp) for stamp in (SECOND, 2 * SECOND, SECOND, SECOND + MS)]
+    assert [setpoint.restart for setpoint in setpoints if setpoint] == [False, False, True, False]
+
+
+def test_stamps_of_a_setpoint_lie_within_the_tolerance_of_each_other() -> None:
+    feed = Feed(sync_tolerance=0.004)
+    for n in range(1, 20):
+        for topic, shift in ((POSE, 0), (TWIST, 3), (ACCEL, -3)):
+            assert feed.sample(topic, (10 * n + shift) * MS) is None
 
 
 def test_a_sample_used_within_the_tolerance_is_not_used_again() -> None:
@@ -462,20 +481,16 @@ def test_a_single_topic_needs_no_stamp(source: str) -> None:
 # Bounds
 
 @pytest.mark.parametrize('silent', TOPICS)
-@pytest.mark.parametrize('stamped', [True, False])
-def test_what_waits_is_bounded(silent: str, stamped: bool) -> None:
+def test_what_waits_is_bounded(silent: str) -> None:
     feed = Feed()
     many = WAITING + 50
-    if not stamped:
-        for topic in TOPICS:
-            feed.sample(topic, 0)
     for n in range(1, many + 1):
         for topic in TOPICS:
             if topic != silent:
-                feed.sample(topic, n * MS if stamped else 0, float(n))
+                feed.sample(topic, n * MS, float(n))
     assert feed.counts == {(topic, NOT_JOINED): 50 for topic in TOPICS if topic != silent}
     # the oldest are given up, the newest are still there
-    answers = [feed.sample(silent, n * MS if stamped else 0) for n in range(1, many + 1)]
+    answers = [feed.sample(silent, n * MS) for n in range(1, many + 1)]
     used = [answer.motion[0 if silent != POSE else 12] for answer in answers if answer]
     assert used == [float(n) for n in range(51, many + 1)]
 
@@ -490,9 +505,6 @@ def test_memory_does_not_grow_while_a_topic_is_silent(stamped: bool) -> None:
                 data = WRITERS[topic](n * MS if stamped else 0)
                 assert setpoints.take(topic, data, NOW) is None
 
-    if not stamped:
-        for topic in TOPICS:
-            setpoints.take(topic, WRITERS[topic](0), NOW)
     feed(1, 1000)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
@@ -502,7 +514,7 @@ def test_memory_does_not_grow_while_a_topic_is_silent(stamped: bool) -> None:
     grown = tracemalloc.get_traced_memory()[0] - before - whole
     tracemalloc.stop()
     assert abs(grown) < 30_000
-    assert sum(setpoints.counts.values()) == 2 * (7999 - WAITING)
+    assert sum(setpoints.counts.values()) == 2 * (7999 - (WAITING if stamped else 1))
 
 
 # Quaternions
@@ -570,17 +582,6 @@ def _drained(feed: Feed, answers: list[Setpoint]) -> None:
     final = [answer for topic in TOPICS if (answer := feed.sample(topic, far))]
     assert len(final) == 1
     answers += final
-    # who lacks a partner among those without a stamp gets one
-    for topic in TOPICS:
-        for _ in range(WAITING):
-            used = len(answers) + sum(n for (t, _), n in feed.counts.items() if t == topic)
-            if used == feed.given[topic]:
-                break
-            for other in TOPICS:
-                waits = feed.given[other] - len(answers) - sum(
-                    n for (t, _), n in feed.counts.items() if t == other)
-                if other != topic and not waits and (answer := feed.sample(other, 0)):
-                    answers.append(answer)
 
 
 @settings(derandomize=True, deadline=None, max_examples=250)

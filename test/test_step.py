@@ -336,3 +336,12 @@ def test_only_finite_numbers_are_published_whatever_the_machine(
         'platform.mass': mass, 'legs.piston.mass': leg_mass,
         'geometry.zero_length': zero_length}))
     _check_finite(step, Setpoint(STAMP, (*position, *rotation, *rates)), NO_WRENCH)
+
+
+def test_a_restart_is_no_crossing() -> None:
+    before = Singularity(warning=True, stopped=True, determinant=-0.2, crossings=1)
+    output = STEP(HOME._replace(restart=True), before)
+    assert output is not None
+    assert output.singularity.crossings == 1
+    assert not output.singularity.warning
+    assert output.warning_changed
