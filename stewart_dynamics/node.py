@@ -218,8 +218,11 @@ class DynamicsNode(LifecycleNode):
         rclpy sets one after the other, and keeps the first when it refuses the second.
         """
         def set_together(request: Any, response: Any) -> Any:
-            result = self.set_parameters_atomically(
-                [RosParameter.from_parameter_msg(message) for message in request.parameters])
+            try:
+                result = self.set_parameters_atomically(
+                    [RosParameter.from_parameter_msg(message) for message in request.parameters])
+            except (RuntimeError, TypeError, ValueError) as exc:  # a type that does not exist
+                result = SetParametersResult(successful=False, reason=str(exc))
             response.results = [result] * len(request.parameters)
             return response
 

@@ -137,8 +137,8 @@ class StewartPlatform:
         large batches use all processors.
         """
         # Another layout in memory would be compiled for anew, for seconds.
-        rows = np.require(rows, float, ['C', 'W'])
-        wrenches = self._no_wrench if wrenches is None else np.require(wrenches, float, ['C', 'W'])
+        rows = _compiled_for(rows)
+        wrenches = self._no_wrench if wrenches is None else _compiled_for(wrenches)
         results = np.empty((len(rows), runtime.RESULT))
         threads = min(_CPUS, len(rows) // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
         if threads < 2:
@@ -232,6 +232,13 @@ class StewartPlatform:
             # [()] makes a number of an array without a shape
             results[..., runtime.DETERMINANT][()], results[..., runtime.DETERMINANT_RATE][()],
             results[..., runtime.CONDITION][()])
+
+
+def _compiled_for(array: Array) -> Array:
+    """Return the array, or a copy of it that the runtime path is compiled for."""
+    if array.flags.carray and array.dtype.char == 'd':
+        return array
+    return np.require(array, float, ['C', 'W'])
 
 
 def _machine_numbers(p: Parameters) -> Array:

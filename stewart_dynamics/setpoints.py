@@ -105,6 +105,7 @@ class Setpoints:
         self._waiting: dict[str, dict[int, tuple[float, ...]]] = {t: {} for t in self.topics}
         self._unstamped: dict[str, tuple[float, ...] | None] = {}
         self._unstamped_said = False
+        self._unstamped_first = ''
         self._stamped: set[str] = set()
 
     def take_wrench(self, data: bytes) -> None:
@@ -242,15 +243,15 @@ class Setpoints:
         """
         Join samples without a stamp in their order of arrival; one without values was refused.
 
-        What comes between two samples of one topic is one setpoint. What is incomplete when the
-        next sample comes is given up, all of it: else one lost sample would join the following
-        ones wrongly for ever.
+        A setpoint begins with the topic that began the first one, and has one sample of each.
+        What is incomplete when the next one begins is given up, all of it: else a lost sample
+        would join the following ones wrongly for ever.
         """
         if not self._unstamped_said:
             self._unstamped_said = True
             self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
                           'of arrival and stamped with the clock')
-        if topic in self._unstamped:
+        if topic in self._unstamped or topic == self._unstamped_first:
             self._give_up_unstamped()
         self._unstamped[topic] = values
         if len(self._unstamped) < len(self.topics):
@@ -260,6 +261,7 @@ class Setpoints:
         if len(sound) < len(in_order):
             self._give_up_unstamped()
             return None
+        self._unstamped_first = self._unstamped_first or next(iter(self._unstamped))
         self._unstamped.clear()
         return Setpoint(now, self._motion(sound), self.wrench)
 

@@ -673,6 +673,7 @@ def test_a_payload_is_picked_up_while_active(as_before: DynamicsNode) -> None:
     laden = StewartPlatform(node.platform.parameters.replaced(payload))
     state = node.answer(MOVING, platform=laden)
     assert bits(state.effort) != bits(node.result_of(MOVING).forces)
+
     # Through the other service as well it is all of a request or nothing.
     def ask(**changes: Any) -> list[bool]:
         answer = node.call('set_parameters', SetParameters.Request(parameters=[

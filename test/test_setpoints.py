@@ -413,7 +413,7 @@ def test_a_topic_that_speaks_earlier_is_not_joined_late(order: Sequence[str]) ->
 
 
 @pytest.mark.parametrize(('spoilt', 'arrives'), [
-    (TWIST, False), (ACCEL, False), (POSE, True), (TWIST, True), (ACCEL, True)])
+    (POSE, False), (TWIST, False), (ACCEL, False), (POSE, True), (TWIST, True), (ACCEL, True)])
 def test_a_lost_or_refused_sample_without_a_stamp_costs_its_setpoint_and_no_other(
         spoilt: str, arrives: bool) -> None:
     feed = Feed()
@@ -429,6 +429,19 @@ def test_a_lost_or_refused_sample_without_a_stamp_costs_its_setpoint_and_no_othe
                 assert len(marks) == 1, marks
                 used += marks
     assert used == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0]
+
+
+def test_samples_without_stamps_that_come_in_bunches_are_lost_but_never_mixed() -> None:
+    feed = Feed()
+    assert feed.whole(0, 1.0) is not None
+    for topic in TOPICS:
+        for mark in (2.0, 3.0, 4.0):
+            assert feed.sample(topic, 0, mark) is None
+    for mark in (5.0, 6.0, 7.0):
+        setpoint = feed.whole(0, mark)
+        assert setpoint is not None
+        assert (setpoint.motion[0], setpoint.motion[12], setpoint.motion[18]) == (mark,) * 3
+    assert feed.counts == {(topic, NOT_JOINED): 3 for topic in TOPICS}
 
 
 def test_a_zero_stamp_among_others_is_a_time() -> None:
