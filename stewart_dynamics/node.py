@@ -38,8 +38,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from stewart_dynamics import setpoints as inputs
 from stewart_dynamics import compiled
+from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters import is_of_ros, Parameters

@@ -250,6 +250,7 @@ class ParameterSet(Mapping[str, Any]):
         Parameters
         ----------
         path : str or Path
+            The file.
         node : str
             The node's name, with its namespace if it has one, where it is not the usual one.
 

@@ -37,8 +37,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics import setpoints as inputs
 from stewart_dynamics import compiled
+from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.setpoints import Refusal, Setpoints
