@@ -208,9 +208,9 @@ class StewartPlatform:
     def _rows(self, motion: Motion, wrench: ArrayLike | None,
               ) -> tuple[Array, Array, tuple[int, ...]]:
         """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
-        rows = motion.rows.reshape(-1, runtime.MOTION)
+        rows = motion.rows
         if wrench is None:
-            return rows, self._no_wrench, motion.shape
+            return rows.reshape(-1, runtime.MOTION), self._no_wrench, motion.shape
         load = as_array('wrench', wrench, (runtime.WRENCH,))
         try:
             shape = np.broadcast_shapes(motion.shape, load.shape[:-1])
@@ -218,7 +218,7 @@ class StewartPlatform:
             raise MotionError(f'wrench: shape {load.shape}: must broadcast against the '
                               f"motion's {motion.shape}") from exc
         if shape != motion.shape:
-            rows = np.array(np.broadcast_to(motion.rows, (*shape, runtime.MOTION)), order='C')
+            rows = np.array(np.broadcast_to(rows, (*shape, runtime.MOTION)), order='C')
         loads = np.array(np.broadcast_to(load, (*shape, runtime.WRENCH)), order='C')
         return rows.reshape(-1, runtime.MOTION), loads.reshape(-1, runtime.WRENCH), shape
 
