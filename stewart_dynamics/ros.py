@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 import signal
 import sys
 from typing import Any, TypeVar
@@ -35,6 +36,9 @@ from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
 
 # The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
 _SPIN_SECONDS = 10.0
+
+# What is the user's to mend, said in one line: all else is a fault of ours.
+_OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
 
 Kind = TypeVar('Kind', bound=ParameterSet)
 
@@ -150,10 +154,12 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         return int(stop.result() or 0) if stop.done() else 0
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         return 0
-    except (StewartError, RCLError, UnknownROSArgsError, NameValidationException) as exc:
+    except Exception as exc:
         starting = False
-        if not rclpy.ok() and signals:
-            return 0  # cut short by a signal
+        if signals and not rclpy.ok():
+            return 0  # a signal has shut ROS down in the middle of anything
+        if not isinstance(exc, _OF_THE_USER):
+            raise
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
         return 1
     finally:
@@ -163,4 +169,5 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
             executor.shutdown()
         if node is not None:
             node.destroy_node()
-        rclpy.try_shutdown()
+        with suppress(RCLError):  # a signal's own shutdown may come between check and call
+            rclpy.try_shutdown()
