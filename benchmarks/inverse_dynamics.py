@@ -288,13 +288,13 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     row, result = rows[:1].copy(), np.empty((1, runtime.RESULT))
     q, v, a, _ = tree.state(one)
     single = [
-        Contestant('`inverse_dynamics.solve`, one row: what the node calls', repeated(
+        Contestant('`inverse_dynamics.solve`, one row: the compiled step', repeated(
             'solve(machine, rows, wrenches, results)', solve=runtime.solve, machine=numbers,
             rows=row, wrenches=no_wrench, results=result), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),
-        Contestant('`StewartPlatform.solve`, one row', repeated(
+        Contestant('`StewartPlatform.solve`, one row: what the node calls', repeated(
             'solve(rows)', solve=machine.solve, rows=row), RNEA),
         Contestant('`StewartPlatform.inverse_dynamics`, one `Motion`', repeated(
             'solve(motion)', solve=machine.inverse_dynamics, motion=one), RNEA),

@@ -258,13 +258,17 @@ class DynamicsNode(LifecycleNode):
             return
         if isinstance(self.executor, SingleThreadedExecutor):
             self._take_what_has_come()
-        while len(self._waiting) > _BACKLOG:
-            for _ in range(len(self._waiting) - 1):
-                passed = self._waiting.popleft()
+        if len(self._waiting) > _BACKLOG:
+            newest = self._waiting.pop()
+            for passed in self._waiting:
                 self._setpoints.refuse('setpoint', PASSED_OVER, f'stamp {passed.stamp} ns')
+            restart = newest.restart or any(passed.restart for passed in self._waiting)
+            self._waiting.clear()
+            self._waiting.append(newest._replace(restart=restart))
         while self._waiting:
             setpoint = self._waiting.popleft()
-            output = self._step(setpoint, self._last_singularity())
+            before = None if self._last is None else self._last.singularity
+            output = self._step(setpoint, before)
             if output is None:
                 self._setpoints.refuse(
                     'setpoint', inputs.OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
@@ -291,9 +295,6 @@ class DynamicsNode(LifecycleNode):
                 if taken is not None:
                     came = True
                     self._on_setpoint(topic, taken[0])
-
-    def _last_singularity(self) -> Any:
-        return None if self._last is None else self._last.singularity
 
     # -- words ----------------------------------------------------------------------------
 
