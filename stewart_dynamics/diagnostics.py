@@ -45,17 +45,17 @@ class Status(NamedTuple):
 
 
 class _Held:
-    """The worst level and its words for as long as it holds."""
+    """Levels and their words for as long as they hold; the worst one counts."""
 
     def __init__(self) -> None:
-        self._level, self._message, self._until = OK, '', 0.0
+        self._seen: dict[int, tuple[float, str]] = {}
 
     def see(self, level: int, message: str, now: float) -> None:
-        if level >= self._level or now >= self._until:
-            self._level, self._message, self._until = level, message, now + _HOLD_SECONDS
+        self._seen[level] = now + _HOLD_SECONDS, message
 
     def at(self, now: float) -> tuple[int, str]:
-        return (self._level, self._message) if now < self._until else (OK, '')
+        return max(((level, message) for level, (until, message) in self._seen.items()
+                    if now < until), default=(OK, ''))
 
 
 class Diagnostics:
@@ -87,6 +87,8 @@ class Diagnostics:
         self._worst_condition = 1.0
         self._refused, self._singularity, self._limits = _Held(), _Held(), _Held()
         self._levels: tuple[int, ...] = ()
+        # of the last output, singularity and limits: they hold until another one comes
+        self._states: tuple[tuple[int, str], tuple[int, str]] = (OK, ''), (OK, '')
         self.writers: dict[str, int] = {}
 
     def heard(self, topic: str, now: float) -> None:
@@ -105,17 +107,11 @@ class Diagnostics:
         self._answered_at = now
         self._output = output
         self._worst_condition = max(self._worst_condition, output.condition)
-        state = output.singularity
-        if output.demanded_forces is None:
-            self._singularity.see(ERROR, 'J_inv cannot be solved: no forces', now)
-        elif state.stopped:
-            self._singularity.see(
-                ERROR, 'inside stop_condition' + (
-                    ': forces suppressed' if output.forces is None else ''), now)
-        elif state.warning:
-            self._singularity.see(WARN, state.cause.value, now)
-        if output.excesses:
-            self._limits.see(ERROR, ', '.join(map(self._words, output.excesses)), now)
+        self._states = _singularity_of(output), self._limits_of(output)
+        for held, (level, message) in zip((self._singularity, self._limits), self._states,
+                                          strict=True):
+            if level > OK:
+                held.see(level, message, now)
         return self.level_changed(now)
 
     def level_changed(self, now: float) -> bool:
@@ -132,18 +128,30 @@ class Diagnostics:
         return statuses
 
     def _current_levels(self, now: float) -> tuple[int, ...]:
-        return (self._setpoint_level(now)[0], self._singularity.at(now)[0],
-                self._limits.at(now)[0])
+        return (self._setpoint_level(now)[0], self._level_of(0, now)[0],
+                self._level_of(1, now)[0])
+
+    def _level_of(self, which: int, now: float) -> tuple[int, str]:
+        held = (self._singularity, self._limits)[which]
+        return max(self._states[which], held.at(now), key=lambda state: state[0])
+
+    def _limits_of(self, output: Output) -> tuple[int, str]:
+        if output.excesses:
+            return ERROR, ', '.join(map(self._words, output.excesses))
+        return OK, ''
 
     def _setpoint_level(self, now: float) -> tuple[int, str]:
         timeout = self.parameters['setpoint.timeout']
+        tolerance = self.parameters['setpoint.sync_tolerance']
         if now - self._answered_at > timeout or not self._answered:
             silent = [f'{topic} ' + ('never came' if self._silent[topic]
                                      else f'silent for {now - at:.1f} s')
                       for topic, at in self._heard.items() if now - at > timeout
                       or self._silent[topic]]
-            return STALE, 'no setpoint' + (': ' + ', '.join(silent) if silent else
-                                           ': all topics speak, but none is joined')
+            why = ', '.join(silent) or (
+                'all topics speak, but none is joined: their stamps differ by more than '
+                f'setpoint.sync_tolerance, {tolerance:g} s')
+            return STALE, f'no setpoint: {why}'
         several = [f'{topic} has {n} writers' for topic, n in self.writers.items() if n > 1]
         if several:
             return ERROR, ', '.join(several)
@@ -164,7 +172,7 @@ class Diagnostics:
         return Status('setpoints', level, message or 'answered', tuple(values))
 
     def _report_singularity(self, now: float) -> Status:
-        level, message = self._singularity.at(now)
+        level, message = self._level_of(0, now)
         output = self._output
         if output is None:
             return Status('singularity', level, 'no setpoint yet', ())
@@ -182,7 +190,7 @@ class Diagnostics:
             ('its leg', self.parameters['joints'][worst])))
 
     def _report_limits(self, now: float) -> Status:
-        level, message = self._limits.at(now)
+        level, message = self._level_of(1, now)
         output = self._output
         if output is None:
             return Status('limits', level, 'no setpoint yet', ())
@@ -204,3 +212,13 @@ class Diagnostics:
         how = ', clipped' if quantity == 'force' else ''
         return (f'{self.parameters["joints"][excess.leg]}: {quantity} {excess.value:.6g} {unit} '
                 f'is {beyond:.6g} {unit} beyond {excess.limit}{how}')
+
+
+def _singularity_of(output: Output) -> tuple[int, str]:
+    state = output.singularity
+    if output.demanded_forces is None:
+        return ERROR, 'J_inv cannot be solved: no forces'
+    if state.stopped:
+        return ERROR, 'inside stop_condition' + (
+            ': forces suppressed' if output.forces is None else '')
+    return (WARN, state.cause.value) if state.warning else (OK, '')

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 import time
 from typing import Any
@@ -40,7 +40,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from stewart_dynamics import compiled
 from stewart_dynamics import setpoints as inputs
-from stewart_dynamics.diagnostics import Diagnostics
+from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters import is_of_ros, Parameters
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
@@ -121,6 +121,7 @@ class DynamicsNode(LifecycleNode):
         self._last: Output | None = None
         self._reported = now
         self._said.clear()
+        self._logged: dict[str, int] = {}
         self._active = True
         return TransitionCallbackReturn.SUCCESS
 
@@ -334,14 +335,29 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         self._reported = now
         name = self.get_fully_qualified_name().lstrip('/')
+        statuses = self._diagnostics.report(now)
+        self._log_changes(statuses[1:])
         array = DiagnosticArray(status=[
             DiagnosticStatus(
                 level=bytes([status.level]), name=f'{name}: {status.name}',
                 message=status.message, hardware_id=name,
                 values=[KeyValue(key=key, value=value) for key, value in status.values])
-            for status in self._diagnostics.report(now)])
+            for status in statuses])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics_publisher.publish(array)
+
+    def _log_changes(self, statuses: Iterable[Status]) -> None:
+        for status in statuses:
+            if status.level != self._logged.get(status.name, OK):
+                self._logged[status.name] = status.level
+                text = f'{status.name}: {status.message}'
+                # each level its own call: rclpy takes a call's level for constant
+                if status.level == OK:
+                    self.get_logger().info(text)
+                elif status.level == WARN:
+                    self.get_logger().warning(text)
+                else:
+                    self.get_logger().error(text)
 
     # -- parameters -----------------------------------------------------------------------
 

@@ -65,6 +65,8 @@ class Replayed(NamedTuple):
     """They, and the messages that made the setpoints, are all that was read."""
     notices: tuple[str, ...]
     """What the node would say in its log."""
+    excesses: dict[tuple[str, int], tuple[int, float]]
+    """Of limits broken, by limit and leg: in how many setpoints, and the value farthest out."""
     limit_met: bool
     """A limit or a singularity warning was met."""
     unread: str
@@ -209,6 +211,7 @@ def replay(
     determinants: list[float] = []
     warnings: list[tuple[int, bool]] = []
     limit_met = False
+    excesses: dict[tuple[str, int], tuple[int, float]] = {}
     state: Singularity | None = None
     taken: Counter[str] = Counter()
     joined = 0
@@ -238,6 +241,11 @@ def replay(
                     if output.warning_changed:
                         warnings.append((output.stamp, state.warning))
                     limit_met = limit_met or state.warning or bool(output.excesses)
+                    for limit, leg, value, bound in output.excesses:
+                        number, worst = excesses.get((limit, leg), (0, bound))
+                        if abs(abs(value) - bound) > abs(abs(worst) - bound):
+                            worst = value
+                        excesses[limit, leg] = number + 1, worst
             finally:
                 outputs.close()
     finally:
@@ -249,7 +257,8 @@ def replay(
     summary = Summary.of(parameters['joints'], stamps, lengths, forces, determinants,
                          warnings) if stamps else None
     return Replayed(
-        path, summary, dict(setpoints.counts), tuple(notices), limit_met, bag.unread)
+        path, summary, dict(setpoints.counts), tuple(notices), excesses, limit_met,
+        bag.unread)
 
 
 def _one_line(exc: BaseException) -> str:
@@ -316,7 +325,7 @@ def _replay_one(path: Path, folder: Path, parameters: Parameters,
         result = replay(path, parameters, folder, '/' + options.node.strip('/'))
     except (StewartError, OSError) as exc:
         return _complain(exc)
-    _print(result)
+    _print(result, parameters['joints'])
     if result.unread:
         _complain(f'{path}: the rest could not be read: {result.unread}')
         return PARTLY_READ
@@ -328,9 +337,13 @@ def _complain(what: object) -> int:
     return BAD_INPUT
 
 
-def _print(result: Replayed) -> None:
+def _print(result: Replayed, legs: Sequence[str]) -> None:
     print(f'{result.bag}:')
     print(result.summary.table() if result.summary else 'no setpoint could be answered')
+    for (limit, leg), (number, worst) in sorted(result.excesses.items()):
+        print(f'{limit} broken by {legs[leg]} in {number} setpoints, farthest {worst:.6g}')
+    if result.summary and not result.excesses:
+        print('all limits held')
     for notice in result.notices:
         print(notice)
     for refusal, number in sorted(result.refusals.items()):

@@ -30,6 +30,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
@@ -109,6 +110,14 @@ def _executor() -> Executor:
     return EventsExecutor()
 
 
+def _usage(kind: type[ParameterSet]) -> str:
+    parameters = [f'  {name} ({parameter.ros_type}{parameter.unit and ", "}{parameter.unit}): '
+                  f'{parameter.text}' for name, parameter in kind.table.items()]
+    return '\n'.join([
+        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]', '',
+        'parameters:', *parameters])
+
+
 def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         done: Future | None = None) -> int:
     """
@@ -124,6 +133,9 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         When it is done, its result is the exit code.
 
     """
+    if {'-h', '--help'} & set(sys.argv[1:]):
+        print(_usage(kind))
+        return 0
     stop = done or Future()
     executor = node = None
     starting = True
@@ -144,6 +156,8 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
             raise ParameterError('--params-file is read only behind --ros-args')
         for path in parameter_files(sys.argv):
             kind.check_file(path)
+        for stray in remove_ros_args(sys.argv)[1:]:
+            raise ParameterError(f'{stray}: unknown argument; see --help')
         rclpy.init()
         node = make_node()
         executor = _executor()

@@ -116,6 +116,10 @@ class TrajectoryNode(Node):
         stamp = self.get_clock().now().nanoseconds
         if now >= 0 and stamp:  # simulated time stands at zero until there is a clock
             self._begun = True
+            if not self._subscribed:
+                self.get_logger().warning('begun, but not every topic has a subscriber: '
+                                          + ', '.join(p.topic_name for p in self._outputs
+                                                      if not p.get_subscription_count()))
             self._start += now
             self._stamp = stamp
 

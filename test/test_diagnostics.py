@@ -117,7 +117,8 @@ def test_topics_that_all_speak_but_do_not_meet_are_stale() -> None:
         diagnostics.heard(topic, BEGIN + 1.0)
     of = status(diagnostics, 'setpoints', BEGIN + 1.02)
     assert (of.level, of.message) == (
-        STALE, 'no setpoint: all topics speak, but none is joined')
+        STALE, 'no setpoint: all topics speak, but none is joined: '
+        'their stamps differ by more than setpoint.sync_tolerance, 0 s')
 
 
 def test_the_timeout_is_that_of_the_parameters() -> None:
@@ -359,3 +360,21 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
             state = output.singularity
         diagnostics.writers = {POSE: 2}
         _check_values(diagnostics, now)
+
+
+def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
+    diagnostics = begun()
+    warned = CLEAR._replace(singularity=Singularity(warning=True, cause=Cause.CONDITION))
+    stopped = CLEAR._replace(singularity=Singularity(warning=True, stopped=True,
+                                                     cause=Cause.CONDITION))
+    answered(diagnostics, BEGIN, stopped)
+    levels = []
+    for n in range(1, 40):
+        at = BEGIN + 0.1 * n
+        answered(diagnostics, at, warned)
+        levels += [status(diagnostics, 'singularity', at + shift).level for shift in (0.0, 0.09)]
+    assert levels[0] == ERROR
+    assert levels[-1] == WARN
+    assert levels == sorted(levels, reverse=True), 'it was OK or rose in between'
+    # and when setpoints end there
+    assert status(diagnostics, 'singularity', BEGIN + 100.0).level == WARN

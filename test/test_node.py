@@ -1008,3 +1008,14 @@ def test_whatever_comes_nothing_but_numbers_goes_out_and_a_setpoint_is_answered(
         target.result_of(MOVING).lengths - target.platform.parameters['geometry.zero_length'])
     target.check_finite()
     assert_only_log_lines(target.program.stderr)
+
+
+@pytest.mark.parametrize('program', ['stewart_dynamics', 'stewart_trajectory'])
+def test_help_is_given_and_a_stray_argument_is_refused(program: str) -> None:
+    path = Path(sys.executable).with_name(program)
+    said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
+    assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')
+    assert not said.stderr
+    refused = subprocess.run([path, 'foo'], capture_output=True, text=True, check=False)
+    assert refused.returncode == 1
+    assert refused.stderr == f'{program}: foo: unknown argument; see --help\n'

@@ -857,3 +857,15 @@ def test_the_library_raises_what_the_program_says(tmp_path: Path) -> None:
     assert (result.bag, result.unread, result.notices) == (ROOT / 'bags' / 'clear', '', ())
     assert not result.limit_met
     assert result.refusals == {}
+
+
+def test_limits_that_are_broken_are_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / 'machine.yaml'
+    text = PARAMS.read_text(encoding='utf-8')
+    file.write_text(text.replace('force_max: 6000.0', 'force_max: 500.0'))
+    for params, said in ((PARAMS, 'all limits held'),
+                         (file, 'limits.force_max broken by leg_4 in ')):
+        assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
+                     '--output', str(tmp_path / params.stem)]) == 0
+        assert said in capsys.readouterr().out
