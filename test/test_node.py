@@ -510,7 +510,9 @@ def test_what_is_missing_is_said_once_and_gives_the_same_bits(
     node.until_active()
     for sample in (HOME, MOVING, TURNED, LEAPING):
         node.answer(sample)
-    warnings = log_lines(node.program.stderr, 'WARN')
+    # one of the samples is near a singularity, which is said as well
+    warnings = [line for line in log_lines(node.program.stderr, 'WARN')
+                if ': singularity: ' not in line]
     assert len(warnings) == 1
     assert said in warnings[0]
     node.stop()
