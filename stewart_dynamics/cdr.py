@@ -30,12 +30,13 @@ from struct import Struct
 from typing import NamedTuple
 
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
+# A builtin_interfaces/Time holds stamps below it [ns].
+STAMPS_END = 2 ** 31 * 1_000_000_000
 
 _TIME_AND_LENGTH = {0: Struct('>iII'), 1: Struct('<iII')}
 _SIX = {0: Struct('>6d'), 1: Struct('<6d')}
 _SEVEN = {0: Struct('>7d'), 1: Struct('<7d')}
 _COUNT = {0: Struct('>I'), 1: Struct('<I')}
-_STAMPS_END = 2 ** 31 * 1_000_000_000
 _DURATION = {0: Struct('>iI'), 1: Struct('<iI')}
 
 
@@ -204,7 +205,7 @@ class JointState:
 
 def is_stamp(nanoseconds: int) -> bool:
     """Return whether a builtin_interfaces/Time can hold it: until 2038, a clock may be beyond."""
-    return -_STAMPS_END <= nanoseconds < _STAMPS_END
+    return -STAMPS_END <= nanoseconds < STAMPS_END
 
 
 def finite(values: Sequence[float]) -> bool:

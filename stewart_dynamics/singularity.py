@@ -27,7 +27,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stewart_dynamics.compiled import inlined
 from stewart_dynamics.parameters import Parameters
+
+Array = NDArray[np.float64]
 
 # From here on a solution of J_inv^T f = wrench keeps fewer than four of its sixteen digits:
 # forces are neither computed nor published.
@@ -55,6 +58,41 @@ class Cause(Enum):
     CROSSED = 'det(J) changed its sign since the last sample'
 
 
+CAUSES = tuple(Cause)
+
+
+@inlined
+def state_after(
+        thresholds: Array, warned: bool, stopped: bool, last: float, determinant: float,
+        determinant_rate: float, condition: float) -> tuple[int, bool, float]:
+    """
+    Return cause of the warning (its place in Cause), inside stop_condition, time to crossing.
+
+    Parameters
+    ----------
+    thresholds : (3,)
+        warn_condition, stop_condition, warn_time.
+    warned, stopped : bool
+        Of the sample before.
+    last : float
+        det(J) of the last sample that had not zero; 0 where there was none.
+    determinant, determinant_rate, condition : float
+        Of the sample.
+
+    """
+    time = -determinant / determinant_rate if determinant_rate != 0.0 else np.inf
+    if not time >= 0.0:
+        time = np.inf
+    cause = 0
+    if determinant * last < 0.0:
+        cause = 3
+    elif condition >= thresholds[0] * (LEAVING if warned else 1.0):
+        cause = 1
+    elif time < thresholds[2] / (LEAVING if warned else 1.0):
+        cause = 2
+    return cause, condition >= thresholds[1] * (LEAVING if stopped else 1.0), time
+
+
 class Singularity(NamedTuple):
     """The state of the warning after a sample; the first sample follows Singularity()."""
 
@@ -63,6 +101,7 @@ class Singularity(NamedTuple):
     """Inside stop_condition."""
     cause: Cause = Cause.NONE
     determinant: float = 0.0
+    """The last that was not zero."""
     time_to_crossing: float = np.inf
     crossings: int = 0
     """Changes of sign of det(J) so far."""
@@ -70,16 +109,16 @@ class Singularity(NamedTuple):
     def after(self, parameters: Parameters, determinant: float, determinant_rate: float,
               condition: float) -> Singularity:
         """Return the state after one more sample."""
-        crossed = determinant * self.determinant < 0.0
-        time = -determinant / determinant_rate if determinant_rate else np.inf
-        time = time if time >= 0.0 else np.inf
-        warn_at = parameters['singularity.warn_condition'] * (LEAVING if self.warning else 1.0)
-        stop_at = parameters['singularity.stop_condition'] * (LEAVING if self.stopped else 1.0)
-        warn_time = parameters['singularity.warn_time'] / (LEAVING if self.warning else 1.0)
-        cause = (Cause.CROSSED if crossed
-                 else Cause.CONDITION if condition >= warn_at
-                 else Cause.FORETOLD if time < warn_time
-                 else Cause.NONE)
+        cause, stopped, time = state_after(
+            thresholds(parameters), self.warning, self.stopped, self.determinant, determinant,
+            determinant_rate, condition)
         return Singularity(
-            cause is not Cause.NONE, condition >= stop_at, cause,
-            determinant or self.determinant, time, self.crossings + crossed)
+            cause > 0, stopped, CAUSES[cause], determinant or self.determinant, time,
+            self.crossings + (CAUSES[cause] is Cause.CROSSED))
+
+
+def thresholds(parameters: Parameters) -> Array:
+    """Return warn_condition, stop_condition and warn_time (3,)."""
+    return np.array([parameters['singularity.warn_condition'],
+                     parameters['singularity.stop_condition'],
+                     parameters['singularity.warn_time']])

@@ -15,20 +15,30 @@
 """
 The one step from a setpoint to what is published for it; node and replay both take it.
 
-It knows neither ROS nor bags, holds no state, and gives the same bits for the same input.
+It knows neither ROS nor bags, holds no state, and gives the same bits for the same input,
+whether setpoints come one at a time or by the thousand.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stewart_dynamics import cdr
 from stewart_dynamics import inverse_dynamics as runtime
+from stewart_dynamics.compiled import entry_point, source_digest
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import StewartPlatform
-from stewart_dynamics.singularity import Singularity, UNSOLVABLE_CONDITION
+from stewart_dynamics.singularity import (
+    Cause, CAUSES, Singularity, state_after, thresholds, UNSOLVABLE_CONDITION)
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -85,6 +95,153 @@ class Output(NamedTuple):
     excesses: tuple[Excess, ...]
 
 
+class Batch(NamedTuple):
+    """Setpoints one after the other, N of them."""
+
+    stamps: Stamps
+    """(N,) [ns]"""
+    motions: Array
+    """Rows of motion (N, 24), laid out as ``inverse_dynamics`` says."""
+    wrenches: Array
+    """(N, 6) [N, N m], or one row for all."""
+    restarts: Flags
+    """(N,): time has jumped back before it."""
+
+
+class Outputs(NamedTuple):
+    """What a batch gives: of those setpoints that could be answered, N of them."""
+
+    answered: Flags
+    """Which setpoints of the batch these are; of the others numbers overflow."""
+    stamps: Stamps
+    """(N,) [ns]"""
+    results: Array
+    """Rows of results (N, 27), laid out as ``inverse_dynamics`` says; no forces are nan."""
+    forces: Array
+    """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
+    states: Array
+    """(N, STATE)"""
+    changed: Flags
+    """(N,): the singularity warning is another than before."""
+    exceeding: Flags
+    """(N,): a limit is broken."""
+
+    @property
+    def lengths(self) -> Array:
+        """(N, 6) [m]."""
+        return self.results[:, runtime.LENGTHS:runtime.LENGTHS + 6]
+
+    @property
+    def rates(self) -> Array:
+        """(N, 6) [m/s]."""
+        return self.results[:, runtime.RATES:runtime.RATES + 6]
+
+    @property
+    def demanded_forces(self) -> Array:
+        """As the dynamics have them (N, 6) [N]; nan where J_inv cannot be solved."""
+        return self.results[:, runtime.FORCES:runtime.FORCES + 6]
+
+    @property
+    def unit_load_forces(self) -> Array:
+        """(N, 6)."""
+        return self.results[:, runtime.UNIT_LOAD_FORCES:runtime.UNIT_LOAD_FORCES + 6]
+
+    @property
+    def determinants(self) -> Array:
+        """(N,) [m^3]."""
+        return self.results[:, runtime.DETERMINANT]
+
+    @property
+    def determinant_rates(self) -> Array:
+        """(N,) [m^3/s]."""
+        return self.results[:, runtime.DETERMINANT_RATE]
+
+    @property
+    def conditions(self) -> Array:
+        """(N,)."""
+        return self.results[:, runtime.CONDITION]
+
+    @property
+    def times_to_crossing(self) -> Array:
+        """(N,) [s]; inf where det(J) does not go toward zero."""
+        return self.states[:, _TIME]
+
+    @property
+    def warnings(self) -> Flags:
+        """(N,): the singularity warning is on."""
+        return self.states[:, _CAUSE] > 0.0
+
+    @property
+    def stopped(self) -> Flags:
+        """(N,): inside stop_condition."""
+        return self.states[:, _STOPPED] > 0.0
+
+    def singularity(self, n: int = -1) -> Singularity:
+        """Return the state after one of them."""
+        cause, stopped, determinant, time, crossings = self.states[n].tolist()
+        return Singularity(cause > 0.0, stopped > 0.0, CAUSES[int(cause)], determinant, time,
+                           int(crossings))
+
+
+# A row of states.
+_CAUSE, _STOPPED, _LAST, _TIME, _CROSSINGS, STATE = range(6)
+# The numbers of the settings: thresholds, whether to suppress, and four limits of six legs.
+_SUPPRESS = 3
+_LIMITS = 4
+LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+_SETTINGS = _LIMITS + 6 * len(LIMITS)
+
+
+def _entry_point(source: str) -> Callable[..., None]:
+    @entry_point
+    def watch(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
+              forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
+        """Go through results in their order and write what becomes of them, see Outputs."""
+        _ = source  # part of the key of the kept machine code: see source_digest
+        state = before.copy()
+        for n in range(len(results)):
+            finite = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
+            for k in range(runtime.RESULT):
+                finite = finite and math.isfinite(results[n, k])
+            answered[n] = finite
+            exceeding[n] = False
+            if not finite:
+                states[n] = state
+                continue
+            if restarts[n]:
+                state[_CAUSE], state[_STOPPED], state[_LAST] = 0.0, 0.0, 0.0
+            determinant = results[n, runtime.DETERMINANT]
+            condition = results[n, runtime.CONDITION]
+            cause, stopped, time = state_after(
+                settings, state[_CAUSE] > 0.0, state[_STOPPED] > 0.0, state[_LAST], determinant,
+                results[n, runtime.DETERMINANT_RATE], condition)
+            state[_CAUSE], state[_STOPPED], state[_TIME] = cause, stopped, time
+            state[_CROSSINGS] += cause == _CROSSED
+            if determinant != 0.0:
+                state[_LAST] = determinant
+            states[n] = state
+            solved = condition < UNSOLVABLE_CONDITION
+            published = solved and not (stopped and settings[_SUPPRESS] > 0.0)
+            for leg in range(6):
+                length = results[n, runtime.LENGTHS + leg]
+                rate = results[n, runtime.RATES + leg]
+                force = results[n, runtime.FORCES + leg]
+                most = settings[_LIMITS + 18 + leg]
+                if not solved:
+                    results[n, runtime.FORCES + leg] = np.nan
+                forces[n, leg] = min(max(force, -most), most) if published else np.nan
+                if (length < settings[_LIMITS + leg] or length > settings[_LIMITS + 6 + leg]
+                        or abs(rate) > settings[_LIMITS + 12 + leg]
+                        or (solved and abs(force) > most)):
+                    exceeding[n] = True
+
+    return watch
+
+
+_CROSSED = CAUSES.index(Cause.CROSSED)
+_watch = _entry_point(source_digest('compiled', 'cdr', 'inverse_dynamics', 'singularity', 'step'))
+
+
 class Step:
     """
     The step, for a machine with given parameters.
@@ -99,10 +256,14 @@ class Step:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
-        self._suppress = parameters['singularity.action'] == 'suppress_forces'
-        self._limits = {name: parameters[name].tolist() for name in (
-            'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
-            if parameters[name] is not None}
+        self._settings = np.empty(_SETTINGS)
+        self._settings[:_SUPPRESS] = thresholds(parameters)
+        self._settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
+        self._limits = {name: parameters[name].tolist() for name in LIMITS
+                        if parameters[name] is not None}
+        for n, name in enumerate(LIMITS):
+            never = -math.inf if name == 'limits.length_min' else math.inf
+            self._settings[_LIMITS + 6 * n:_LIMITS + 6 * n + 6] = self._limits.get(name, never)
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = cdr.JointState(parameters['joints'])
 
@@ -118,30 +279,31 @@ class Step:
             The output's before this one; none for the first.
 
         """
-        result = self._platform.solve(
-            np.array((setpoint.motion,)), np.array((setpoint.wrench,)))[0].tolist()
-        if not cdr.finite(result) or not cdr.is_stamp(setpoint.stamp):
-            return None
-        lengths: Six = tuple(result[0:6])
-        rates: Six = tuple(result[6:12])
-        determinant = result[runtime.DETERMINANT]
-        determinant_rate = result[runtime.DETERMINANT_RATE]
-        condition = result[runtime.CONDITION]
+        outputs = self.many(Batch(
+            np.array((setpoint.stamp,)), np.array((setpoint.motion,)),
+            np.array((setpoint.wrench,)), np.array((setpoint.restart,))), before)
+        return self._output(outputs) if outputs.answered[0] else None
+
+    def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
+        """Return what setpoints give one after the other; see the call for one."""
+        results = self._platform.solve(setpoints.motions, setpoints.wrenches)
+        many = len(results)
         past = before or Singularity()
-        if setpoint.restart:
-            past = Singularity(crossings=past.crossings)
-        singularity = past.after(self.parameters, determinant, determinant_rate, condition)
-        demanded: Six | None = None
-        forces: Six | None = None
-        if condition < UNSOLVABLE_CONDITION:
-            demanded = tuple(result[12:18])
-            if not (self._suppress and singularity.stopped):
-                forces = self._clipped(demanded)
-        return Output(
-            setpoint.stamp, lengths, rates, demanded, forces, tuple(result[18:24]),
-            determinant, determinant_rate, condition, singularity,
-            before is None or singularity.warning != before.warning,
-            self._excesses(lengths, rates, demanded))
+        state = np.array((CAUSES.index(past.cause) or past.warning, past.stopped,
+                          past.determinant, past.time_to_crossing, past.crossings), dtype=float)
+        forces, states = np.empty((many, 6)), np.empty((many, STATE))
+        answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
+        _watch(self._settings, setpoints.stamps, setpoints.restarts, state, results, forces,
+               states, answered, exceeding)
+        stamps = setpoints.stamps
+        if not answered.all():
+            stamps, results, forces = stamps[answered], results[answered], forces[answered]
+            states, exceeding = states[answered], exceeding[answered]
+        warnings = states[:, _CAUSE] > 0.0
+        changed = np.empty(len(states), dtype=bool)
+        changed[:1] = before is None or warnings[:1] != before.warning
+        changed[1:] = warnings[1:] != warnings[:-1]
+        return Outputs(answered, stamps, results, forces, states, changed, exceeding)
 
     def messages(self, output: Output) -> list[tuple[str, bytes]]:
         """Return topics (keys of OUTPUT_TYPES) and messages to publish for an output."""
@@ -158,12 +320,18 @@ class Step:
             messages.append(('singularity_warning', cdr.boolean(output.singularity.warning)))
         return messages
 
-    def _clipped(self, forces: Six) -> Six:
-        bounds = self._limits.get('limits.force_max')
-        if bounds is None:
-            return forces
-        return tuple(
-            min(max(force, -bound), bound) for force, bound in zip(forces, bounds, strict=True))
+    def _output(self, outputs: Outputs) -> Output:
+        """Return the only one of them."""
+        result = outputs.results[0].tolist()
+        forces = outputs.forces[0].tolist()
+        lengths, rates = tuple(result[0:6]), tuple(result[6:12])
+        demanded = tuple(result[12:18]) if result[12] == result[12] else None
+        return Output(
+            int(outputs.stamps[0]), lengths, rates, demanded,
+            tuple(forces) if forces[0] == forces[0] else None, tuple(result[18:24]),
+            result[runtime.DETERMINANT], result[runtime.DETERMINANT_RATE],
+            result[runtime.CONDITION], outputs.singularity(), bool(outputs.changed[0]),
+            self._excesses(lengths, rates, demanded) if outputs.exceeding[0] else ())
 
     def _excesses(
             self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Excess, ...]:
