@@ -23,11 +23,14 @@ node and replay have in common: the same bytes in, the same bytes out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from struct import error as StructError
 from struct import Struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 # A builtin_interfaces/Time holds stamps below it [ns].
@@ -109,28 +112,36 @@ def combined(data: bytes) -> Stamped:
     try:
         order = data[1]
         sec, nanosec, size = _TIME_AND_LENGTH[order].unpack_from(data, 4)
-        count = _COUNT[order]
-        frame = _text(data, 16, size)
-        names, at = _sequence(data, 16 + size, count)
-        for _ in range(names):
-            length, at = _sequence(data, at, count)
-            at += length
-        points, at = _sequence(data, at, count)
-        if points != 1:
-            raise MalformedError(f'{points} points: a setpoint has one')
         values: tuple[float, ...] = ()
-        for name, layout in (('transforms', _SEVEN), ('velocities', _SIX),
-                             ('accelerations', _SIX)):
-            number, at = _sequence(data, at, count)
-            if number != 1:
-                raise MalformedError(f'{number} {name}: a setpoint has one')
-            at = _aligned8(at)
+        for at, layout in zip(_combined_numbers(data), (_SEVEN, _SIX, _SIX), strict=True):
             values += layout[order].unpack_from(data, at)
-            at += layout[order].size
-        _DURATION[order].unpack_from(data, at)  # time_from_start: not used, but it must be there
+        # time_from_start: not used, but it must be there
+        _DURATION[order].unpack_from(data, at + layout[order].size)
     except (IndexError, KeyError, StructError) as exc:
         raise MalformedError(f'{len(data)} bytes: {exc}') from exc
-    return Stamped(_nanoseconds(data, sec, nanosec), frame, values)
+    return Stamped(_nanoseconds(data, sec, nanosec), _text(data, 16, size), values)
+
+
+def _combined_numbers(data: bytes) -> list[int]:
+    """Return where transform, velocity and acceleration begin."""
+    order = data[1]
+    count = _COUNT[order]
+    size = count.unpack_from(data, 12)[0]
+    names, at = _sequence(data, 16 + size, count)
+    for _ in range(names):
+        length, at = _sequence(data, at, count)
+        at += length
+    points, at = _sequence(data, at, count)
+    if points != 1:
+        raise MalformedError(f'{points} points: a setpoint has one')
+    found = []
+    for name, layout in (('transforms', _SEVEN), ('velocities', _SIX), ('accelerations', _SIX)):
+        number, at = _sequence(data, at, count)
+        if number != 1:
+            raise MalformedError(f'{number} {name}: a setpoint has one')
+        found.append(_aligned8(at))
+        at = found[-1] + layout[order].size
+    return found
 
 
 def _sequence(data: bytes, at: int, count: Struct) -> tuple[int, int]:
@@ -146,6 +157,7 @@ _FLOAT64 = Struct('<4sd')
 _BOOL = Struct('<4s?')
 # an empty layout's two numbers, the number of entries, and what aligns them
 _FLOAT64_ARRAY = Struct('<4sIII4x6d')
+_ZEROS = (0.0,) * 6
 
 
 def float64(value: float) -> bytes:
@@ -187,7 +199,9 @@ class JointState:
         first = f'{-size % 4}xI'
         size += -size % 4 + 4
         doubles = f'{-size % 8}x6d'
+        at = 4 + size + -size % 8
         # Each later count stands where doubles end, so that four bytes align what follows.
+        self._numbers = [(at, 6), (at + 56, 6), (at + 112, 6)]
         self._whole = Struct(f'{head}{first}{doubles}I4x6dI4x6d')
         self._without_effort = Struct(f'{head}{first}{doubles}I4x6dI')
         self._constant = tuple(constant)
@@ -202,10 +216,102 @@ class JointState:
         return self._whole.pack(LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position,
                                 6, *velocity, 6, *effort)
 
+    def layout(self, effort: bool) -> Layout:
+        """Return the layout of the messages with or without effort."""
+        numbers = self._numbers if effort else self._numbers[:2]
+        return Layout(self.write(0, _ZEROS, _ZEROS, _ZEROS if effort else None), numbers)
 
-def is_stamp(nanoseconds: int) -> bool:
-    """Return whether a builtin_interfaces/Time can hold it: until 2038, a clock may be beyond."""
-    return -STAMPS_END <= nanoseconds < STAMPS_END
+
+class Layout:
+    """
+    Messages that differ in nothing but their stamp and numbers, many of them at once.
+
+    Parameters
+    ----------
+    message : bytes
+        One of them, little-endian.
+    numbers : sequence of (offset, count)
+        Where doubles stand in it.
+    stamped : bool
+        It has a header.
+
+    """
+
+    def __init__(
+            self, message: bytes, numbers: Sequence[tuple[int, int]], stamped: bool = True,
+    ) -> None:
+        self.size = len(message)
+        self._message = message
+        free = np.zeros(self.size, dtype=bool)
+        fields: dict[str, tuple[Any, int]] = {}
+        if stamped:
+            free[4:12] = True
+            fields = {'sec': ('<i4', 4), 'nanosec': ('<u4', 8)}
+        self._parts = []
+        for at, count in numbers:
+            free[at:at + 8 * count] = True
+            fields[f'numbers at {at}'] = (('<f8', (count,)), at)
+            self._parts.append(f'numbers at {at}')
+        self._fixed = [f'byte {at}' for at in np.flatnonzero(~free).tolist()]
+        fields.update({name: ('u1', int(name[5:])) for name in self._fixed})
+        self.dtype = np.dtype({
+            'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
+            'offsets': [at for _, at in fields.values()], 'itemsize': self.size})
+        self._stamped = stamped
+
+    @classmethod
+    def of(cls, topic_reader: Callable[[bytes], Stamped], message: bytes) -> Layout | None:
+        """Return the layout of a message that its reader has read; none if big-endian."""
+        if message[:2] != LITTLE_ENDIAN[:2]:
+            return None
+        if topic_reader is combined:
+            counts = (7, 6, 6)
+            return cls(message, list(zip(_combined_numbers(message), counts, strict=True)))
+        size = _COUNT[1].unpack_from(message, 12)[0]
+        return cls(message, [(_aligned8(16 + size), 7 if topic_reader is pose else 6)])
+
+    def read(
+            self, data: NDArray[np.uint8], starts: NDArray[np.int64],
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+        """
+        Return stamps (N,) [ns] and numbers (N, ...) of messages; None if one has another layout.
+
+        Parameters
+        ----------
+        data : (M,)
+            Bytes that have all the messages in them.
+        starts : (N,)
+            Where each begins; each is of ``size``.
+
+        """
+        rows = at_any_byte(data, self.dtype)[starts]
+        stamps = rows['sec'] * np.int64(1_000_000_000) + rows['nanosec']
+        alike = bool((rows['nanosec'] < 1_000_000_000).all()) and all(
+            bool((rows[name] == self._message[int(name[5:])]).all()) for name in self._fixed)
+        if not alike:
+            return None
+        return stamps, np.concatenate([rows[name] for name in self._parts], axis=1)
+
+    def write(self, stamps: NDArray[np.int64] | None, *numbers: NDArray[np.float64],
+              ) -> NDArray[np.void]:
+        """Return messages (N,), each an entry of ``size`` bytes."""
+        rows = np.empty(len(numbers[0]), dtype=self.dtype)
+        rows.view(np.uint8).reshape(-1, self.size)[:] = np.frombuffer(self._message, np.uint8)
+        if stamps is not None:
+            rows['sec'], rows['nanosec'] = np.divmod(stamps, 1_000_000_000)
+        for name, values in zip(self._parts, numbers, strict=True):
+            rows[name] = values
+        return rows
+
+
+FLOAT64_ARRAY = Layout(float64_array(_ZEROS), [(20, 6)], stamped=False)
+FLOAT64 = Layout(float64(0.0), [(4, 1)], stamped=False)
+
+
+def at_any_byte(data: NDArray[np.uint8], kind: np.dtype[Any]) -> NDArray[Any]:
+    """Return the entries of a type that begin at each of the bytes; they share its memory."""
+    many = max(data.size - kind.itemsize + 1, 0)
+    return np.ndarray((many,), kind, data.data, strides=(1,))
 
 
 def finite(values: Sequence[float]) -> bool:

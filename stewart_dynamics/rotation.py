@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -62,10 +64,13 @@ def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
         [-cb * db, zero, zero]])
 
 
+Number = TypeVar('Number', float, Array)
+
+
 def from_quaternion(
-        x: float, y: float, z: float, w: float,
-) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """Return the nine numbers of R, row by row, of a unit quaternion."""
+        x: Number, y: Number, z: Number, w: Number,
+) -> tuple[Number, Number, Number, Number, Number, Number, Number, Number, Number]:
+    """Return the nine numbers of R, row by row, of a unit quaternion, or of arrays of them."""
     xx, yy, zz = x * x, y * y, z * z
     xy, xz, yz = x * y, x * z, y * z
     wx, wy, wz = w * x, w * y, w * z

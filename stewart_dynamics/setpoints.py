@@ -15,20 +15,27 @@
 """
 From messages on the setpoint topics to joined setpoints; what is refused is counted.
 
-Node and replay feed it the same bytes in the same order, so both refuse and join alike.
+Node and replay feed it the same bytes in the same order, so both refuse and join alike: the node
+one message at a time, the replay many at once. ``take`` says what becomes of a message;
+``take_many`` does the same to many of which none is out of the ordinary, and hands them to
+``take`` where one is.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from stewart_dynamics import cdr
+from stewart_dynamics.inverse_dynamics import MOTION
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.rotation import from_quaternion
-from stewart_dynamics.step import NO_WRENCH, Setpoint, Six
+from stewart_dynamics.step import Array, Batch, NO_WRENCH, Setpoint, Six, Stamps
 
 # Of each topic under the node's name: type, how it is read.
 POSE = 'setpoint/pose'
@@ -62,6 +69,30 @@ class Refusal(NamedTuple):
 
     topic: str
     reason: str
+
+
+class Messages(NamedTuple):
+    """Recorded messages in their order, M of them."""
+
+    topics: tuple[str, ...]
+    """Keys of INPUT_TYPES."""
+    of_topic: NDArray[np.int64]
+    """(M,): which of the topics."""
+    times: Stamps
+    """(M,): when each was recorded [ns]."""
+    data: NDArray[np.uint8]
+    """Bytes in which all of them are."""
+    starts: NDArray[np.int64]
+    """(M,): where each begins in them."""
+    sizes: NDArray[np.int64]
+    """(M,): how long each is."""
+
+    def each(self) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time and bytes of one after the other."""
+        for topic, time, start, size in zip(
+                self.of_topic.tolist(), self.times.tolist(), self.starts.tolist(),
+                self.sizes.tolist(), strict=True):
+            yield self.topics[topic], time, self.data[start:start + size].tobytes()
 
 
 MALFORMED = 'malformed'
@@ -107,6 +138,7 @@ class Setpoints:
         self._unstamped_said = False
         self._unstamped_first = ''
         self._stamped: set[str] = set()
+        self._layouts: dict[str, cdr.Layout] = {}
 
     def take_wrench(self, data: bytes) -> None:
         """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
@@ -151,6 +183,37 @@ class Setpoints:
             self.refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
         return self._join(sample.stamp)
 
+    def take_many(self, messages: Messages) -> tuple[Batch, Stamps]:
+        """Return the setpoints that these messages complete, and when each was (N,) [ns]."""
+        joined = self._join_many(messages)
+        if joined is not None:
+            return joined
+        self._layouts.clear()
+        setpoints = []
+        times = []
+        for topic, time, data in messages.each():
+            if topic == WRENCH:
+                self.take_wrench(data)
+                continue
+            setpoint = self.take(topic, data, time)
+            if setpoint is not None:
+                setpoints.append(setpoint)
+                times.append(time)
+        return Batch(
+            np.array([each.stamp for each in setpoints], dtype=np.int64),
+            np.array([each.motion for each in setpoints], dtype=float).reshape(-1, MOTION),
+            np.array([each.wrench for each in setpoints], dtype=float).reshape(-1, 6),
+            np.array([each.restart for each in setpoints], dtype=bool),
+        ), np.array(times, dtype=np.int64)
+
+    def end(self, why: str) -> None:
+        """Give up and count what still waits: no more messages come."""
+        for topic, waiting in self._waiting.items():
+            for stamp in waiting:
+                self.refuse(topic, NOT_JOINED, f'stamp {stamp} ns: {why}')
+            waiting.clear()
+        self._give_up_unstamped()
+
     def refuse(self, topic: str, reason: str, details: str) -> None:
         """Count, and tell of, what is not used."""
         refusal = Refusal(topic, reason)
@@ -174,7 +237,7 @@ class Setpoints:
             return None
         if topic in (POSE, COMBINED):
             x, y, z, w = values[3:7]
-            length = math.hypot(x, y, z, w)
+            length = math.sqrt(x * x + y * y + z * z + w * w)
             if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
                 self.refuse(topic, NOT_UNIT, f'length {length:.6g}, must be within '
                             f'{QUATERNION_TOLERANCE:g} of 1')
@@ -275,3 +338,134 @@ class Setpoints:
         """Return a row of motion: what the topics give, and zeros for what they do not."""
         motion = sum(values, ())
         return motion + _STANDSTILL + _STANDSTILL if len(motion) == 12 else motion
+
+    def _join_many(self, messages: Messages) -> tuple[Batch, Stamps] | None:
+        """
+        Join messages of which none is out of the ordinary; None, and nothing done, if one is.
+
+        Ordinary are sound messages of one layout for each topic, whose stamps only rise.
+        """
+        if self._tolerance or self._unstamped_said:
+            return None
+        came = {topic: np.flatnonzero(messages.of_topic == n)
+                for n, topic in enumerate(messages.topics)}
+        samples: dict[str, tuple[Stamps, Array]] = {}
+        for topic, at in came.items():
+            of_topic = self._samples(topic, messages, at)
+            if of_topic is None:
+                return None
+            samples[topic] = of_topic
+        wrench_at, wrenches = came.get(WRENCH, _NOWHERE), samples.pop(WRENCH, (None, None))[1]
+        stamps: dict[str, Stamps] = {}
+        # Where each of a topic's samples came, -1 for those that wait already.
+        places: dict[str, NDArray[np.int64]] = {}
+        for topic in self.topics:
+            fresh, places_of = samples.get(topic, _NO_SAMPLES)[0], came.get(topic, _NOWHERE)
+            waiting = np.fromiter(self._waiting[topic], dtype=np.int64)
+            of_topic_all = np.concatenate([waiting, fresh])
+            after = self._last.get(topic)
+            if len(fresh) and (
+                    fresh[0] <= 0 or np.any(np.diff(of_topic_all) <= 0)
+                    or (after is not None and of_topic_all[0] <= after)):
+                return None
+            stamps[topic] = of_topic_all
+            places[topic] = np.concatenate([np.full(len(waiting), -1), places_of])
+        # Stamps only rise, so setpoints are complete in the order of their stamps.
+        common = stamps[self.topics[0]]
+        for topic in self.topics[1:]:
+            common = np.intersect1d(common, stamps[topic], assume_unique=True)
+        chosen = {topic: np.searchsorted(stamps[topic], common) for topic in self.topics}
+        complete = np.max([places[topic][chosen[topic]] for topic in self.topics], axis=0)
+        if any(self._overflows(stamps[t], places[t], common, complete) for t in self.topics):
+            return None
+        values = {topic: self._values(topic, samples) for topic in self.topics}
+        motions = np.zeros((len(common), MOTION))
+        column = 0
+        for topic in self.topics:
+            width = values[topic].shape[1]
+            motions[:, column:column + width] = values[topic][chosen[topic]]
+            column += width
+        loads = np.empty((len(common), 6))
+        loads[:] = self.wrench
+        if wrenches is not None and len(wrenches):
+            latest = np.searchsorted(wrench_at, complete) - 1
+            loads[latest >= 0] = wrenches[latest[latest >= 0]]
+            self.wrench = tuple(wrenches[-1].tolist())
+        self._stamped |= {topic for topic in self.topics if len(came.get(topic, ()))}
+        self._keep_waiting(stamps, values, common)
+        return Batch(common, motions, loads, np.zeros(len(common), dtype=bool)), (
+            messages.times[complete])
+
+    def _samples(self, topic: str, messages: Messages, at: NDArray[np.int64],
+                 ) -> tuple[Stamps, Array] | None:
+        """Return stamps and values of a topic's messages; None where one is not ordinary."""
+        if not len(at):
+            return _NO_SAMPLES
+        layout = self._layouts.get(topic)
+        if layout is None:
+            start, size = int(messages.starts[at[0]]), int(messages.sizes[at[0]])
+            first = messages.data[start:start + size].tobytes()
+            try:
+                if _READERS[topic](first).frame not in self._frames:
+                    return None
+            except cdr.MalformedError:
+                return None
+            layout = cdr.Layout.of(_READERS[topic], first)
+            if layout is None:
+                return None
+            self._layouts[topic] = layout
+        if np.any(messages.sizes[at] != layout.size):
+            return None
+        read = layout.read(messages.data, messages.starts[at])
+        if read is None or not np.isfinite(read[1]).all():
+            return None
+        stamps, values = read
+        if topic not in (POSE, COMBINED):
+            return read
+        # The same arithmetic as in _sound, so that the bits are the same.
+        x, y, z, w = values[:, 3:7].T
+        with np.errstate(over='ignore'):
+            length = np.sqrt(x * x + y * y + z * z + w * w)
+        if not np.all(np.abs(length - 1.0) <= QUATERNION_TOLERANCE):
+            return None
+        rotation = from_quaternion(x / length, y / length, z / length, w / length)
+        return stamps, np.column_stack([values[:, :3], *rotation, values[:, 7:]])
+
+    def _values(self, topic: str, samples: dict[str, tuple[Stamps, Array]]) -> Array:
+        """Return the values of what waits and of what came."""
+        fresh = samples.get(topic, _NO_SAMPLES)[1]
+        waiting = list(self._waiting[topic].values())
+        if not waiting:
+            return fresh
+        return np.concatenate([np.array(waiting), fresh.reshape(-1, len(waiting[0]))])
+
+    @staticmethod
+    def _overflows(stamps: Stamps, places: NDArray[np.int64], common: Stamps,
+                   complete: NDArray[np.int64]) -> bool:
+        """Return whether, at any time, more than WAITING samples of a topic wait."""
+        if len(stamps) <= WAITING:
+            return False
+        completed = np.searchsorted(complete, places)  # setpoints, when a sample comes
+        used = np.concatenate([[0], np.searchsorted(stamps, common, side='right')])[completed]
+        return bool(np.any(np.arange(1, len(stamps) + 1) - used > WAITING))
+
+    def _keep_waiting(self, stamps: dict[str, Stamps], values: dict[str, Array],
+                      common: Stamps) -> None:
+        """Keep what came after the last setpoint; count what no setpoint can use any more."""
+        if len(common):
+            self._last = dict.fromkeys(self.topics, int(common[-1]))
+        for topic in self.topics:
+            first = 0
+            if len(common):
+                first = int(np.searchsorted(stamps[topic], common[-1], side='right'))
+                if first > len(common):
+                    for stamp in np.setdiff1d(stamps[topic][:first], common,
+                                              assume_unique=True).tolist():
+                        self.refuse(topic, NOT_JOINED, f'stamp {stamp} ns')
+            self._waiting[topic] = dict(zip(
+                stamps[topic][first:].tolist(), map(tuple, values[topic][first:].tolist()),
+                strict=True))
+
+
+_NOWHERE = np.empty(0, dtype=np.int64)
+_NO_SAMPLES: tuple[Stamps, Array] = (_NOWHERE, np.empty((0, 0)))

@@ -226,7 +226,7 @@ def _survives(data: bytes) -> None:
             continue
         assert len(read.values) == LENGTHS[kind]
         assert isinstance(read.stamp, int)
-        assert cdr.is_stamp(read.stamp)
+        assert -cdr.STAMPS_END <= read.stamp < cdr.STAMPS_END
         assert isinstance(read.frame, bytes)
 
 
@@ -363,7 +363,7 @@ def test_a_number_and_a_truth_value_are_what_rclpy_writes(number: float, truth: 
     (0, True), (-2 ** 31 * SECOND, True), (-2 ** 31 * SECOND - 1, False),
     (2 ** 31 * SECOND - 1, True), (2 ** 31 * SECOND, False), (2 ** 63, False)])
 def test_stamps_have_the_seconds_of_32_bits(stamp: int, holds: bool) -> None:
-    assert cdr.is_stamp(stamp) is holds
+    assert (-cdr.STAMPS_END <= stamp < cdr.STAMPS_END) is holds
     write: Callable[..., bytes] = cdr.JointState('abcdef').write
     if holds:
         write(stamp, [0.0] * 6, [0.0] * 6, None)

@@ -22,6 +22,7 @@ from itertools import permutations
 import math
 import re
 import tracemalloc
+from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from hypothesis import example, given, settings
@@ -35,8 +36,8 @@ from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.setpoints import (
-    ACCEL, COMBINED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, POSE, Refusal, Setpoints,
-    TOO_OLD, TWICE, TWIST, WAITING, WRENCH, WRONG_FRAME)
+    ACCEL, COMBINED, MALFORMED, Messages, NOT_FINITE, NOT_JOINED, NOT_UNIT, POSE, Refusal,
+    Setpoints, TOO_OLD, TWICE, TWIST, WAITING, WRENCH, WRONG_FRAME)
 from stewart_dynamics.step import NO_WRENCH, Setpoint
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
@@ -216,7 +217,7 @@ def _spoilt() -> list[tuple[str, bytes, str, str]]:
             for value in (NAN, INF, -INF):
                 bad = good[:at_byte] + np.float64(value).tobytes() + good[at_byte + 8:]
                 found.append((topic, bad, NOT_FINITE, 'nan|inf'))
-        for length in (1 - 1.1e-3, 1 + 1.1e-3, 0.0, 2.0, 1e308):
+        for length in (1 - 1.1e-3, 1 + 1.1e-3, 0.0, 2.0, 1e150):
             if topic in (POSE, COMBINED):
                 quaternion = (0.0, 0.0, 0.6 * length, 0.8 * length)
                 found.append((topic, WRITERS[topic](SECOND, HOME, quaternion), NOT_UNIT,
@@ -656,3 +657,144 @@ def test_wrenches_of_any_bytes_never_raise() -> None:
         setpoints.take_wrench(_garbage(random, good))
         assert np.all(np.isfinite(setpoints.wrench))
     assert sum(setpoints.counts.values()) > 100
+
+
+# Many at once
+
+def together(given: Sequence[tuple[str, bytes]]) -> Messages:
+    """Return messages as a bag has them: one behind the other, recorded a microsecond apart."""
+    topics = (*TOPICS, COMBINED, WRENCH)
+    sizes = np.array([len(data) for _, data in given], dtype=np.int64)
+    return Messages(
+        topics, np.array([topics.index(topic) for topic, _ in given], dtype=np.int64),
+        NOW + 1000 * np.arange(len(given)), np.frombuffer(b'?' + b''.join(
+            data for _, data in given), dtype=np.uint8),
+        1 + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64), sizes)
+
+
+def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **options: object) -> int:
+    """Check that messages taken together give what they give one by one; return how many."""
+    one, many = Feed(**options), Feed(**options)
+    expected, times = [], []
+    for n, (topic, data) in enumerate(given):
+        if topic == WRENCH:
+            one.setpoints.take_wrench(data)
+            continue
+        setpoint = one.setpoints.take(topic, data, NOW + 1000 * n)
+        if setpoint is not None:
+            expected.append(setpoint)
+            times.append(NOW + 1000 * n)
+    found, found_times = [], []
+    edges = [0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]
+    whole = together(given)
+    for first, end in zip(edges[:-1], edges[1:], strict=True):
+        batch, when = many.setpoints.take_many(whole._replace(
+            of_topic=whole.of_topic[first:end], times=whole.times[first:end],
+            starts=whole.starts[first:end], sizes=whole.sizes[first:end]))
+        assert batch.motions.shape == (len(when), 24)
+        assert batch.wrenches.shape == (len(when), 6)
+        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart)
+                  for stamp, motion, wrench, restart in zip(
+                      *(part.tolist() for part in batch), strict=True)]
+        found_times += when.tolist()
+    # repr: the very same bits
+    assert list(map(repr, found)) == list(map(repr, expected))
+    assert found_times == times
+    assert many.notices == one.notices
+    for feed in (one, many):
+        feed.setpoints.end('the bag ends')
+    assert many.counts == one.counts
+    return len(found)
+
+
+def stream(number: int, step: int = MS) -> list[tuple[str, bytes]]:
+    """Return a stream of turning, moving setpoints, wrenches between them."""
+    random = rng()
+    found = []
+    for n in range(1, number + 1):
+        quaternion = random.normal(size=4)
+        quaternion *= (1.0 + random.uniform(-9e-4, 9e-4)) / np.linalg.norm(quaternion)
+        found += [(POSE, messages.pose(n * step, random.normal(size=3), quaternion)),
+                  (TWIST, messages.twist(n * step, random.normal(size=6))),
+                  (ACCEL, messages.accel(n * step, random.normal(size=6)))]
+        if n % 7 == 0:
+            found.append((WRENCH, messages.wrench(n * step, random.normal(size=6))))
+    return found
+
+
+@pytest.mark.parametrize('cuts', [(), (1, 2, 5), tuple(range(0, 300, 7))])
+def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None:
+    assert check_many(stream(100), cuts) == 100
+    assert check_many([(topic, data) for topic, data in stream(100) if topic == POSE], cuts,
+                      source='pose') == 100
+    assert check_many(stream(100), cuts, sync_tolerance=1e-4) == 100
+
+
+def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    feed = Feed()
+    monkeypatch.delattr(Setpoints, 'take')
+    monkeypatch.delattr(Setpoints, 'take_wrench')
+    given = stream(50)
+    for part in (given[:61], given[61:]):
+        feed.setpoints.take_many(together(part))
+    assert not feed.counts
+
+
+def test_many_of_one_topic_may_come_before_the_others() -> None:
+    given = [(topic, data) for of in TOPICS for topic, data in stream(3 * WAITING // 2)
+             if topic == of]
+    for cuts in ((), (10, 700, 1600, 3100)):
+        # beyond WAITING the oldest are given up
+        assert check_many(given, cuts) == WAITING
+    assert check_many([(topic, data) for of in TOPICS for topic, data in stream(WAITING)
+                       if topic == of], ()) == WAITING
+
+
+def test_many_combined_are_what_they_are_one_by_one() -> None:
+    random = rng()
+    given = [(COMBINED, messages.combined(
+        n * MS, random.normal(size=3), UPRIGHT, random.normal(size=6), random.normal(size=6),
+        names=['élan' if n < 60 else 'a'])) for n in range(1, 100)]
+    assert check_many(given, (20, 40, 80), source='combined') == 99
+
+
+FATES = ['as it is'] * 12 + [
+    'lost', 'twice', 'late', 'nan', 'cut', 'zero', 'frame', 'back', 'big-endian', 'quaternion']
+
+
+@settings(max_examples=150)
+@given(st.lists(st.sampled_from(FATES), max_size=90), st.lists(st.integers(0, 90), max_size=6),
+       st.randoms(use_true_random=False), st.booleans())
+def test_many_of_whatever_kind_are_what_they_are_one_by_one(
+        fates: list[str], cuts: list[int], random: Any, shuffled: bool) -> None:
+    given = stream(30)[:len(fates)]
+    if shuffled:
+        # topics overtake each other, each in its own order
+        queues = {topic: [data for of, data in given if of == topic] for topic, _ in given}
+        order = [topic for topic, _ in given]
+        random.shuffle(order)
+        given = [(topic, queues[topic].pop(0)) for topic in order]
+    found: list[tuple[str, bytes]] = []
+    late: list[tuple[str, bytes]] = []
+    for fate, (topic, data) in zip(fates, given, strict=False):
+        if fate == 'late':
+            late.append((topic, data))
+            continue
+        if fate == 'nan':
+            data = data[:-8] + np.array(NAN).tobytes()
+        elif fate == 'cut':
+            data = data[:-5]
+        elif fate == 'zero':
+            data = data[:4] + bytes(8) + data[12:]
+        elif fate == 'back':
+            data = data[:4] + bytes(7) + b'\1' + data[12:]
+        elif fate == 'frame':
+            data = data.replace(b'base', b'besa')
+        elif fate == 'quaternion' and topic == POSE:
+            data = data[:-8] + np.array(1.5).tobytes()
+        elif fate == 'big-endian' and topic == POSE:
+            data = messages.pose(20 * MS + random.randrange(20 * MS), little_endian=False)
+        found += [(topic, data)] * {'lost': 0, 'twice': 2}.get(fate, 1)
+        if late and random.random() < 0.5:
+            found.append(late.pop())
+    check_many(found, cuts)
