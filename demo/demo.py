@@ -32,6 +32,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped
+import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -41,7 +42,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 from tqdm import tqdm
 
+from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.step import Batch, Outputs, STATE
 from stewart_dynamics.summary import Summary
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -126,14 +129,27 @@ def play(demo: Demo, executor: Any, process: Any) -> None:
 
 def report(demo: Demo, parameters: Parameters) -> str:
     """Return the table of what the node answered."""
-    legs = parameters['joints']
-    zero = parameters['geometry.zero_length']
-    none = [float('nan')] * 6
-    return Summary.of(
-        legs, [_nanoseconds(state.header.stamp) for state in demo.states],
-        [zero + state.position for state in demo.states],
-        [list(state.effort) or none for state in demo.states],
-        demo.determinants, demo.warnings, parameters['limits.force_max']).table()
+    many = len(demo.states)
+    stamps = np.array([_nanoseconds(state.header.stamp) for state in demo.states])
+    forces = np.array([state.effort or [np.nan] * 6 for state in demo.states])
+    results = np.full((many, runtime.RESULT), np.nan)  # nan: not published
+    results[:, runtime.LENGTHS:runtime.LENGTHS + 6] = parameters['geometry.zero_length'] + [
+        list(state.position) for state in demo.states]
+    results[:, runtime.RATES:runtime.RATES + 6] = [list(s.velocity) for s in demo.states]
+    results[:, runtime.FORCES:runtime.FORCES + 6] = forces
+    results[:, runtime.DETERMINANT] = demo.determinants[:many]
+    # a state begins with what the warning is for, 0 for none
+    states = np.full((many, STATE), np.nan)
+    changes = np.searchsorted([stamp for stamp, _ in demo.warnings], stamps, side='right')
+    states[:, 0] = [changed > 0 and demo.warnings[changed - 1][1] for changed in changes]
+    every, none = np.ones(many, dtype=bool), np.zeros(many, dtype=bool)
+    summary = Summary(parameters)
+    summary.add(
+        (stamps - stamps[0]) * 1e-9,
+        Batch(stamps, np.full((many, runtime.MOTION), np.nan), np.zeros((1, 6)), none,
+              stamps),
+        Outputs(every, stamps, results, forces, states, none, none))
+    return summary.table()
 
 
 def main() -> None:

@@ -119,6 +119,7 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now)
         self._waiting: deque[Setpoint] = deque()
         self._last: Output | None = None
+        self._restarting = False  # the last one was a restart and could not be answered
         self._reported = now
         self._said.clear()
         self._logged: dict[str, int] = {}
@@ -268,12 +269,16 @@ class DynamicsNode(LifecycleNode):
             self._waiting.append(newest._replace(restart=restart))
         while self._waiting:
             setpoint = self._waiting.popleft()
+            if self._restarting:
+                setpoint = setpoint._replace(restart=True)
             before = None if self._last is None else self._last.singularity
             output = self._step(setpoint, before)
             if output is None:
+                self._restarting = setpoint.restart
                 self._setpoints.refuse(
                     'setpoint', inputs.OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
                 continue
+            self._restarting = False
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
             self._last = output

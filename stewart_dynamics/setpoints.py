@@ -183,8 +183,8 @@ class Setpoints:
             self.refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
         return self._join(sample.stamp)
 
-    def take_many(self, messages: Messages) -> tuple[Batch, Stamps]:
-        """Return the setpoints that these messages complete, and when each was (N,) [ns]."""
+    def take_many(self, messages: Messages) -> Batch:
+        """Return the setpoints that these messages complete."""
         joined = self._join_many(messages)
         if joined is not None:
             return joined
@@ -204,7 +204,7 @@ class Setpoints:
             np.array([each.motion for each in setpoints], dtype=float).reshape(-1, MOTION),
             np.array([each.wrench for each in setpoints], dtype=float).reshape(-1, 6),
             np.array([each.restart for each in setpoints], dtype=bool),
-        ), np.array(times, dtype=np.int64)
+            np.array(times, dtype=np.int64))
 
     def end(self, why: str) -> None:
         """Give up and count what still waits: no more messages come."""
@@ -339,7 +339,7 @@ class Setpoints:
         motion = sum(values, ())
         return motion + _STANDSTILL + _STANDSTILL if len(motion) == 12 else motion
 
-    def _join_many(self, messages: Messages) -> tuple[Batch, Stamps] | None:
+    def _join_many(self, messages: Messages) -> Batch | None:
         """
         Join messages of which none is out of the ordinary; None, and nothing done, if one is.
 
@@ -393,8 +393,8 @@ class Setpoints:
             self.wrench = tuple(wrenches[-1].tolist())
         self._stamped |= {topic for topic in self.topics if len(came.get(topic, ()))}
         self._keep_waiting(stamps, values, common)
-        return Batch(common, motions, loads, np.zeros(len(common), dtype=bool)), (
-            messages.times[complete])
+        return Batch(common, motions, loads, np.zeros(len(common), dtype=bool),
+                     messages.times[complete])
 
     def _samples(self, topic: str, messages: Messages, at: NDArray[np.int64],
                  ) -> tuple[Stamps, Array] | None:

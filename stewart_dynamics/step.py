@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +106,15 @@ class Batch(NamedTuple):
     """(N, 6) [N, N m], or one row for all."""
     restarts: Flags
     """(N,): time has jumped back before it."""
+    times: Stamps
+    """When the message that completed each came (N,) [ns]."""
+
+    def chosen(self, which: Any) -> Batch:
+        """Return some of them: a slice, or an index or a mask (N,)."""
+        return Batch._make(part[which] for part in self)
+
+
+_NO_TIME = np.zeros(1, dtype=np.int64)
 
 
 class Outputs(NamedTuple):
@@ -199,7 +208,10 @@ def _entry_point(source: str) -> Callable[..., None]:
         """Go through results in their order and write what becomes of them, see Outputs."""
         _ = source  # part of the key of the kept machine code: see source_digest
         state = before.copy()
+        restart = False
         for n in range(len(results)):
+            # One that cannot be answered hands it on.
+            restart = restart or restarts[n]
             finite = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
             for k in range(runtime.RESULT):
                 finite = finite and math.isfinite(results[n, k])
@@ -208,7 +220,8 @@ def _entry_point(source: str) -> Callable[..., None]:
             if not finite:
                 states[n] = state
                 continue
-            if restarts[n]:
+            if restart:
+                restart = False
                 state[_CAUSE], state[_STOPPED], state[_LAST] = 0.0, 0.0, 0.0
             determinant = results[n, runtime.DETERMINANT]
             condition = results[n, runtime.CONDITION]
@@ -281,7 +294,8 @@ class Step:
         """
         outputs = self.many(Batch(
             np.array((setpoint.stamp,)), np.array((setpoint.motion,)),
-            np.array((setpoint.wrench,)), np.array((setpoint.restart,))), before)
+            np.array((setpoint.wrench,)), np.array((setpoint.restart,)),
+            _NO_TIME), before)
         return self._output(outputs) if outputs.answered[0] else None
 
     def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
@@ -318,6 +332,39 @@ class Step:
         messages.append(('jacobian_determinant', cdr.float64(output.determinant)))
         if output.warning_changed:
             messages.append(('singularity_warning', cdr.boolean(output.singularity.warning)))
+        return messages
+
+    def messages_of(self, outputs: Outputs) -> list[tuple[str, Stamps, NDArray[np.void]]]:
+        """
+        Return the same messages as ``messages``, of many outputs.
+
+        Returns
+        -------
+        list of (topic, which, messages)
+            In the order in which they are published for one output; ``which`` (K,) outputs have
+            such a message, and the messages (K,) as entries of their length. A topic may come
+            twice, for its messages with and without forces.
+
+        """
+        positions = outputs.lengths - self._zero_lengths
+        solved = np.isfinite(outputs.forces[:, 0])
+        having, lacking = np.flatnonzero(solved), np.flatnonzero(~solved)
+        stamps, rates, forces = outputs.stamps, outputs.rates, outputs.forces
+        messages = [
+            ('leg_states', having, self._joint_state.layout(effort=True).write(
+                stamps[having], positions[having], rates[having], forces[having])),
+            ('leg_states', lacking, self._joint_state.layout(effort=False).write(
+                stamps[lacking], positions[lacking], rates[lacking])),
+            ('leg_lengths', np.arange(len(stamps)), cdr.FLOAT64_ARRAY.write(
+                None, outputs.lengths)),
+            ('leg_forces', having, cdr.FLOAT64_ARRAY.write(None, forces[having])),
+            ('jacobian_determinant', np.arange(len(stamps)), cdr.FLOAT64.write(
+                None, outputs.determinants[:, None])),
+        ]
+        changed = np.flatnonzero(outputs.changed)
+        warnings = [cdr.boolean(on) for on in outputs.warnings[changed].tolist()]
+        messages.append(('singularity_warning', changed, np.frombuffer(
+            b''.join(warnings), dtype=f'V{len(cdr.boolean(True))}')))
         return messages
 
     def _output(self, outputs: Outputs) -> Output:

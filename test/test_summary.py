@@ -12,161 +12,601 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The summary of a motion: peaks, crossings, spans of the warning, and its table."""
+
+"""The summary of a motion, however its samples are split; and the table of it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import json
 import math
+import re
+import statistics
+import tracemalloc
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
+from numpy.typing import NDArray
 import pytest
+from referees import (
+    random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
-from stewart_dynamics.summary import Summary
+from stewart_dynamics import inverse_dynamics as runtime
+from stewart_dynamics import Parameters
+from stewart_dynamics.causes import CAUSES, ForceCauses
+from stewart_dynamics.step import Batch, Outputs, STATE, Step
+from stewart_dynamics.summary import Summary, TOLD
 
-LEGS = ['front left', 'b', 'c', 'd', 'e', 'f']
+Array = NDArray[np.float64]
+
 SECOND = 1_000_000_000
-NONE = (math.nan,) * 6
+LIMITS = {
+    'limits.length_min': [0.5, 0.6, 0.7, 0.5, 0.6, 0.0],
+    'limits.length_max': [1.5, 1.4, 1.3, 1.5, 1.4, 9.0],
+    'limits.velocity_max': [0.9, 0.8, 0.7, 0.9, 0.8, 9.0],
+    'limits.force_max': [90.0, 80.0, 70.0, 90.0, 80.0, 900.0]}
 
 
-def summary_of(determinants: list[float], stamps: list[float] | None = None,
-               **given: object) -> Summary:
-    """Return the summary of samples of det(J), a second apart, or at these times."""
-    times = range(len(determinants)) if stamps is None else stamps
-    arguments = {
-        'lengths': np.ones((len(determinants), 6)), 'forces': np.ones((len(determinants), 6)),
-        'warnings': [], **given}
-    return Summary.of(
-        LEGS, [round((1000 + t) * SECOND) for t in times], determinants=determinants,
-        **arguments)
+def machine(**changes: Any) -> Parameters:
+    """Return a machine whose first leg has a name with a blank."""
+    return symmetric_parameters().replaced({
+        'joints': ['front left', 'b', 'c', 'd', 'e', 'f'], 'setpoint.timeout': 0.5, **changes})
 
 
-def test_a_small_example() -> None:
-    summary = Summary.of(
-        LEGS, [10 * SECOND, 11 * SECOND, 12 * SECOND, 14 * SECOND],
-        [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [1.5, 1.0, 3.0, 4.0, 5.0, 6.0],
-         [0.5, 3.0, 3.0, 4.0, 5.0, 6.0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]],
-        [[10.0, -20.0, 5.0, 0.0, 1.0, 2.0], [-30.0, 15.0, 5.0, 0.0, 1.0, 2.0],
-         [20.0, 25.0, 5.0, 0.0, 1.0, 3.0], [0.0, 0.0, 5.0, 0.0, 1.0, 2.0]],
-        [3.0, 1.0, -1.0, -2.0],
-        [(10 * SECOND, False), (11 * SECOND, True), (14 * SECOND, False)])
-    assert summary.samples == 4
-    assert summary.duration == 4.0
-    assert [(p.leg, p.force, p.force_time) for p in summary.peaks[:3]] == [
-        ('front left', -30.0, 1.0), ('b', 25.0, 2.0), ('c', 5.0, 0.0)]
-    assert [(p.shortest, p.longest) for p in summary.peaks[:3]] == [
-        (0.5, 1.5), (1.0, 3.0), (3.0, 3.0)]
-    assert not any(p.clipped for p in summary.peaks)
-    assert (summary.nearest, summary.nearest_time) == (1.0, 1.0)
-    assert summary.crossings == (1.5,)
-    assert summary.warnings == ((1.0, 4.0),)
-    assert summary.table().splitlines() == [
-        '4 setpoints in 4.00 s',
-        '',
-        'leg              peak force       at     length from        to',
-        '                          N        s               m         m',
-        'front left            -30.0     1.00          0.5000    1.5000',
-        'b                      25.0     2.00          1.0000    3.0000',
-        'c                       5.0     0.00          3.0000    3.0000',
-        'd                       0.0     0.00          4.0000    4.0000',
-        'e                       1.0     0.00          5.0000    5.0000',
-        'f                       3.0     2.00          6.0000    6.0000',
-        '',
-        'det(J) crossed zero at t = 1.500 s: forces grow without bound there',
-        'det(J) nearest zero: 1 m^3 at t = 1.00 s',
-        'singularity warning from t = 1.00 s to 4.00 s: 0.50 s before the crossing']
+def batch(stamps: NDArray[np.int64], restarts: NDArray[np.bool_] | None = None,
+          motions: Array | None = None, wrenches: Array | None = None) -> Batch:
+    """Return setpoints; what is not given is zero."""
+    many = len(stamps)
+    return Batch(
+        stamps, np.zeros((many, runtime.MOTION)) if motions is None else motions,
+        np.zeros((many, runtime.WRENCH)) if wrenches is None else wrenches,
+        np.zeros(many, dtype=bool) if restarts is None else restarts, stamps)
 
 
-def test_a_single_sample_is_enough() -> None:
-    summary = summary_of([0.5])
-    assert (summary.samples, summary.duration, summary.crossings) == (1, 0.0, ())
-    table = summary.table()
-    assert '1 setpoints in 0.00 s' in table
-    assert 'det(J) did not cross zero' in table
-    assert 'no singularity warning' in table
+class Samples:
+    """Samples of a motion, as a summary takes them; what is not given is all ones."""
+
+    def __init__(self, many: int, **given: Any) -> None:
+        def numbers(name: str, *tail: int, default: float = 1.0) -> Array:
+            values = np.empty((many, *tail))
+            values[:] = given.pop(name, default)
+            return values
+
+        self.seconds = numbers('seconds', default=math.nan)
+        if np.isnan(self.seconds).any():
+            self.seconds = np.arange(many) * 1.0
+        self.restarts = numbers('restarts', default=0.0) > 0.0
+        self.stamps = np.round((1000.0 + self.seconds) * SECOND).astype(np.int64)
+        self.lengths, self.rates = numbers('lengths', 6), numbers('rates', 6)
+        self.demanded = numbers('demanded', 6)
+        self.forces = numbers('forces', 6, default=math.nan)
+        self.forces = np.where(np.isnan(self.forces), self.demanded, self.forces)
+        self.forces[numbers('suppressed', default=0.0) > 0.0] = math.nan
+        self.unit_load = numbers('unit_load', 6)
+        self.det, self.condition = numbers('det'), numbers('condition')
+        self.time_to_crossing = numbers('time_to_crossing', default=math.inf)
+        self.warnings = numbers('warnings', default=0.0) > 0.0
+        self.causes = numbers('causes', 6, 6) if 'causes' in given else None
+        assert not given
+
+    def outputs(self) -> Outputs:
+        """Return them as the step gives them."""
+        many = len(self.seconds)
+        results = np.concatenate([
+            self.lengths, self.rates, self.demanded, self.unit_load, self.det[:, None],
+            np.zeros((many, 1)), self.condition[:, None]], axis=1)
+        assert results.shape == (many, runtime.RESULT)
+        states = np.zeros((many, STATE))
+        states[:, 0], states[:, 3] = self.warnings, self.time_to_crossing
+        flags = np.zeros(many, dtype=bool)
+        outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags)
+        np.testing.assert_array_equal(outputs.warnings, self.warnings)
+        np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
+        return outputs
+
+    def summary(self, parameters: Parameters, edges: Sequence[int] = ()) -> Summary:
+        """Return the summary of them, given to it in parts."""
+        many = len(self.seconds)
+        outputs = self.outputs()
+        setpoints = batch(self.stamps, self.restarts)
+        summary = Summary(parameters)
+        for first, end in zip([0, *edges], [*edges, many], strict=True):
+            part = slice(first, end)
+            summary.add(self.seconds[part], Batch(*(each[part] for each in setpoints)),
+                        Outputs(*(each[part] for each in outputs)),
+                        None if self.causes is None else self.causes[part])
+        return summary
+
+
+def values(many: int, **given: Any) -> dict[str, Any]:
+    """Return what the summary of such samples has."""
+    found = Samples(many, **given).summary(machine()).values()
+    json.dumps(found, allow_nan=False)
+    return found
+
+
+def singularity(many: int, **given: Any) -> dict[str, Any]:
+    """Return what it has of singularities."""
+    found: dict[str, Any] = values(many, **given)['singularity']
+    return found
+
+
+def random_samples(seed: int, many: int) -> Samples:
+    """Return samples in which everything happens: restarts, gaps, zeros, nothing solved."""
+    random = rng(seed)
+    restarts = random.random(many) < 0.1
+    steps = np.where(restarts, 0.0, random.choice([0.01, 0.02, 0.03, 0.7], many))
+    unsolved = random.random(many) < random.choice([0.0, 0.2, 1.0], p=[0.4, 0.5, 0.1])
+    demanded = random.integers(-100, 101, (many, 6)) * 1.0
+    demanded[unsolved] = math.nan
+    causes = random.normal(size=(many, 6, 6))
+    causes[unsolved] = math.nan
+    return Samples(
+        many, seconds=np.cumsum(steps) - steps[0], restarts=restarts, demanded=demanded,
+        forces=np.clip(demanded, -50.0, 50.0), causes=causes,
+        suppressed=random.random(many) < 0.2, lengths=random.uniform(0.4, 1.6, (many, 6)),
+        rates=random.integers(-10, 11, (many, 6)) * 0.1,
+        unit_load=random.integers(1, 9, (many, 6)), det=random.integers(-2, 3, many),
+        condition=random.integers(1, 9, many), warnings=random.random(many) < 0.4,
+        time_to_crossing=random.choice([0.1, 0.2, 3.0, math.inf], many))
+
+
+# The same again, sample by sample
+
+def first_peak(numbers: Sequence[float], times: Sequence[float]) -> tuple[Any, Any]:
+    """Return the number that is largest in size, with its sign, and when it is first met."""
+    known = [n for n, number in enumerate(numbers) if not math.isnan(number)]
+    if not known:
+        return None, None
+    best = max(known, key=lambda n: (abs(numbers[n]), -n))
+    return numbers[best], times[best]
+
+
+def over_time(numbers: Sequence[float], times: Sequence[float], gap: float,
+              ) -> tuple[float, float | None]:
+    """Return the integral by trapezoids and the mean."""
+    area, time = [], []
+    for n in range(1, len(numbers)):
+        step = times[n] - times[n - 1]
+        if step <= gap and not math.isnan(numbers[n] + numbers[n - 1]):
+            area.append(0.5 * (numbers[n] + numbers[n - 1]) * step)
+            time.append(step)
+    known = [number for number in numbers if not math.isnan(number)]
+    if math.fsum(time):
+        return math.fsum(area), math.fsum(area) / math.fsum(time)
+    return 0.0, statistics.fmean(known) if known else None
+
+
+def root(number: float | None) -> float | None:
+    """Return the square root, if there is a number."""
+    return None if number is None else math.sqrt(number)
+
+
+def plain(p: Parameters, s: Samples) -> dict[str, Any]:
+    """Return what the summary must have, from its definitions."""
+    t = s.seconds.tolist()
+    forward = [b - a for a, b in zip(t[:999], t[1:1000], strict=False) if b > a]
+    gap = max(p['setpoint.timeout'], 10.0 * statistics.median(forward) if forward else 0.0)
+    steps = [b - a for a, b in zip(t, t[1:], strict=False)]
+    legs, limits, causes = {}, [], {}
+    for leg, name in enumerate(p['joints']):
+        length, rate = s.lengths[:, leg].tolist(), s.rates[:, leg].tolist()
+        force = s.demanded[:, leg].tolist()
+        power = [f * v for f, v in zip(force, rate, strict=True)]
+        low, high, fastest, strongest = (p[f'limits.{limit}'][leg] for limit in (
+            'length_min', 'length_max', 'velocity_max', 'force_max'))
+        peak = first_peak(force, t)
+        driving, _ = over_time([x if math.isnan(x) else max(x, 0.0) for x in power], t, gap)
+        braking, _ = over_time([x if math.isnan(x) else max(-x, 0.0) for x in power], t, gap)
+        none = peak[0] is None
+        legs[name] = {
+            'length_min_m': min(length), 'length_max_m': max(length),
+            'rate_peak_m_s': first_peak(rate, t)[0], 'rate_peak_at_s': first_peak(rate, t)[1],
+            'force_peak_n': peak[0], 'force_peak_at_s': peak[1],
+            'force_rms_n': root(over_time([f * f for f in force], t, gap)[1]),
+            'force_published_peak_n': first_peak(s.forces[:, leg].tolist(), t)[0],
+            'power_peak_w': first_peak(power, t)[0], 'power_peak_at_s': first_peak(power, t)[1],
+            'power_mean_w': over_time(power, t, gap)[1],
+            'energy_driving_j': None if none else driving,
+            'energy_braking_j': None if none else braking,
+            'length_margin_m': min(min(length) - low, high - max(length)),
+            'rate_margin_m_s': fastest - max(map(abs, rate)),
+            'force_margin_n': None if none else strongest - abs(peak[0])}
+        causes[name] = {}
+        for n, cause in enumerate(CAUSES):
+            of_cause = s.causes[:, n, leg].tolist()
+            causes[name][cause] = {
+                'peak_n': first_peak(of_cause, t)[0],
+                'rms_n': root(over_time([f * f for f in of_cause], t, gap)[1])}
+    for limit, broken, numbers in (
+            ('limits.length_min', lambda x, bound: x < bound, s.lengths),
+            ('limits.length_max', lambda x, bound: x > bound, s.lengths),
+            ('limits.velocity_max', lambda x, bound: abs(x) > bound, s.rates),
+            ('limits.force_max', lambda x, bound: abs(x) > bound, s.demanded)):
+        for leg, name in enumerate(p['joints']):
+            bound = p[limit][leg]
+            found = [n for n, x in enumerate(numbers[:, leg]) if broken(x, bound)]
+            if found:
+                far = max(found, key=lambda n: (abs(abs(numbers[n, leg]) - bound), -n))
+                limits.append({
+                    'limit': limit, 'leg': name, 'setpoints': len(found),
+                    'worst': numbers[far, leg], 'bound': bound, 'first_at_s': t[found[0]]})
+    crossings = []
+    last = None
+    for n, det in enumerate(s.det.tolist()):
+        if s.restarts[n]:
+            last = None
+        if det:
+            if last is not None and det * s.det[last] < 0.0:
+                share = s.det[last] / (s.det[last] - s.det[last + 1])
+                crossings.append(t[last] + share * (t[last + 1] - t[last]))
+            last = n
+    spans: list[list[float | None]] = []
+    for n, on in enumerate(s.warnings):
+        if on and not (n and s.warnings[n - 1]):
+            spans.append([t[n], None])
+        if not on and n and s.warnings[n - 1]:
+            spans[-1][1] = t[n]
+    nearest = min(range(len(t)), key=lambda n: (abs(s.det[n]), n))
+    soonest = min(range(len(t)), key=lambda n: (s.time_to_crossing[n], n))
+    worst = max(range(len(t)), key=lambda n: (s.condition[n], -n))
+    ever = s.time_to_crossing[soonest] < math.inf
+    unsolved = np.isnan(s.demanded[:, 0])
+    most_loaded = int(np.argmax(s.unit_load.max(axis=0)))
+    return {
+        'setpoints': {
+            'answered': len(t), 'first_stamp_ns': int(s.stamps[0]),
+            'last_stamp_ns': int(s.stamps[-1]), 'duration_s': t[-1],
+            'gaps': sum(step > gap for step in steps),
+            'gaps_s': math.fsum(step for step in steps if step > gap),
+            'restarts': sum(s.restarts.tolist())},
+        'legs': legs, 'limits': limits,
+        'singularity': {
+            'determinant_nearest_m3': s.det[nearest], 'determinant_nearest_at_s': t[nearest],
+            'crossings': len(crossings), 'crossings_at_s': crossings[:TOLD],
+            'condition_max': s.condition[worst], 'condition_max_at_s': t[worst],
+            'unsolved': int(unsolved.sum()),
+            'suppressed': int((np.isnan(s.forces[:, 0]) & ~unsolved).sum()),
+            'time_to_crossing_min_s': s.time_to_crossing[soonest] if ever else None,
+            'time_to_crossing_min_at_s': t[soonest] if ever else None,
+            'unit_load_force_max': s.unit_load.max(),
+            'unit_load_force_leg': p['joints'][most_loaded],
+            'warnings': len(spans), 'warnings_from_to_s': spans[:TOLD],
+            'warning_s': math.fsum(step for n, step in enumerate(steps)
+                                   if s.warnings[n] and step <= gap)},
+        'causes': causes,
+        'limit_met': bool(limits) or bool(spans)}
+
+
+def assert_same(found: Any, truth: Any, at: str = '') -> None:
+    """Assert that both hold the same, numbers but for rounding."""
+    if isinstance(truth, dict):
+        assert list(found) == list(truth), at
+        for key in truth:
+            assert_same(found[key], truth[key], f'{at}/{key}')
+    elif isinstance(truth, list):
+        assert len(found) == len(truth), at
+        for n, (each, other) in enumerate(zip(found, truth, strict=True)):
+            assert_same(each, other, f'{at}/{n}')
+    elif isinstance(truth, float):
+        assert type(found) is float, at
+        assert found == pytest.approx(truth, rel=1e-12, abs=1e-12), at
+    else:
+        assert type(found) is type(truth), at
+        assert found == truth, at
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(st.integers(0, 10 ** 6), st.integers(1, 50))
+def test_it_is_what_its_definitions_say(seed: int, many: int) -> None:
+    samples, parameters = random_samples(seed, many), machine(**LIMITS)
+    found = samples.summary(parameters).values()
+    assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(st.data(), st.integers(0, 10 ** 6), st.integers(1, 60))
+def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> None:
+    edges = sorted(data.draw(st.lists(st.integers(0, many), max_size=many)))
+    samples, parameters = random_samples(seed, many), machine(**LIMITS)
+    whole, split = samples.summary(parameters), samples.summary(parameters, edges)
+    assert_same(split.values(), whole.values())
+    assert split.table() == whole.table()
+
+
+@pytest.mark.parametrize('size', [1, 7, 999, 1000, 1001, 2500])
+def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
+    samples, parameters = random_samples(size, 3000), machine(**LIMITS)
+    # what is a usual step is told from the first thousand setpoints
+    samples.seconds[1500:] += np.arange(1500) * 0.4
+    found = samples.summary(parameters, range(size, 3000, size)).values()
+    assert found['setpoints']['gaps'] > 500
+    assert found['singularity']['crossings'] > len(found['singularity']['crossings_at_s']) == TOLD
+    assert found['singularity']['warnings'] > TOLD
+    assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
+
+
+def test_it_can_be_read_before_the_end() -> None:
+    samples, parameters = random_samples(3, 40), machine(**LIMITS)
+    outputs = samples.outputs()
+    setpoints = batch(samples.stamps, samples.restarts)
+    summary = Summary(parameters)
+    for first in range(0, 40, 10):
+        part = slice(first, first + 10)
+        summary.add(samples.seconds[part], Batch(*(each[part] for each in setpoints)),
+                    Outputs(*(each[part] for each in outputs)))
+        assert summary.values()['setpoints']['answered'] == first + 10
+        assert summary.values() == summary.values()
+
+
+def test_it_sums_up_what_the_step_answers() -> None:
+    random = rng()
+    p = random_parameters(random).replaced({'limits.force_max': 2000.0})
+    motion, wrench = random_motion(p, random, 200), random_wrench(p, random, 200)
+    setpoints = batch(np.arange(200) * SECOND, motions=motion.rows, wrenches=wrench)
+    outputs = Step(p).many(setpoints, None)
+    summary = Summary(p)
+    summary.add(np.arange(200) * 1.0, setpoints, outputs,
+                ForceCauses(p)(setpoints.motions, setpoints.wrenches))
+    found = summary.values()
+    assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
+                                              axis=0).sum()
+    for leg, name in enumerate(p['joints']):
+        forces = outputs.demanded_forces[:, leg]
+        of_leg = found['legs'][name]
+        assert abs(of_leg['force_peak_n']) == np.abs(forces).max()
+        assert of_leg['force_published_peak_n'] == pytest.approx(
+            np.clip(of_leg['force_peak_n'], -2000.0, 2000.0))
+        assert of_leg['force_rms_n'] == pytest.approx(
+            math.sqrt((forces ** 2)[1:-1].sum() / 199.0
+                      + 0.5 * (forces[0] ** 2 + forces[-1] ** 2) / 199.0), rel=1e-12)
+        assert set(found['causes'][name]) == set(CAUSES)
+    assert found['singularity']['condition_max'] == outputs.conditions.max()
+
+
+def test_it_keeps_no_samples() -> None:
+    samples, parameters = random_samples(1, 2000), machine(**LIMITS)
+    outputs = samples.outputs()
+    setpoints = batch(samples.stamps, samples.restarts)
+    summary = Summary(parameters)
+
+    def held_after(blocks: int) -> int:
+        for n in range(blocks):
+            # new arrays: what is kept of them would be seen
+            summary.add(samples.seconds + n, Batch(*map(np.copy, setpoints)),
+                        Outputs(*map(np.copy, outputs)), samples.causes.copy())
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        held = held_after(10)
+        assert held_after(40) - held < 50_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_every_key_is_documented() -> None:
+    def keys(tree: Any, at: str = '') -> set[str]:
+        if isinstance(tree, dict):
+            return {key for name, each in tree.items() for key in keys(each, f'{at}.{name}')}
+        if isinstance(tree, list) and tree and isinstance(tree[0], dict):
+            return keys(tree[0], f'{at}[]')
+        return {at.lstrip('.')}
+
+    samples, parameters = random_samples(1, 50), machine(**LIMITS)
+    found = keys(samples.summary(parameters).values())
+    for leg in parameters['joints']:
+        found = {key.replace(f'legs.{leg}.', 'legs.NAME.').replace(
+            f'causes.{leg}.', 'causes.NAME.') for key in found}
+    for cause in CAUSES:
+        found = {key.replace(f'.{cause}.', '.CAUSE.') for key in found}
+    text = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
+    documented = set(re.findall(r'^\| `([^`]+)` \|', text, flags=re.MULTILINE))
+    assert found <= documented
+    parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'causes.')
+    assert {key for key in documented if key.startswith(parts)} == found - {'limit_met'}
+    assert set(CAUSES) <= documented
+
+
+# Energy
+
+def test_energy_of_a_leg_that_drives_and_brakes() -> None:
+    time = np.linspace(0.0, 2.0 * math.pi, 10001)
+    samples = Samples(10001, seconds=time, demanded=100.0 * np.sin(time)[:, None],
+                      rates=0.5 * np.cos(time)[:, None])
+    leg = samples.summary(machine()).values()['legs']['b']
+    # P = 25 sin 2t: two humps of 25 each way
+    assert leg['energy_driving_j'] == pytest.approx(50.0, rel=1e-6)
+    assert leg['energy_braking_j'] == pytest.approx(50.0, rel=1e-6)
+    assert leg['power_mean_w'] == pytest.approx(0.0, abs=1e-9)
+    assert leg['force_rms_n'] == pytest.approx(100.0 / math.sqrt(2.0), rel=1e-9)
+    assert abs(leg['power_peak_w']) == pytest.approx(25.0, rel=1e-6)
+
+
+def test_the_time_in_a_gap_is_left_out() -> None:
+    found = values(6, seconds=[0.0, 0.1, 0.2, 9.2, 9.3, 9.4], demanded=2.0)
+    assert found['setpoints']['gaps'] == 1
+    assert found['setpoints']['gaps_s'] == pytest.approx(9.0)
+    assert found['setpoints']['duration_s'] == 9.4
+    assert found['legs']['b']['energy_driving_j'] == pytest.approx(2.0 * 0.4)
+    assert found['legs']['b']['power_mean_w'] == pytest.approx(2.0)
+
+
+def test_slow_setpoints_are_no_gaps() -> None:
+    assert values(5, seconds=[0.0, 2.0, 4.0, 6.0, 25.0])['setpoints']['gaps'] == 0
+    assert values(5, seconds=[0.0, 2.0, 4.0, 6.0, 27.0])['setpoints']['gaps'] == 1
+
+
+def test_a_single_setpoint_has_an_rms_and_no_energy() -> None:
+    leg = values(1, demanded=-3.0, rates=2.0)['legs']['b']
+    assert (leg['force_rms_n'], leg['power_mean_w']) == (3.0, -6.0)
+    assert (leg['energy_driving_j'], leg['energy_braking_j']) == (0.0, 0.0)
+
+
+def test_without_a_setpoint_there_is_nothing() -> None:
+    summary = Summary(machine(**LIMITS))
+    found = summary.values()
+    json.dumps(found, allow_nan=False)
+    assert found['setpoints'] == {
+        'answered': 0, 'first_stamp_ns': None, 'last_stamp_ns': None, 'duration_s': 0.0,
+        'gaps': 0, 'gaps_s': 0.0, 'restarts': 0}
+    assert set(found['legs']['front left'].values()) == {None}
+    assert (found['limits'], found['causes'], found['limit_met']) == ([], None, False)
+    assert summary.table() == 'no setpoint could be answered'
+    assert_same(Samples(0).summary(machine()).values(), Summary(machine()).values())
+
+
+def test_there_are_no_margins_without_limits() -> None:
+    leg = values(2)['legs']['b']
+    assert leg['length_margin_m'] is leg['rate_margin_m_s'] is leg['force_margin_n'] is None
+    only = Samples(2, lengths=[[1.0] * 6, [1.25] * 6]).summary(
+        machine(**{'limits.length_max': 1.5})).values()['legs']['b']
+    assert only['length_margin_m'] == 0.25
+
+
+def test_numbers_that_json_cannot_hold_are_none() -> None:
+    found = values(2, demanded=1e200, rates=1e200)['legs']['b']
+    assert found['force_peak_n'] == 1e200
+    assert found['force_rms_n'] is found['power_mean_w'] is found['energy_driving_j'] is None
 
 
 # Crossings
 
 @pytest.mark.parametrize(('determinants', 'crossings'), [
-    ([3.0, 1.0], ()), ([3.0, -1.0], (0.75,)), ([-1.0, 3.0], (0.25,)),
-    ([1.0, -1.0, 1.0], (0.5, 1.5)), ([1.0, 0.0, -1.0], (1.0,)), ([1.0, 0.0, 1.0], ()),
-    ([0.0, 0.0, 1.0], ()), ([-1.0, 0.0], ()), ([2.0, 0.0, 0.0, -1.0, 1.0], (1.0, 3.5)),
-    ([0.0, -1.0, 0.0, 2.0], (2.0,)), ([1e-300, -1e-300], (0.5,)), ([0.0], ())])
-def test_crossings_are_interpolated(
-        determinants: list[float], crossings: tuple[float, ...]) -> None:
-    assert summary_of(determinants).crossings == pytest.approx(crossings)
+    ([3.0, 1.0], []), ([3.0, -1.0], [0.75]), ([-1.0, 3.0], [0.25]),
+    ([1.0, -1.0, 1.0], [0.5, 1.5]), ([1.0, 0.0, -1.0], [1.0]), ([1.0, 0.0, 1.0], []),
+    ([0.0, 0.0, 1.0], []), ([-1.0, 0.0], []), ([2.0, 0.0, 0.0, -1.0, 1.0], [1.0, 3.5]),
+    ([0.0, -1.0, 0.0, 2.0], [2.0]), ([1e-300, -1e-300], [0.5]), ([0.0], [])])
+def test_crossings_are_interpolated(determinants: list[float], crossings: list[float]) -> None:
+    found = singularity(len(determinants), det=determinants)
+    assert found['crossings_at_s'] == pytest.approx(crossings)
+    assert found['crossings'] == len(crossings)
 
 
-def test_crossings_stand_where_the_stamps_are() -> None:
-    summary = summary_of([1.0, 3.0, -1.0], [0.0, 0.1, 0.3])
-    assert summary.crossings == pytest.approx([0.25])
+@pytest.mark.parametrize(('determinants', 'restart', 'crossings'), [
+    ([1.0, -1.0], 1, 0), ([1.0, 0.0, -1.0], 1, 0), ([1.0, 0.0, -1.0], 2, 0),
+    ([1.0, -1.0, -1.0], 2, 1), ([1.0, 1.0, 0.0, 0.0, -1.0], 1, 1), ([1.0, -1.0], 0, 1)])
+@pytest.mark.parametrize('edges', [(), (1,), (2,), (1, 2)])
+def test_a_restart_is_no_crossing(
+        determinants: list[float], restart: int, crossings: int, edges: tuple[int, ...]) -> None:
+    restarts = np.arange(len(determinants)) == restart
+    found = Samples(len(determinants), det=determinants, restarts=restarts).summary(
+        machine(), edges).values()['singularity']
+    assert found['crossings'] == crossings
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
-@given(st.lists(st.integers(-3, 3).map(float), min_size=1, max_size=30))
-def test_there_are_as_many_crossings_as_changes_of_sign(determinants: list[float]) -> None:
-    signs = [number > 0 for number in determinants if number]
-    changes = sum(a != b for a, b in zip(signs, signs[1:], strict=False))
-    summary = summary_of(determinants)
-    assert len(summary.crossings) == changes
-    assert list(summary.crossings) == sorted(summary.crossings)
-    assert abs(summary.nearest) == min(map(abs, determinants))
+def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
+    p = symmetric_parameters()
+    time = np.linspace(0.0, 1.0, 101)
+    turn = 1.5 + 0.123 * time  # the machine is singular at a quarter turn
+    rows = np.zeros((101, runtime.MOTION))
+    rows[:, 2] = 1.0
+    rows[:, 3], rows[:, 4] = np.cos(turn), -np.sin(turn)
+    rows[:, 6], rows[:, 7] = np.sin(turn), np.cos(turn)
+    rows[:, 11], rows[:, 17] = 1.0, 0.123
+    setpoints = batch(np.round(time * SECOND).astype(np.int64), motions=rows)
+    summary = Summary(p)
+    summary.add(time, setpoints, Step(p).many(setpoints, None))
+    found = summary.values()['singularity']
+    assert found['crossings_at_s'] == pytest.approx([(math.pi / 2.0 - 1.5) / 0.123], abs=1e-4)
+    assert found['warnings'] == 1
+    assert found['warnings_from_to_s'][0][0] < found['crossings_at_s'][0]
 
 
-def test_a_bag_that_loops_lasts_what_went_forward_and_crosses_nothing_in_its_jump() -> None:
-    summary = summary_of([1.0, 1.0, -1.0, 1.0, 1.0, -1.0], [0.0, 1.0, 2.0, 0.0, 1.0, 2.0])
-    assert summary.duration == 4.0
-    assert summary.crossings == (1.5, 1.5)
+# The table
+
+def test_a_small_example() -> None:
+    nan = math.nan
+    summary = Samples(
+        4, seconds=[0.0, 1.0, 2.0, 4.0],
+        lengths=[[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [1.5, 1.0, 3.0, 4.0, 5.0, 6.0],
+                 [0.5, 3.0, 3.0, 4.0, 5.0, 6.0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]],
+        demanded=[[10.0, -20.0, 5.0, 0.0, 1.0, 2.0], [-30.0, 15.0, 5.0, 0.0, 1.0, 2.0],
+                  [20.0, 25.0, 5.0, 0.0, 1.0, 3.0], [nan] * 6],
+        rates=0.25, det=[3.0, 1.0, -1.0, -2.0], condition=[1.0, 2.0, 3.0, 2.0],
+        warnings=[False, True, True, False]).summary(machine(**{
+            'limits.length_min': 0.75, 'limits.length_max': 10.0, 'limits.force_max': 25.0}))
+    assert summary.table().splitlines() == [
+        '4 setpoints in 4.00 s',
+        '',
+        '            --------------force [N]-------------- power [W] ------length [m]------- '
+        'rate [m/s]',
+        'leg              peak    at [s]      RMS   margin      peak    from      to  margin'
+        '     peak',
+        'front left      -30.0*     1.00     24.0     -5.0      -7.5  0.5000  1.5000 -0.2500'
+        '   0.2500',
+        'b                25.0*     2.00     19.2      0.0       6.2  1.0000  3.0000  0.2500'
+        '   0.2500',
+        'c                 5.0      0.00      5.0     20.0       1.2  3.0000  3.0000  2.2500'
+        '   0.2500',
+        'd                 0.0      0.00      0.0     25.0       0.0  4.0000  4.0000  3.2500'
+        '   0.2500',
+        'e                 1.0      0.00      1.0     24.0       0.2  5.0000  5.0000  4.2500'
+        '   0.2500',
+        'f                 3.0      2.00      2.3     22.0       0.8  6.0000  6.0000  4.0000'
+        '   0.2500',
+        '* at limits.force_max or beyond: published clipped to it, the leg would need more',
+        'limits.length_min, 0.75, broken by front left in 1 setpoint from t = 2.00 s on: 0.5 at '
+        'worst',
+        'limits.force_max, 25, broken by front left in 1 setpoint from t = 1.00 s on: -30 at '
+        'worst',
+        '',
+        'det(J) crossed zero at t = 1.500 s: forces grow without bound there',
+        'det(J) nearest zero: 1 m^3 at t = 1.00 s',
+        'condition number of J_inv: 3 at most, at t = 2.00 s',
+        'no forces were published in 1 setpoint',
+        'singularity warning from t = 1.00 s to 4.00 s: 0.50 s before the crossing']
 
 
-# Forces
-
-def test_legs_without_forces_say_so() -> None:
-    forces = np.ones((3, 6))
-    forces[:, 2] = math.nan
-    forces[1] = NONE
-    summary = summary_of([1.0, 1.0, 1.0], forces=forces)
-    assert math.isnan(summary.peaks[2].force)
-    assert summary.peaks[0].force == 1.0
-    line = summary.table().splitlines()[6]
-    assert line.startswith('c ')
-    assert 'none' in line
-    assert 'nan' not in summary.table()
-
-
-def test_a_peak_at_its_limit_is_marked_as_clipped() -> None:
-    forces = [[100.0, -100.0, 99.9, 0.0, 0.0, math.nan]] * 2
-    summary = summary_of([1.0, 1.0], forces=forces, force_max=[100.0] * 6)
-    assert [p.clipped for p in summary.peaks] == [True, True, False, False, False, False]
-    lines = summary.table().splitlines()
-    assert [('*' in line) for line in lines[4:10]] == [True, True, False, False, False, False]
-    assert lines[10].startswith('* clipped to limits.force_max')
-    unlimited = summary_of([1.0, 1.0], forces=forces)
-    assert not any(p.clipped for p in unlimited.peaks)
-    assert '*' not in unlimited.table()
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(st.integers(0, 10 ** 6), st.integers(0, 60), st.floats(1e-3, 1e9), st.booleans())
+def test_the_table_is_no_wider_than_100_columns(
+        seed: int, many: int, scale: float, limited: bool) -> None:
+    samples = random_samples(seed, many) if many else Samples(0)
+    samples.demanded *= scale
+    samples.forces *= scale
+    table = samples.summary(machine(**LIMITS) if limited else machine()).table()
+    assert all(len(line) <= 100 and line == line.rstrip() for line in table.splitlines())
+    assert 'nan' not in table
+    assert 'inf' not in table
+    assert 'None' not in table
 
 
-# Warnings
-
-def _warnings(*changes: tuple[float, bool]) -> list[tuple[int, bool]]:
-    return [(round((1000 + time) * SECOND), on) for time, on in changes]
-
-
-@pytest.mark.parametrize(('changes', 'spans'), [
-    ([], ()), ([(0.0, False)], ()), ([(0.0, True)], ((0.0, math.inf),)),
-    ([(0.0, False), (1.0, True), (2.0, False)], ((1.0, 2.0),)),
-    ([(0.0, True), (1.0, False), (2.0, True), (3.0, False)], ((0.0, 1.0), (2.0, 3.0))),
-    ([(0.0, False), (1.0, True), (2.0, False), (3.5, True)], ((1.0, 2.0), (3.5, math.inf)))])
-def test_spans_of_the_warning(
-        changes: list[tuple[float, bool]], spans: tuple[tuple[float, float], ...]) -> None:
-    assert summary_of([1.0] * 5, warnings=_warnings(*changes)).warnings == spans
+def test_a_leg_without_forces_has_no_columns_of_them() -> None:
+    table = Samples(3, demanded=math.nan).summary(machine(**LIMITS)).table()
+    assert 'force [N]' not in table
+    assert 'length [m]' in table
+    assert 'no forces were published in 3 setpoints' in table
 
 
-def test_the_table_says_how_long_before_a_crossing_the_warning_came() -> None:
-    table = summary_of([2.0, 1.0, -1.0, -2.0, -3.0], warnings=_warnings(
-        (0.0, False), (1.0, True), (2.0, False), (3.0, True))).table()
+def test_it_says_when_all_limits_hold_and_nothing_warned() -> None:
+    held = Samples(1).summary(machine(**{'limits.force_max': 5.0})).table()
+    assert 'all limits held' in held
+    assert '1 setpoint in 0.00 s' in held
+    assert 'det(J) did not cross zero' in held
+    assert 'no singularity warning' in held
+    assert 'all limits held' not in Samples(1).summary(machine()).table()
+    # published forces that are clipped do not tell how much was demanded
+    clipped = Samples(1).summary(machine(**{'limits.force_max': 1.0})).table()
+    assert 'all limits held' not in clipped
+    assert '1.0*' in clipped
+
+
+def test_it_says_how_long_before_a_crossing_the_warning_came_and_not_all_of_many() -> None:
+    table = Samples(5, det=[2.0, 1.0, -1.0, -2.0, -3.0],
+                    warnings=[0, 1, 0, 1, 1]).summary(machine()).table()
     assert 'warning from t = 1.00 s to 2.00 s: 0.50 s before the crossing' in table
-    assert 'warning from t = 3.00 s to the end\n' in table + '\n'
-    assert 'no singularity warning' not in table
+    assert table.endswith('warning from t = 3.00 s to the end')
+    many = np.arange(40)
+    table = Samples(40, det=(-1.0) ** many, warnings=many % 2).summary(machine()).table()
+    assert 't = 4.500 s and 34 times more: forces' in ' '.join(table.split())
+    assert table.endswith('and 15 singularity warnings more, for 19.00 s in all')
+
+
+def test_gaps_and_restarts_stand_in_the_first_line() -> None:
+    summary = Samples(5, seconds=[0.0, 0.1, 0.2, 3.2, 3.2], restarts=[0, 0, 0, 0, 1]).summary(
+        machine())
+    assert summary.table().startswith(
+        '5 setpoints in 3.20 s, of them 3.00 s in 1 gap, 1 restart\n')

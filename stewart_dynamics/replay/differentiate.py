@@ -1,0 +1,405 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Twist and acceleration of recorded poses, by smoothing splines.
+
+Positions and the four numbers of the quaternion are each smoothed by the cubic spline f that
+minimises ``sum h_i (y_i - f(t_i))^2 + L * integral f''^2 dt`` over a stretch without gaps, where
+h_i is half the time from the pose before to the pose after. By these weights the sum is the
+integral of (y - f)^2 by trapezoids, so the spline is the same filter however the poses are
+spaced: for ``f = H y`` the minimum has ``(1 + L w^4) H(w) = 1`` (Craven and Wahba, Numerische
+Mathematik 31, 1979, doi:10.1007/BF01404567; Unser and Blu, IEEE Trans. Signal Processing 53(6),
+2005, doi:10.1109/TSP.2005.847856). It has no phase. The cut-off frequency f_c is where an
+amplitude comes down to 1/sqrt(2) of it (-3 dB), hence ``L = (sqrt(2) - 1) / (2 pi f_c)^4``:
+
+    H = 1 / (1 + (sqrt(2) - 1) (f / f_c)^4)
+
+which leaves 99.9 % at 0.2 f_c, 50 % at 1.25 f_c and 3 % at 3 f_c. On samples h apart w^4 is in
+truth ``(2 - 2 cos wh)^2 / (h^4 (2 + cos wh) / 3)``, w^4 within 0.5 % up to a fifth of the
+sampling rate. Acceleration passes as w^2 H: white noise of s in poses h apart leaves
+``s sqrt(sqrt(2) / 16 h W^5)``, ``W = 2 pi f_c / (sqrt(2) - 1)^(1/4)``, which grows so fast with
+the cut-off that the cut-off wants to be as low as the motion allows.
+
+The poles of H decay by ``W / sqrt(2)`` = 5.54 f_c in a second, so what is farther away than
+5 / f_c counts less than 1e-12: a long recording is worked off in windows that overlap by this.
+At the ends of a stretch the spline is natural, without acceleration; within about 1 / f_c of
+them the accelerations are too small, and how many setpoints this concerns is counted.
+
+The spline is had in the form of Reinsch (Numerische Mathematik 10, 1967,
+doi:10.1007/BF02162161; Green and Silverman, Nonparametric Regression and Generalized Linear
+Models, 1994, 2.3): a banded system for the second derivatives at the samples. SciPy's own
+``make_smoothing_spline`` gives the same numbers, but takes 6 us for a pose and axis where this
+takes 0.1 us for all axes, and loses twenty times more digits at low cut-off frequencies.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics import rotation as rotations
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.inverse_dynamics import MOTION, WRENCH
+from stewart_dynamics.step import Batch
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+# Poses that are worked off at once.
+WINDOW = 4096
+
+# Fewer poses in a stretch say nothing of an acceleration: a natural spline has none at its ends.
+FEWEST = 5
+TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration follows from them'
+TOO_FAST = 'turns faster than the cut-off frequency can follow'
+
+# Of the reach of the spline, in times of 1 / cut-off and in poses, where these are sparse: an
+# interpolating spline forgets by a factor of 0.27 a pose.
+_REACH = 5.0
+_REACH_IN_POSES = 32
+# The system's condition grows with the fourth power of it: 4e-6 of the acceleration is lost here.
+_MOST_POSES_IN_A_CUTOFF = 2000
+# A smoothed quaternion is shorter than one by what is smoothed away of it.
+_SHORTEST_QUATERNION = 0.5
+
+_POSITION, _ROTATION, _POSE = slice(0, 3), slice(3, 12), slice(0, 12)
+_VELOCITY, _OMEGA, _ACCELERATION, _ALPHA = (
+    slice(12, 15), slice(15, 18), slice(18, 21), slice(21, 24))
+
+
+class Spline(NamedTuple):
+    """A smoothing spline at its samples, each (N, K)."""
+
+    values: Array
+    rates: Array
+    accelerations: Array
+
+
+def smoothing_spline(times: Array, samples: Array, cutoff: float) -> Spline:
+    """
+    Return the smoothing spline of K signals that were sampled at the same times.
+
+    Parameters
+    ----------
+    times : (N,)
+        [s], increasing, N at least FEWEST.
+    samples : (N, K)
+        Of the signals, in any unit.
+    cutoff : float
+        Frequency that passes with 1/sqrt(2) of its amplitude [Hz].
+
+    """
+    banded = _banded_solver()
+    steps = np.diff(times)
+    slope = 1.0 / steps
+    weights = np.empty(len(times))
+    weights[1:-1] = 0.5 * (steps[1:] + steps[:-1])
+    weights[0], weights[-1] = 0.5 * steps[0], 0.5 * steps[-1]
+    roughness = (math.sqrt(2.0) - 1.0) / (2.0 * math.pi * cutoff) ** 4 / weights
+    # Green and Silverman, 2.1.2: column j of Q has these at j, j + 1 and j + 2; R + L Q^T W^-1 Q
+    # by its diagonals, the lower ones below
+    first, third = slope[:-1], slope[1:]
+    second = -(first + third)
+    matrix = np.zeros((3, len(times) - 2))
+    matrix[0] = ((steps[:-1] + steps[1:]) / 3.0 + first ** 2 * roughness[:-2]
+                 + second ** 2 * roughness[1:-1] + third ** 2 * roughness[2:])
+    matrix[1, :-1] = (steps[1:-1] / 6.0 + second[:-1] * first[1:] * roughness[1:-2]
+                      + third[:-1] * second[1:] * roughness[2:-1])
+    matrix[2, :-2] = third[:-2] * first[2:] * roughness[2:-2]
+
+    bends = np.zeros_like(samples)
+    bends[1:-1] = banded(
+        matrix, np.diff(np.diff(samples, axis=0) * slope[:, None], axis=0), lower=True,
+        overwrite_ab=True, overwrite_b=True, check_finite=False)
+    residual = np.diff(np.diff(bends, axis=0) * slope[:, None], axis=0, prepend=0.0, append=0.0)
+    values = samples - roughness[:, None] * residual
+
+    # the slope at either end of a piece; each sample takes that of its longer piece, where the
+    # difference loses fewer digits
+    step = steps[:, None]
+    chords = np.diff(values, axis=0) / step
+    begins = chords - step * (2.0 * bends[:-1] + bends[1:]) / 6.0
+    ends = chords + step * (bends[:-1] + 2.0 * bends[1:]) / 6.0
+    rates = np.concatenate([begins, ends[-1:]])
+    rates[1:-1] = np.where(step[1:] >= step[:-1], begins[1:], ends[:-1])
+    return Spline(values, rates, bends)
+
+
+def _banded_solver() -> Any:
+    try:
+        from scipy.linalg import solveh_banded
+    except ImportError as exc:
+        raise StewartError('twist and acceleration of poses need scipy, which is not installed: '
+                           'pip install "stewart_dynamics[differentiate]"') from exc
+    return solveh_banded
+
+
+class Deviation(NamedTuple):
+    """
+    How far the smoothed poses are from the recorded ones: noise, and what is cut off.
+
+    Of poses farther than 1 / cutoff from the ends of their stretch.
+    """
+
+    position_rms: float
+    """[m]"""
+    position_max: float
+    angle_rms: float
+    """[rad]"""
+    angle_max: float
+
+
+class Differentiator:
+    """
+    Gives poses their twist and acceleration, batch by batch, in bounded memory.
+
+    The poses themselves stay as they were recorded, bit for bit: leg lengths, det(J) and limits
+    are those of the recording, and a cut-off that is too low cannot hide a limit that the
+    recording breaks. Twist and acceleration are those of the smoothed pose at the same time,
+    derived exactly, without a phase between them; ``deviation`` says how far the two are apart.
+
+    A jump back in time or a gap ends a stretch, and no spline passes over it. The results are
+    the same, bit for bit, however the poses are cut into batches.
+
+    Parameters
+    ----------
+    cutoff : float
+        Frequency that passes with 1/sqrt(2) of its amplitude [Hz].
+    gap : float
+        Longest time between two poses of a stretch [s].
+    window : int
+        Poses that are worked off at once.
+
+    Raises StewartError where the cut-off is no positive number, or scipy is not installed.
+
+    """
+
+    def __init__(self, cutoff: float, gap: float, window: int = WINDOW) -> None:
+        if not (math.isfinite(cutoff) and cutoff > 0.0):
+            raise StewartError(f'cut-off frequency: {cutoff} Hz: must be a positive number')
+        _banded_solver()
+        self.cutoff = cutoff
+        self.left_out: Counter[str] = Counter()
+        """Setpoints that got no twist and acceleration and are not given back, by reason."""
+        self.near_ends = 0
+        """Setpoints within 1 / cutoff of an end of their stretch."""
+        self._gap = round(gap * 1e9)
+        self._reach = round(_REACH / cutoff * 1e9)
+        self._window = window
+        self._pending: list[Batch] = []
+        self._held = 0
+        self._due = window
+        # of the stretch that the pending setpoints begin in: how many of them were given
+        # already and stay for the next window's sake, and its first stamp
+        self._given = 0
+        self._begun = 0  # [ns]
+        self._restart = False  # of a setpoint that was left out
+        self._gathered = 0
+        self._squares = np.zeros(2)
+        self._largest = np.zeros(2)
+
+    @property
+    def deviation(self) -> Deviation:
+        """How far the smoothed poses are from the recorded ones so far."""
+        position, angle = np.sqrt(self._squares / max(self._gathered, 1)).tolist()
+        return Deviation(position, float(self._largest[0]), angle, float(self._largest[1]))
+
+    def add(self, batch: Batch) -> Batch:
+        """
+        Take setpoints that have poses only; return those that are done, with their motion.
+
+        Parameters
+        ----------
+        batch : Batch
+            Stamps increase but where time has jumped back.
+
+        """
+        wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
+        self._pending.append(Batch(
+            batch.stamps, batch.motions, wrenches, batch.restarts, batch.times))
+        self._held += len(batch.stamps)
+        # not at every batch: joining what is pending takes time
+        return self._done() if self._held >= self._due else _joined([])
+
+    def finish(self) -> Batch:
+        """Return the setpoints that are left, with their motion; no more are to come."""
+        done = self._done(ended=True)
+        self._pending, self._held = [], 0
+        return done
+
+    def notices(self) -> list[str]:
+        """Return what a reader of the results has to know, in words."""
+        off = self.deviation
+        lines = [
+            f'twist and acceleration are those of smoothing splines through the poses, cut-off '
+            f'frequency {self.cutoff:g} Hz; the splines pass the poses at '
+            f'{off.position_rms * 1e3:.3g} mm and {math.degrees(off.angle_rms):.3g} degrees '
+            f'RMS, {off.position_max * 1e3:.3g} mm and {math.degrees(off.angle_max):.3g} '
+            'degrees at most']
+        if self.near_ends:
+            lines.append(
+                f'{self.near_ends} setpoints are within {1.0 / self.cutoff:.3g} s of the begin '
+                'or end of the poses or of a gap in them: their accelerations are too small')
+        return lines
+
+    def _done(self, ended: bool = False) -> Batch:
+        """Work off every window that has all that it needs."""
+        held = _joined(self._pending)
+        stamps = held.stamps
+        steps = np.diff(stamps)
+        begins = [0, *(np.flatnonzero(
+            held.restarts[1:] | (steps <= 0) | (steps > self._gap)) + 1).tolist()]
+        ends = [*begins[1:], len(stamps)]
+        done: list[Batch] = []
+        for begin, end in zip(begins, ends, strict=True):
+            stretch = _part(held, slice(begin, end))
+            closed = ended or end < len(stamps)
+            done += self._windows(stretch, closed)
+            if closed:
+                self._given = 0
+            else:
+                self._keep(stretch)
+        return _joined(done)
+
+    def _windows(self, stretch: Batch, closed: bool) -> list[Batch]:
+        """Work off a stretch as far as can be; a closed one to its end."""
+        stamps = stretch.stamps
+        if closed and not self._given and len(stamps) < FEWEST:
+            if len(stamps):
+                self.left_out[TOO_FEW] += len(stamps)
+                self._restart = self._restart or bool(stretch.restarts.any())
+            return []
+        if not self._given:
+            self._begun = int(stamps[0])
+        done = []
+        while self._given < len(stamps):
+            end = min(self._given + self._window, len(stamps))
+            after = self._end_of_reach(stamps, end - 1)
+            if not closed and (end < self._given + self._window or after > len(stamps)):
+                break
+            part = slice(self._begin_of_reach(stamps, self._given), min(after, len(stamps)))
+            # numbers that overflow are left to the step, which refuses them
+            with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+                done.append(self._differentiate(stretch, part, slice(self._given, end)))
+            self._given = end
+        return done
+
+    def _keep(self, stretch: Batch) -> None:
+        """Keep of a stretch that goes on what the next window needs."""
+        begin = self._begin_of_reach(stretch.stamps, self._given)
+        self._pending = [_part(stretch, slice(begin, None))]
+        self._given -= begin
+        self._held = len(stretch.stamps) - begin
+        self._due = self._held + self._window // 2
+
+    def _begin_of_reach(self, stamps: Stamps, at: int) -> int:
+        """Return the first pose that counts for this one."""
+        before = int(np.searchsorted(stamps, int(stamps[at]) - self._reach))
+        return max(0, min(before - 1, at - _REACH_IN_POSES))
+
+    def _end_of_reach(self, stamps: Stamps, at: int) -> int:
+        """Return the end of the poses that count for this one; beyond them if some are to come."""
+        after = int(np.searchsorted(stamps, int(stamps[at]) + self._reach, side='right'))
+        return max(after + 1, at + _REACH_IN_POSES)
+
+    def _differentiate(self, stretch: Batch, part: slice, core: slice) -> Batch:
+        """Return a core of setpoints with the motion of the spline through a part around it."""
+        stamps, motions = stretch.stamps[part], stretch.motions[part]
+        times = (stamps - stamps[0]) * 1e-9
+        self._check_rate(times)
+        quaternions = rotations.to_quaternion(motions[:, _ROTATION].reshape(-1, 3, 3))
+        flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
+        quaternions[1:][np.logical_xor.accumulate(flips)] *= -1.0
+        spline = smoothing_spline(
+            times, np.concatenate([motions[:, _POSITION], quaternions], axis=1), self.cutoff)
+        inner = slice(core.start - part.start, core.stop - part.start)
+        values, rates, accelerations = (each[inner] for each in spline)
+
+        turn, turn_rate, turn_acceleration = (each[:, 3:] for each in (
+            values, rates, accelerations))
+        square = np.sum(turn ** 2, axis=-1, keepdims=True)
+        followed = ~(square[:, 0] < _SHORTEST_QUATERNION ** 2)
+        # of u = |u| q: the vector part of u' u^-1 is that of q' q^-1, half the angular velocity;
+        # that of u' times the conjugate of u' is zero
+        omega = 2.0 * _vector_of_quotient(turn_rate, turn) / square
+        alpha = (2.0 * _vector_of_quotient(turn_acceleration, turn) / square
+                 - 2.0 * np.sum(turn * turn_rate, axis=-1, keepdims=True) / square * omega)
+        given = _part(stretch, core)
+        out = np.empty_like(given.motions)
+        out[:, _POSE] = given.motions[:, _POSE]
+        out[:, _VELOCITY], out[:, _ACCELERATION] = rates[:, :3], accelerations[:, :3]
+        out[:, _OMEGA], out[:, _ALPHA] = omega, alpha
+
+        time = 1e9 / self.cutoff
+        near = (given.stamps - self._begun < time) | (stretch.stamps[-1] - given.stamps < time)
+        self.near_ends += int(np.count_nonzero(followed & near))
+        known = followed & ~near & np.isfinite(out).all(axis=1)
+        self._gather(values[known, :3] - out[known, _POSITION], turn[known],
+                     quaternions[inner][known])
+        return self._followed(given, out, followed)
+
+    def _check_rate(self, times: Array) -> None:
+        if len(times) < _MOST_POSES_IN_A_CUTOFF:
+            return
+        rate = 1.0 / float(np.median(np.diff(times)))
+        if rate > self.cutoff * _MOST_POSES_IN_A_CUTOFF:
+            raise StewartError(
+                f'cut-off frequency: {self.cutoff:g} Hz: must be at least '
+                f'{rate / _MOST_POSES_IN_A_CUTOFF:.3g} Hz where poses come at {rate:.6g} Hz, '
+                f'a {_MOST_POSES_IN_A_CUTOFF}th of it')
+
+    def _gather(self, off: Array, turn: Array, recorded: Array) -> None:
+        """Gather how far positions, and quaternions of any length, are from those recorded."""
+        angle = 2.0 * np.arctan2(np.linalg.norm(_vector_of_quotient(turn, recorded), axis=-1),
+                                 np.sum(turn * recorded, axis=-1))
+        distances = np.stack([np.linalg.norm(off, axis=-1), angle])
+        self._gathered += len(off)
+        self._squares += np.sum(distances ** 2, axis=1)
+        self._largest = np.maximum(self._largest, np.max(distances, axis=1, initial=0.0))
+
+    def _followed(self, given: Batch, motions: Array, followed: Flags) -> Batch:
+        """Leave out what the spline could not follow; a restart among it stays one."""
+        self.left_out.update({TOO_FAST: n} if (n := int(np.count_nonzero(~followed))) else {})
+        jumps = np.cumsum(given.restarts) + self._restart
+        kept = jumps[followed]
+        self._restart = bool(jumps[-1] > (kept[-1] if len(kept) else 0))
+        if n:
+            given, motions = _part(given, followed), motions[followed]
+        return Batch(given.stamps, motions, given.wrenches, np.diff(kept, prepend=0) > 0,
+                     given.times)
+
+
+def _vector_of_quotient(a: Array, b: Array) -> Array:
+    """Return the vector part of a times the conjugate of b, of quaternions x y z w (N, 4)."""
+    return (b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3]))
+
+
+def _joined(batches: list[Batch]) -> Batch:
+    if len(batches) == 1:
+        return batches[0]
+    if not batches:
+        none = np.empty(0, dtype=np.int64)
+        return Batch(none, np.empty((0, MOTION)), np.empty((0, WRENCH)), none.astype(bool), none)
+    return Batch(*map(np.concatenate, zip(*batches, strict=True)))
+
+
+def _part(batch: Batch, part: slice | Flags) -> Batch:
+    return Batch(batch.stamps[part], batch.motions[part], batch.wrenches[part],
+                 batch.restarts[part], batch.times[part])

@@ -1,0 +1,226 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The table of many bags, a row for each: fleet.csv, and index.html, which sorts."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+import csv
+import hashlib
+from importlib.resources import files
+import json
+import math
+import os
+from pathlib import Path
+import re
+import tempfile
+from typing import Any, NamedTuple, TextIO
+from urllib.parse import quote
+
+from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
+
+Cell = str | int | float | bool | None
+Row = Mapping[str, Cell]
+"""Of one bag: a cell for each column."""
+
+RESULTS = ('done', 'limit met', 'failed', 'partly read')
+"""The exit codes in words."""
+
+
+class Column(NamedTuple):
+    """
+    What fleet.csv calls a column, and its head on the page with its unit.
+
+    ``of`` gives the cell from the dict that summary.json holds; None: not from there.
+    ``size``: the page sorts these numbers by size, whatever their sign.
+    """
+
+    key: str
+    head: str
+    unit: str = ''
+    of: Callable[[dict[str, Any]], Cell] | None = None
+    number: bool = True
+    size: bool = False
+
+
+def _legs(key: str, choose: Callable[..., Any]) -> Callable[[dict[str, Any]], Cell]:
+    def of(summary: dict[str, Any]) -> Cell:
+        values = [leg[key] for leg in summary['legs'].values() if leg[key] is not None]
+        return choose(values) if values else None
+
+    return of
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max(values, key=abs)
+
+
+def _worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
+    """Return what gives of the largest force: 0 itself, 1 its leg, 2 its time."""
+    def of(summary: dict[str, Any]) -> Cell:
+        peaks = [(leg['force_peak_n'], name, leg['force_peak_at_s'])
+                 for name, leg in summary['legs'].items() if leg['force_peak_n'] is not None]
+        cell: Cell = max(peaks, key=lambda peak: abs(peak[0]))[what] if peaks else None
+        return cell
+
+    return of
+
+
+def _broken(summary: dict[str, Any]) -> str:
+    legs: dict[str, list[str]] = {}
+    for each in summary['limits']:
+        legs.setdefault(each['limit'].removeprefix('limits.'), []).append(each['leg'])
+    return '; '.join(f'{limit}: {", ".join(of)}' for limit, of in legs.items())
+
+
+def _singularity(key: str) -> Callable[[dict[str, Any]], Cell]:
+    def of(summary: dict[str, Any]) -> Cell:
+        cell: Cell = summary['singularity'][key]
+        return cell
+
+    return of
+
+
+COLUMNS = (
+    Column('bag', 'bag', number=False),
+    Column('code', ''),
+    Column('result', 'result', number=False),
+    Column('complete', '', '', lambda summary: bool(summary['complete']), number=False),
+    Column('setpoints', 'setpoints', '', lambda summary: summary['setpoints']['answered']),
+    Column('duration_s', 'duration', 's', lambda summary: summary['setpoints']['duration_s']),
+    Column('force_worst_n', 'worst force', 'N', _worst_force(0), size=True),
+    Column('force_worst_leg', 'of leg', '', _worst_force(1), number=False),
+    Column('force_worst_at_s', 'at', 's', _worst_force(2)),
+    Column('force_margin_n', 'force margin', 'N', _legs('force_margin_n', min)),
+    Column('length_margin_m', 'length margin', 'm', _legs('length_margin_m', min)),
+    Column('rate_margin_m_s', 'rate margin', 'm/s', _legs('rate_margin_m_s', min)),
+    Column('limits_broken', 'limits broken', '', _broken, number=False),
+    Column('force_rms_n', 'RMS force', 'N', _legs('force_rms_n', max)),
+    Column('power_peak_w', 'peak power', 'W', _legs('power_peak_w', _largest), size=True),
+    Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
+           _singularity('determinant_nearest_m3'), size=True),
+    Column('crossings', 'crossings', '', _singularity('crossings')),
+    Column('condition_max', 'condition number', 'max', _singularity('condition_max')),
+    Column('warnings', 'warnings', '', _singularity('warnings')),
+    Column('refused', 'refused', '',
+           lambda summary: sum(each['count'] for each in summary['refused'])),
+    Column('error', 'error', number=False),
+    Column('results', '', number=False),
+)
+
+
+def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, Cell]:
+    """
+    Return a bag's cells, all but its name and the folder of its results.
+
+    Parameters
+    ----------
+    code : int
+        With which its replay ended.
+    summary : dict, optional
+        What summary.json holds; None where the bag failed.
+    error : str
+        What is wrong with the bag, in words.
+
+    """
+    cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'error': error}
+    if summary is not None:
+        cells['software'] = summary['software']
+        cells.update({column.key: column.of(summary) for column in COLUMNS if column.of})
+    return cells
+
+
+def write_fleet(output: Path, rows: Sequence[Row]) -> None:
+    """Write fleet.csv and index.html into a folder, each whole or not at all."""
+    with _whole_file(output / FLEET_TABLE) as file:
+        # All text in quotes: then no bag's name falls apart into cells at a semicolon either,
+        # where a spreadsheet separates by that.
+        table = csv.writer(file, quoting=csv.QUOTE_NONNUMERIC)
+        table.writerow([column.key for column in COLUMNS])
+        table.writerows([_harmless(column.key, row.get(column.key)) for column in COLUMNS]
+                        for row in rows)
+    with _whole_file(output / FLEET_PAGE) as file:
+        file.write(_page(output, rows))
+
+
+def _harmless(key: str, cell: Cell) -> Cell:
+    """
+    Return a cell that no spreadsheet takes for a formula.
+
+    A name that begins as one gets './' before it and is still the same path; other text gets an
+    apostrophe.
+    """
+    if cell is None:
+        return ''
+    if isinstance(cell, bool):
+        return str(cell).lower()
+    if isinstance(cell, str) and cell[:1] in tuple('=+-@\t\r\n'):
+        return ('./' if key in ('bag', 'results') else "'") + cell
+    return cell
+
+
+def _page(output: Path, rows: Sequence[Row]) -> str:
+    shown = [column for column in COLUMNS if column.head]
+    fleet = {
+        'software': next((row['software'] for row in rows if 'software' in row), ''),
+        'columns': [{'key': column.key, 'head': column.head, 'unit': column.unit,
+                     'number': column.number, 'size': column.size} for column in shown],
+        'codes': [row['code'] for row in rows],
+        'links': [_link(output, row) for row in rows],
+        'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
+    }
+    # Nothing in the data can end the element that holds it.
+    data = json.dumps(fleet, separators=(',', ':'), allow_nan=False).replace('<', '\\u003c')
+    template = files(__package__).joinpath('index.html').read_text(encoding='utf-8')
+    script = re.search(r'<script>(.*)</script>', template, re.DOTALL)
+    assert script is not None
+    # The browser is told to run this script and no other, and to load nothing.
+    digest = base64.b64encode(hashlib.sha256(script[1].encode()).digest()).decode()
+    return template.replace('SHA256', digest).replace('FLEET', data)
+
+
+def _shown(cell: Cell) -> Cell:
+    """Return a number in the digits that a person reads."""
+    if isinstance(cell, float):
+        return float(f'{cell:.6g}') if math.isfinite(cell) else None
+    return cell
+
+
+def _link(output: Path, row: Row) -> str | None:
+    """Return where a bag's report is, or its folder if there is none."""
+    if row['results'] is None:
+        return None
+    report = Path(str(row['results'])) / 'report.html'
+    target = report if (output / report).is_file() else report.parent
+    return quote(os.fsencode(target))
+
+
+@contextmanager
+def _whole_file(final: Path) -> Iterator[TextIO]:
+    """Give a file that takes its final name only when all of it is written."""
+    descriptor, name = tempfile.mkstemp(prefix=f'.{final.name}.', dir=final.parent)
+    partial = Path(name)
+    try:
+        # Names that are no UTF-8 are shown with escapes.
+        with open(descriptor, 'w', newline='', encoding='utf-8',
+                  errors='backslashreplace') as file:
+            yield file
+        partial.chmod(0o644)
+        partial.replace(final)
+    finally:
+        partial.unlink(missing_ok=True)

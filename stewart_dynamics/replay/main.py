@@ -1,0 +1,164 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The command line of stewart_replay."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import math
+from pathlib import Path
+import sys
+
+from tqdm import tqdm
+
+from stewart_dynamics import compiled
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.bags import folders_of_results
+from stewart_dynamics.replay.fleet import replay_fleet
+from stewart_dynamics.replay.one import (
+    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, replay)
+
+_INTERRUPTED = 130
+_CUTOFF = 10.0
+# Of so many bags each one's summary is printed; of more how many ended how.
+_FEW = 10
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    given = _arguments().parse_args(arguments)
+    try:
+        return _run(given, _options(given))
+    except (StewartError, OSError) as exc:
+        _complain(exc)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='stewart_replay', formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Compute leg lengths, forces and singularity warnings of recorded setpoints, '
+                    'as the node does, bit for bit.',
+        epilog='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node), '
+               'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
+               'index.html.\n\nexit codes: 0 done; 1 with --strict, when a limit or singularity '
+               'warning was met;\n2 bad arguments, parameters or bags; 3 part of a bag could not '
+               'be read, the rest is done;\nof several bags the gravest: 2, then 3, then 1')
+    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
+                        help='rosbag2 folder, .mcap or .db3 file, or a folder with bags in it')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the machine, the file that the node takes')
+    parser.add_argument('--output', type=Path, default=Path('replayed'), metavar='DIR',
+                        help='folder of the results (default: replayed)')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when a limit or singularity warning was met')
+    topics = parser.add_argument_group(
+        'topics', 'Setpoints are looked for under the usual names, then by their type.')
+    topics.add_argument('--node', default=NODE, metavar='NAME',
+                        help=f'name before the usual topics (default: {NODE})')
+    for name, what in (
+            ('pose', 'poses'), ('twist', 'twists'), ('accel', 'accelerations'),
+            ('combined', 'setpoints in one message; sets setpoint.source'),
+            ('wrench', 'loads on the platform; never found by its type')):
+        topics.add_argument(f'--{name}', metavar='TOPIC', help=f'topic of the {what}')
+    topics.add_argument('--measured', metavar='TOPIC',
+                        help='JointState whose efforts are compared with the computed forces')
+    poses = parser.add_argument_group('bags that have only poses')
+    poses.add_argument('--differentiate', action='store_true',
+                       help='make twist and acceleration of the poses, by smoothing splines')
+    poses.add_argument('--cutoff', type=_frequency, default=_CUTOFF, metavar='HZ',
+                       help=f'cut-off frequency of the splines (default: {_CUTOFF:g})')
+    output = parser.add_argument_group('what is written')
+    output.add_argument('--no-report', action='store_true', help='write no report.html')
+    output.add_argument('--parquet', action='store_true',
+                        help='write legs.parquet in place of legs.csv')
+    many = parser.add_argument_group('many bags')
+    many.add_argument('--jobs', type=_number, default=1, metavar='N',
+                      help='bags that are replayed at the same time (default: 1)')
+    many.add_argument('--scheduler', metavar='ADDRESS',
+                      help='let the workers of this Dask scheduler do it; they see the same '
+                           'folders')
+    return parser
+
+
+def _options(given: argparse.Namespace) -> Options:
+    names = ('pose', 'twist', 'accel', 'combined', 'wrench')
+    return Options(
+        node='/' + given.node.strip('/'),
+        topics={name: getattr(given, name) for name in names if getattr(given, name)},
+        cutoff=given.cutoff if given.differentiate else None, measured=given.measured,
+        parquet=given.parquet, report=not given.no_report, force=given.force)
+
+
+def _run(given: argparse.Namespace, options: Options) -> int:
+    parameters = Parameters.from_yaml(given.params, given.node)
+    bags = folders_of_results(given.bags, given.output)
+    if compiled.HINT:
+        print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
+    if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
+        return _one(*bags[0], parameters, options, given.strict)
+    fleet = replay_fleet(
+        bags, parameters, given.output, options, given.jobs, given.scheduler)
+    for ended in fleet.ended:
+        if ended.text and len(bags) <= _FEW:
+            print(f'{ended.text}\n')
+        if ended.error:
+            _complain(ended.error)
+    print(fleet.text().partition('\n')[0])
+    return fleet.code(given.strict)
+
+
+def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, strict: bool) -> int:
+    size = sum(file.stat().st_size for file in bag.iterdir()) if bag.is_dir() else None
+    with tqdm(total=size, unit='B', unit_scale=True, disable=None, leave=False,
+              dynamic_ncols=True) as bar:
+        done = 0
+
+        def progress(read: int, setpoints: int) -> None:
+            nonlocal done
+            done += setpoints
+            bar.set_postfix_str(f'{tqdm.format_sizeof(done)} setpoints', refresh=False)
+            bar.update(read)
+
+        replayed = replay(bag, parameters, folder, options, progress)
+    print(replayed.text)
+    print(f'results: {folder}')
+    if replayed.summary['missing']:
+        _complain(f'{bag}: part of it could not be read: {"; ".join(replayed.summary["missing"])}')
+    return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
+
+
+def _complain(what: object) -> None:
+    print(f'stewart_replay: {" ".join(str(what).split())}', file=sys.stderr)
+
+
+def _frequency(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text}: must be more than 0')
+    return value
+
+
+def _number(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least 1')
+    return value

@@ -1,0 +1,283 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a replay writes of the legs: a bag with the node's topics, and a table."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+import zlib
+
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel, Chunk, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
+import numpy as np
+import orjson
+from rosbags.typesys import get_typestore, Stores
+from ruamel.yaml import YAML
+
+from stewart_dynamics.cdr import at_any_byte
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.replay.mcap_file import MAGIC
+from stewart_dynamics.step import OUTPUT_TYPES, Outputs, Stamps, Step
+
+_LIBRARY = 'stewart_dynamics'
+# Of a message record: opcode, length, channel, sequence, when it was logged and published.
+_HEAD = 31
+
+
+class OutputBag:
+    """
+    A bag in MCAP with the topics, types and messages of the node.
+
+    Messages are put together thousands at a time; a checksum covers each chunk of them.
+
+    Parameters
+    ----------
+    folder : Path
+        Made; named as bags are.
+    node : str
+        Name before the topics.
+    step : Step
+        It makes the messages.
+
+    """
+
+    def __init__(self, folder: Path, node: str, step: Step) -> None:
+        self._folder = folder
+        self._step = step
+        folder.mkdir()
+        self._file = (folder / f'{folder.name}.mcap').open('wb')
+        self._counts: Counter[int] = Counter()
+        self._times: tuple[int, int] | None = None
+        self._chunks: list[ChunkIndex] = []
+        store = get_typestore(Stores.ROS2_JAZZY)
+        kinds = tuple(dict.fromkeys(OUTPUT_TYPES.values()))
+        self._schemas = [
+            Schema(data=store.generate_msgdef(kind, ros_version=2)[0].encode(),
+                   encoding='ros2msg', id=n, name=kind) for n, kind in enumerate(kinds, start=1)]
+        self._hashes = {kind: store.hash_rihs01(kind) for kind in kinds}
+        self._channels = {
+            topic: Channel(
+                id=n, topic=f'{node}/{topic}', message_encoding='cdr',
+                schema_id=kinds.index(kind) + 1, metadata={
+                    'offered_qos_profiles': '', 'topic_type_hash': self._hashes[kind]})
+            for n, (topic, kind) in enumerate(OUTPUT_TYPES.items(), start=1)}
+        self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
+        self._declare()
+
+    def write(self, times: Stamps, outputs: Outputs) -> None:
+        """Write a chunk: what each setpoint gave, recorded at these times (N,) [ns]."""
+        if not len(times):
+            return
+        groups = [group for group in self._step.messages_of(outputs) if len(group[1])]
+        sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
+        for n, (_, which, messages) in enumerate(groups):
+            sizes[which, n] = _HEAD + messages.dtype.itemsize
+        ends = np.cumsum(sizes.ravel()).reshape(sizes.shape)
+        content = np.empty(ends[-1, -1], dtype=np.uint8)
+        indexes: dict[int, list[tuple[Stamps, Stamps]]] = {}
+        for n, (topic, which, messages) in enumerate(groups):
+            channel = self._channels[topic].id
+            starts = ends[which, n] - sizes[which, n]
+            records = np.empty(len(which), dtype=[
+                ('opcode', 'u1'), ('length', '<u8'), ('channel', '<u2'), ('sequence', '<u4'),
+                ('logged', '<u8'), ('published', '<u8'), ('data', messages.dtype)])
+            records['opcode'] = int(Opcode.MESSAGE)
+            records['length'] = records.dtype.itemsize - 9
+            records['channel'] = channel
+            records['sequence'] = 0
+            records['logged'] = records['published'] = times[which]
+            records['data'] = messages
+            at_any_byte(content, records.dtype)[starts] = records
+            indexes.setdefault(channel, []).append((times[which], starts))
+            self._counts[channel] += len(which)
+        self._write_chunk(content.tobytes(), int(times.min()), int(times.max()), indexes)
+
+    def close(self) -> None:
+        """Write the index, and the metadata beside it."""
+        with self._file:
+            self._file.write(_bytes(DataEnd(data_section_crc=0)))
+            start = self._file.tell()
+            begin, end = self._times or (0, 0)
+            self._declare()
+            self._file.write(_bytes(Statistics(
+                message_count=self._counts.total(), schema_count=len(self._schemas),
+                channel_count=len(self._channels), attachment_count=0, metadata_count=0,
+                chunk_count=len(self._chunks), message_start_time=begin, message_end_time=end,
+                channel_message_counts=dict(self._counts))))
+            for chunk in self._chunks:
+                self._file.write(_bytes(chunk))
+            self._file.flush()
+            with (self._folder / f'{self._folder.name}.mcap').open('rb') as written:
+                written.seek(start)
+                summary = written.read()
+            footer = _bytes(Footer(summary_start=start, summary_offset_start=0, summary_crc=0))
+            self._file.write(footer[:-4])
+            self._file.write(zlib.crc32(summary + footer[:-4]).to_bytes(4, 'little') + MAGIC)
+        with (self._folder / 'metadata.yaml').open('w', encoding='utf-8') as file:
+            yaml = YAML(typ='safe')
+            yaml.default_flow_style = False
+            yaml.dump(self._metadata(begin, end), file)
+
+    def abandon(self) -> None:
+        """Close what is not to be kept."""
+        self._file.close()
+
+    def _declare(self) -> None:
+        for record in (*self._schemas, *self._channels.values()):
+            self._file.write(_bytes(record))
+
+    def _write_chunk(self, content: bytes, begin: int, end: int,
+                     indexes: dict[int, list[tuple[Stamps, Stamps]]]) -> None:
+        at = self._file.tell()
+        self._file.write(_bytes(Chunk(
+            compression='', data=content, message_end_time=end, message_start_time=begin,
+            uncompressed_crc=zlib.crc32(content), uncompressed_size=len(content))))
+        behind = self._file.tell()
+        offsets = {}
+        for channel, parts in indexes.items():
+            offsets[channel] = self._file.tell()
+            times, starts = (np.concatenate(part) for part in zip(*parts, strict=True))
+            order = np.argsort(starts)
+            entries = np.column_stack([times, starts])[order].astype('<u8').tobytes()
+            head = channel.to_bytes(2, 'little') + len(entries).to_bytes(4, 'little')
+            self._file.write(bytes([Opcode.MESSAGE_INDEX])
+                             + (len(head) + len(entries)).to_bytes(8, 'little') + head + entries)
+        self._chunks.append(ChunkIndex(
+            chunk_length=behind - at, chunk_start_offset=at, compression='',
+            compressed_size=len(content), message_end_time=end, message_start_time=begin,
+            message_index_length=self._file.tell() - behind, message_index_offsets=offsets,
+            uncompressed_size=len(content)))
+        first, last = self._times or (begin, end)
+        self._times = min(first, begin), max(last, end)
+
+    def _metadata(self, begin: int, end: int) -> dict[str, Any]:
+        span = {'starting_time': {'nanoseconds_since_epoch': begin},
+                'duration': {'nanoseconds': end - begin},
+                'message_count': self._counts.total()}
+        name = f'{self._folder.name}.mcap'
+        return {'rosbag2_bagfile_information': {
+            'version': 9, 'storage_identifier': 'mcap', 'relative_file_paths': [name], **span,
+            'topics_with_message_count': [{
+                'topic_metadata': {
+                    'name': channel.topic, 'type': OUTPUT_TYPES[topic],
+                    'serialization_format': 'cdr', 'offered_qos_profiles': [],
+                    'type_description_hash': self._hashes[OUTPUT_TYPES[topic]]},
+                'message_count': self._counts[channel.id],
+            } for topic, channel in self._channels.items()],
+            'compression_format': '', 'compression_mode': '', 'files': [{'path': name, **span}],
+            'custom_data': None, 'ros_distro': _LIBRARY}}
+
+
+def _bytes(record: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    return bytes(builder.end())
+
+
+class Table(Protocol):
+    """A file with a row for each setpoint."""
+
+    def write(self, outputs: Outputs) -> None:
+        """Write the rows of these."""
+
+    def close(self) -> None:
+        """Finish the file."""
+
+
+def _columns(legs: Sequence[str]) -> list[str]:
+    return ['stamp (ns)',
+            *(f'{leg} {quantity}' for quantity in (
+                'length (m)', 'rate (m/s)', 'force (N)', 'demanded force (N)') for leg in legs),
+            'det(J) (m^3)', 'd(det(J))/dt (m^3/s)', 'condition number', 'singularity warning']
+
+
+def _numbers(outputs: Outputs) -> Any:
+    """Return what stands between stamp and warning (N, 27), nan for what there is none of."""
+    return np.column_stack([
+        outputs.lengths, outputs.rates, outputs.forces, outputs.demanded_forces,
+        outputs.determinants, outputs.determinant_rates, outputs.conditions])
+
+
+class CsvTable:
+    """legs.csv: each number in the fewest digits that give it back exactly."""
+
+    def __init__(self, folder: Path, legs: Sequence[str]) -> None:
+        self._file = (folder / 'legs.csv').open('wb')
+        self._file.write(','.join(map(_quoted, _columns(legs))).encode() + b'\n')
+
+    def write(self, outputs: Outputs) -> None:
+        """Write the rows of these."""
+        if not len(outputs.stamps):
+            return
+        text = orjson.dumps(_numbers(outputs), option=orjson.OPT_SERIALIZE_NUMPY)
+        rows = text[2:-2].replace(b'null', b'').split(b'],[')
+        self._file.write(b''.join([
+            b'%d,%b,%d\n' % row for row in zip(
+                outputs.stamps.tolist(), rows, outputs.warnings.tolist(), strict=True)]))
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._file.close()
+
+
+def _quoted(text: str) -> str:
+    if any(mark in text for mark in ',"\n\r'):
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+class ParquetTable:
+    """legs.parquet: the columns of legs.csv; null where there is no force."""
+
+    def __init__(self, folder: Path, legs: Sequence[str]) -> None:
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError as exc:
+            raise StewartError(
+                "--parquet needs pyarrow: pip install 'stewart_dynamics[parquet]'") from exc
+        self._arrow = pyarrow
+        names = _columns(legs)
+        self._schema = pyarrow.schema([
+            (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
+            (names[-1], pyarrow.bool_())])
+        self._writer = pyarrow.parquet.ParquetWriter(folder / 'legs.parquet', self._schema)
+        self._waiting: list[Any] = []
+
+    def write(self, outputs: Outputs) -> None:
+        """Write the rows of these."""
+        columns = [outputs.stamps, *_numbers(outputs).T, outputs.warnings]
+        self._waiting.append(self._arrow.record_batch(
+            [self._arrow.array(column, type=field.type, from_pandas=True)
+             for column, field in zip(columns, self._schema, strict=True)], schema=self._schema))
+        if sum(batch.num_rows for batch in self._waiting) >= 1 << 16:
+            self._flush()
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._flush()
+        self._writer.close()
+
+    def _flush(self) -> None:
+        # Parquet reads well in groups of many rows.
+        if self._waiting:
+            self._writer.write_table(self._arrow.Table.from_batches(self._waiting))
+            self._waiting.clear()

@@ -1,0 +1,446 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Twist and acceleration of poses: against analytic motions, and whatever way they are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+import subprocess
+import sys
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import rng
+from scipy.interpolate import make_smoothing_spline
+
+from stewart_dynamics import Motion
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.replay.differentiate import (
+    Differentiator, FEWEST, smoothing_spline, TOO_FAST, TOO_FEW)
+from stewart_dynamics.step import Batch
+
+Array = NDArray[np.float64]
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+POSE, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
+    slice(0, 12), slice(12, 15), slice(15, 18), slice(18, 21), slice(21, 24))
+
+
+def wave(times: Array, amplitudes: Any, frequencies: Any, phases: Any) -> tuple[Array, ...]:
+    """Return sinusoids (N, 3) and their first two derivatives."""
+    w = 2.0 * math.pi * np.asarray(frequencies)
+    angle = times[:, None] * w + phases
+    a = np.asarray(amplitudes)
+    return a * np.sin(angle), a * w * np.cos(angle), -a * w ** 2 * np.sin(angle)
+
+
+def motion_at(times: Array, turns: float = 0.6) -> Motion:
+    """Return translations up to 1.2 Hz, and rotations about an axis that wanders, exact."""
+    position = wave(times, [0.2, 0.15, 0.1], [0.7, 1.1, 1.2], [0.1, 1.0, 2.0])
+    angles = wave(times, [turns, 0.5, 2.0 * turns], [0.6, 0.9, 0.3], [0.3, 2.0, 1.2])
+    return Motion.from_euler(position[0] + [0.0, 0.0, 1.1], angles[0], position[1], angles[1],
+                             position[2], angles[2])
+
+
+def batch_of(times: Array, motions: Array, restarts: Any = ()) -> Batch:
+    """Return the poses as setpoints without velocities."""
+    rows = motions.copy()
+    rows[:, 12:] = 0.0
+    flags = np.zeros(len(times), dtype=bool)
+    flags[list(restarts)] = True
+    stamps = START + np.round(times * 1e9).astype(np.int64)
+    wrenches = np.arange(6.0 * len(times)).reshape(-1, 6)
+    return Batch(stamps, rows, wrenches, flags, stamps + 1000)
+
+
+def pieces(batch: Batch, cuts: Any) -> Iterator[Batch]:
+    """Return a batch cut before these setpoints."""
+    edges = [0, *sorted(cuts), len(batch.stamps)]
+    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        yield Batch(*(each[begin:end] for each in batch))
+
+
+def differentiated(differentiator: Differentiator, batches: Any) -> Batch:
+    """Return all that comes out of it."""
+    done = [differentiator.add(batch) for batch in batches]
+    done.append(differentiator.finish())
+    return Batch(*map(np.concatenate, zip(*done, strict=True)))
+
+
+def worst(a: Array, b: Array) -> float:
+    """Return the largest error relative to the largest size of a vector."""
+    return float(np.max(np.linalg.norm(a - b, axis=-1)) / np.max(np.linalg.norm(b, axis=-1)))
+
+
+def same(a: Batch, b: Batch) -> bool:
+    """Return whether two batches are equal, bit for bit."""
+    return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+
+
+# The spline
+
+@pytest.mark.parametrize(('rate', 'cutoff'), [(1000.0, 20.0), (100.0, 5.0), (100.0, 20.0)])
+@pytest.mark.parametrize('part', [0.2, 1.0, 2.0])
+def test_a_sinusoid_passes_as_the_cutoff_frequency_says(
+        rate: float, cutoff: float, part: float) -> None:
+    h, w = 1.0 / rate, 2.0 * math.pi * part * cutoff
+    times = np.arange(0.0, 40.0 / cutoff, h)
+    sine, cosine = np.sin(w * times), np.cos(w * times)
+    spline = smoothing_spline(times, np.column_stack([sine, cosine]), cutoff)
+
+    # sinusoids are what an endless spline has for eigenfunctions: none turns into another, that
+    # is, there is no phase
+    spread = (2.0 + math.cos(w * h)) / 3.0
+    fourth = (2.0 - 2.0 * math.cos(w * h)) ** 2 / (h ** 4 * spread)
+    passes = 1.0 / (1.0 + (math.sqrt(2.0) - 1.0) * fourth / (2.0 * math.pi * cutoff) ** 4)
+    middle = slice(len(times) // 3, 2 * len(times) // 3)
+    for got, wanted in (
+            (spline.values, passes * np.column_stack([sine, cosine])),
+            (spline.rates,
+             passes * math.sin(w * h) / (h * spread) * np.column_stack([cosine, -sine])),
+            (spline.accelerations, passes * (2.0 * math.cos(w * h) - 2.0) / (h * h * spread)
+             * np.column_stack([sine, cosine]))):
+        assert np.max(np.abs(got - wanted)[middle]) < 1e-5 * np.max(np.abs(wanted))
+
+    # and that is what the module promises of the cut-off frequency, and of derivatives below it
+    promised = 1.0 / (1.0 + (math.sqrt(2.0) - 1.0) * part ** 4)
+    if part * cutoff <= rate / 5.0:
+        assert fourth == pytest.approx(w ** 4, rel=5e-3)
+    if part <= 1.0:
+        assert passes == pytest.approx(promised, rel=2e-3)
+    if part == 1.0:
+        assert promised == pytest.approx(math.sqrt(0.5), rel=1e-12)
+
+
+def test_three_times_the_cutoff_leaves_three_hundredths() -> None:
+    times = np.arange(0.0, 4.0, 1e-3)
+    sine = np.sin(2.0 * math.pi * 60.0 * times)
+    spline = smoothing_spline(times, sine[:, None], 20.0)
+    passes = np.max(np.abs(spline.values[1000:3000])) / np.max(np.abs(sine))
+    assert passes == pytest.approx(1.0 / (1.0 + (math.sqrt(2.0) - 1.0) * 81.0), rel=1e-3)
+    assert passes == pytest.approx(0.029, abs=5e-4)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_the_spline_is_scipys(seed: int) -> None:
+    random = rng(seed)
+    times = np.cumsum(random.uniform(1e-4, 2e-2, 300))
+    samples = np.cumsum(random.normal(size=(300, 2)), axis=0)
+    cutoff = random.uniform(2.0, 40.0)
+    spline = smoothing_spline(times, samples, cutoff)
+    steps = np.diff(times)
+    weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    for axis in range(2):
+        theirs = make_smoothing_spline(
+            times, samples[:, axis], w=weights,
+            lam=(math.sqrt(2.0) - 1.0) / (2.0 * math.pi * cutoff) ** 4)
+        for order, ours in enumerate(spline):
+            expected = theirs.derivative(order)(times) if order else theirs(times)
+            assert np.max(np.abs(ours[:, axis] - expected)) < 1e-9 * np.max(np.abs(expected))
+
+
+def test_the_response_is_the_same_however_the_samples_are_spaced() -> None:
+    random = rng()
+    w = 2.0 * math.pi * 5.0
+    for gaps in (random.uniform(1e-4, 8e-3, 4000), np.tile([1e-3, 9e-3], 1500),
+                 # in pairs a microsecond apart, as a stamp taken twice may be
+                 np.tile([1e-6, 5e-3], 2000),
+                 # ten times as dense in one half as in the other
+                 np.repeat([5e-4, 5e-3], [8000, 1000])):
+        times = np.cumsum(gaps)
+        spline = smoothing_spline(times, np.sin(w * times)[:, None], 5.0)
+        middle = (times > times[0] + 1.5) & (times < times[-1] - 1.5)
+        wanted = math.sqrt(0.5) * np.sin(w * times)
+        assert np.max(np.abs(spline.values[:, 0] - wanted)[middle]) < 2e-3
+        assert np.max(np.abs(spline.accelerations[:, 0] / w ** 2 + wanted)[middle]) < 1e-2
+        assert np.max(np.abs(spline.rates[:, 0] / w - math.sqrt(0.5) * np.cos(w * times))[
+            middle]) < 5e-3
+
+
+def test_noise_of_the_acceleration_is_what_the_module_says() -> None:
+    cutoff, h, noise = 20.0, 1e-3, 1e-5
+    spline = smoothing_spline(
+        h * np.arange(200_000), rng().normal(0.0, noise, (200_000, 1)), cutoff)
+    w = 2.0 * math.pi * cutoff / (math.sqrt(2.0) - 1.0) ** 0.25
+    assert np.std(spline.accelerations) == pytest.approx(
+        noise * math.sqrt(math.sqrt(2.0) / 16.0 * h * w ** 5), rel=0.02)
+
+
+def test_a_straight_line_stays_one_to_the_ends() -> None:
+    times = np.cumsum(rng().uniform(1e-3, 1e-2, 50))
+    spline = smoothing_spline(times, (2.0 + 3.0 * times)[:, None], 3.0)
+    assert np.allclose(spline.values[:, 0], 2.0 + 3.0 * times, rtol=1e-12)
+    assert np.allclose(spline.rates, 3.0, rtol=1e-10)
+    assert np.allclose(spline.accelerations, 0.0, atol=1e-8)
+
+
+# Motions
+
+# Twice the droop (f / f_c)^4 (sqrt(2) - 1) of the fastest part, the product of two of the angles'
+# sinusoids in a quaternion among them, with the spline's own error (w h)^2 / 12
+@pytest.mark.parametrize(('rate', 'cutoff', 'velocity', 'acceleration'), [
+    (1000.0, 20.0, 2e-4, 4e-4), (1000.0, 100.0, 1e-6, 2e-5), (100.0, 20.0, 2e-4, 1e-3),
+    (100.0, 45.0, 5e-5, 6e-4)])
+def test_a_motion_is_given_its_derivatives(
+        rate: float, cutoff: float, velocity: float, acceleration: float) -> None:
+    times = np.arange(0.0, 20.0, 1.0 / rate)
+    exact = motion_at(times).rows
+    done = differentiated(Differentiator(cutoff, 0.1), [batch_of(times, exact)])
+    inner = slice(int(2.0 * rate), -int(2.0 * rate))
+    assert np.array_equal(done.motions[:, POSE], exact[:, POSE])
+    for part, limit in ((VELOCITY, velocity), (OMEGA, velocity), (ACCELERATION, acceleration),
+                        (ALPHA, acceleration)):
+        assert worst(done.motions[inner, part], exact[inner, part]) < limit
+
+
+def test_full_turns_pass_where_the_quaternion_changes_its_sign() -> None:
+    times = np.arange(0.0, 20.0, 1e-3)
+    exact = motion_at(times, turns=5.0).rows
+    done = differentiated(Differentiator(40.0, 0.1), [batch_of(times, exact)])
+    inner = slice(500, -500)
+    assert worst(done.motions[inner, OMEGA], exact[inner, OMEGA]) < 1e-2
+    assert worst(done.motions[inner, ALPHA], exact[inner, ALPHA]) < 2e-2
+
+
+@pytest.mark.parametrize('rate', [100.0, 1000.0])
+def test_noise_of_a_measured_pose_stays_small(rate: float) -> None:
+    random = rng()
+    times = np.arange(0.0, 20.0, 1.0 / rate) + random.uniform(0.0, 0.3 / rate, int(20.0 * rate))
+    exact = motion_at(times).rows
+    noise, turn_noise = 2e-5, 5e-5
+    noisy = exact.copy()
+    noisy[:, :3] += random.normal(0.0, noise, (len(times), 3))
+    small = Motion.from_euler(np.zeros(3), random.normal(0.0, turn_noise, (len(times), 3)))
+    noisy[:, 3:12] = (small.rotation @ exact[:, 3:12].reshape(-1, 3, 3)).reshape(-1, 9)
+    cutoff = 10.0
+    differentiator = Differentiator(cutoff, 0.1)
+    done = differentiated(differentiator, [batch_of(times, noisy)])
+    inner = slice(int(rate), -int(rate))
+    w = 2.0 * math.pi * cutoff / (math.sqrt(2.0) - 1.0) ** 0.25
+    gain = math.sqrt(math.sqrt(2.0) / 16.0 / rate * w ** 5)
+    for part, size in ((ACCELERATION, noise), (ALPHA, turn_noise)):
+        off = done.motions[inner, part] - exact[inner, part]
+        # what the noise must leave, and the droop
+        assert np.std(off) < 1.3 * gain * size + 2e-3 * np.std(exact[inner, part])
+        assert np.std(off) > 0.5 * gain * size
+        # far less than by differences of the recorded
+        assert gain < (0.1 if rate == 100.0 else 1e-3) * math.sqrt(6.0) * rate ** 2
+    off = differentiator.deviation
+    assert 0.5 * noise < off.position_rms / math.sqrt(3.0) < 1.2 * noise
+    assert 0.5 * turn_noise < off.angle_rms / math.sqrt(3.0) < 1.3 * turn_noise
+    assert off.position_rms < off.position_max < 10.0 * off.position_rms
+    assert off.angle_rms < off.angle_max < 10.0 * off.angle_rms
+
+
+def test_the_integral_of_the_twist_gives_the_pose_back() -> None:
+    h = 1e-3
+    times = np.arange(0.0, 20.0 + h / 2, h)
+    exact = motion_at(times).rows
+    done = differentiated(Differentiator(100.0, 0.1), [batch_of(times, exact)]).motions
+    begin, end = 200, 19800
+    position = done[begin, :3].copy()
+    rotation = done[begin, 3:12].reshape(3, 3).copy()
+    most = np.zeros(2)
+    for at in range(begin, end):
+        # trapezoids, corrected by the accelerations at both ends (Euler and Maclaurin)
+        a, b = done[at], done[at + 1]
+        position += h / 2 * (a[VELOCITY] + b[VELOCITY]) + h * h / 12 * (
+            a[ACCELERATION] - b[ACCELERATION])
+        turn = h / 2 * (a[OMEGA] + b[OMEGA]) + h * h / 12 * (a[ALPHA] - b[ALPHA]) + (
+            h * h / 12 * np.cross(b[OMEGA], a[OMEGA]))  # Magnus
+        angle = np.linalg.norm(turn)
+        x, y, z = turn / angle
+        k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        rotation = (np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k) @ rotation
+        most = np.maximum(most, [np.max(np.abs(position - b[:3])),
+                                 np.max(np.abs(rotation - b[3:12].reshape(3, 3)))])
+    assert most[0] < 1e-7
+    assert most[1] < 1e-5
+
+
+# Windows, stretches and batches
+
+def test_windows_change_nothing() -> None:
+    times = np.cumsum(rng().uniform(5e-4, 1.5e-3, 30_000))
+    exact = motion_at(times).rows
+    batch = batch_of(times, exact)
+    whole = differentiated(Differentiator(20.0, 0.1, window=100_000), [batch])
+    for window in (300, 7000):
+        cut = differentiated(Differentiator(20.0, 0.1, window=window), [batch])
+        for part in (VELOCITY, OMEGA, ACCELERATION, ALPHA):
+            assert worst(cut.motions[:, part], whole.motions[:, part]) < 1e-9
+
+
+@pytest.mark.parametrize(('rate', 'cutoff'), [(100.0, 200.0), (100.0, 40.0), (30.0, 10.0)])
+def test_windows_change_nothing_where_poses_are_sparse(rate: float, cutoff: float) -> None:
+    times = np.arange(0.0, 20.0, 1.0 / rate)
+    batch = batch_of(times, motion_at(times).rows)
+    whole = differentiated(Differentiator(cutoff, 0.1, window=100_000), [batch])
+    cut = differentiated(Differentiator(cutoff, 0.1, window=50), [batch])
+    for part in (VELOCITY, OMEGA, ACCELERATION, ALPHA):
+        assert worst(cut.motions[:, part], whole.motions[:, part]) < 1e-9
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(st.lists(st.sampled_from([0.004, 0.01, 0.0100001, 0.02, 0.3, -0.5, 0.0]), max_size=400),
+       st.sets(st.integers(0, 400), max_size=12), st.sampled_from([1, 7, 40, 1000]),
+       st.sampled_from([3.0, 20.0]))
+def test_batches_change_nothing_and_no_setpoint_is_lost(
+        steps: list[float], cuts: set[int], window: int, cutoff: float) -> None:
+    times = np.cumsum([0.0, *steps])
+    batch = batch_of(times, motion_at(times).rows,
+                     [at + 1 for at, step in enumerate(steps) if step < 0.0])
+    once = Differentiator(cutoff, 0.1, window)
+    whole = differentiated(once, [batch])
+    again = Differentiator(cutoff, 0.1, window)
+    cut = differentiated(again, pieces(batch, [at for at in cuts if at <= len(steps)]))
+    assert same(whole, cut)
+    assert once.left_out == again.left_out
+    assert once.near_ends == again.near_ends
+    assert once.deviation == again.deviation
+    assert len(whole.stamps) + once.left_out.total() == len(times)
+    # what is given back are the setpoints given, in their order
+    kept = np.isin(batch.wrenches[:, 0], whole.wrenches[:, 0])
+    assert np.array_equal(batch.stamps[kept], whole.stamps)
+    assert np.array_equal(batch.times[kept], whole.times)
+    assert np.array_equal(batch.wrenches[kept], whole.wrenches)
+    assert np.array_equal(batch.motions[kept, POSE], whole.motions[:, POSE])
+    assert np.isfinite(whole.motions).all()
+    # every jump back is told, unless nothing comes after it or nothing came before
+    back = np.flatnonzero(np.diff(whole.stamps) < 0) + 1
+    assert whole.restarts[back].all()
+    passes = np.cumsum(batch.restarts)[kept]
+    assert np.array_equal(whole.restarts, np.diff(passes, prepend=0) > 0)
+
+
+def test_every_pose_singly_gives_the_same() -> None:
+    times = np.arange(0.0, 3.0, 1e-2)
+    batch = batch_of(times, motion_at(times).rows)
+    whole = differentiated(Differentiator(10.0, 0.1, window=64), [batch])
+    singly = differentiated(Differentiator(10.0, 0.1, window=64),
+                            pieces(batch, range(1, len(times))))
+    assert same(whole, singly)
+
+
+def test_no_spline_passes_over_a_gap_or_a_restart() -> None:
+    times = np.arange(0.0, 2.0, 1e-2)
+    exact = motion_at(times).rows
+    alone = differentiated(Differentiator(10.0, 0.1), [batch_of(times, exact)])
+    # the same once more, five seconds later and then five seconds back
+    for later, restarts in ((7.0, ()), (-5.0, (len(times),))):
+        both = batch_of(np.concatenate([times, times + later]), np.tile(exact, (2, 1)), restarts)
+        differentiator = Differentiator(10.0, 0.1)
+        done = differentiated(differentiator, [both])
+        for half in (slice(0, 200), slice(200, 400)):
+            assert worst(done.motions[half, 12:], alone.motions[:, 12:]) < 1e-9
+        assert done.restarts.tolist() == both.restarts.tolist()
+        assert not differentiator.left_out
+        assert differentiator.near_ends == 4 * 10
+    # a step as long as the gap is none
+    joined = np.concatenate([times, times + 2.09])
+    done = differentiated(differentiator := Differentiator(10.0, 0.1), [
+        batch_of(joined, motion_at(joined).rows)])
+    assert differentiator.near_ends == 2 * 10
+    assert 'within 0.1 s' in differentiator.notices()[1]
+
+
+def test_too_few_poses_in_a_row_are_left_out_and_counted() -> None:
+    times = np.concatenate([np.arange(20) * 0.01, 5.0 + np.arange(FEWEST - 1) * 0.01,
+                            -9.0 + np.arange(3) * 0.01, 10.0 + np.arange(FEWEST) * 0.01])
+    batch = batch_of(times, motion_at(times).rows, [24])
+    differentiator = Differentiator(10.0, 0.1)
+    done = differentiated(differentiator, [batch])
+    assert differentiator.left_out == {TOO_FEW: FEWEST - 1 + 3}
+    assert np.array_equal(done.stamps, batch.stamps[[*range(20), *range(27, 27 + FEWEST)]])
+    # the restart before the three poses is one before what comes after them
+    assert np.flatnonzero(done.restarts).tolist() == [20]
+
+
+def test_poses_that_turn_too_fast_for_the_cutoff_are_left_out_and_counted() -> None:
+    times = np.arange(0.0, 4.0, 1e-2)
+    # fifteen turns in a second, about an axis at right angles to that in which it stood, from 2 s
+    angles = np.zeros((len(times), 3))
+    angles[:, 2] = np.where(times < 2.0, 0.0, 2.0 * math.pi * 15.0 * (times - 2.0))
+    exact = Motion.from_euler(np.zeros((len(times), 3)), angles).rows
+    differentiator = Differentiator(2.0, 0.1)
+    done = differentiated(differentiator, [batch_of(times, exact)])
+    assert set(differentiator.left_out) == {TOO_FAST}
+    assert 150 < differentiator.left_out[TOO_FAST] < 210
+    assert len(done.stamps) == 400 - differentiator.left_out[TOO_FAST]
+    assert np.isfinite(done.motions).all()
+
+
+def test_one_wrench_for_all_is_given_to_each() -> None:
+    times = np.arange(0.0, 1.0, 1e-2)
+    stamps, motions, _, restarts, came = batch_of(times, motion_at(times).rows)
+    batch = Batch(stamps, motions, np.arange(6.0)[None], restarts, came)
+    done = differentiated(Differentiator(10.0, 0.1), [batch])
+    assert np.array_equal(done.wrenches, np.tile(np.arange(6.0), (100, 1)))
+
+
+def test_nothing_gives_nothing() -> None:
+    differentiator = Differentiator(10.0, 0.1)
+    done = differentiator.finish()
+    assert [each.shape for each in done] == [(0,), (0, 24), (0, 6), (0,), (0,)]
+    assert not differentiator.left_out
+    assert differentiator.deviation == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_the_notice_says_what_was_done() -> None:
+    times = np.arange(0.0, 4.0, 1e-2)
+    differentiator = Differentiator(12.5, 0.1)
+    differentiated(differentiator, [batch_of(times, motion_at(times).rows)])
+    text, ends = differentiator.notices()
+    assert 'cut-off frequency 12.5 Hz' in text
+    assert f'{differentiator.deviation.position_rms * 1e3:.3g} mm' in text
+    assert ends.startswith('16 setpoints are within 0.08 s')
+
+
+# What is refused
+
+@pytest.mark.parametrize('cutoff', [0.0, -1.0, math.nan, math.inf])
+def test_a_cutoff_that_is_none_is_refused(cutoff: float) -> None:
+    with pytest.raises(StewartError, match=r'cut-off frequency: .* Hz: must be a positive'):
+        Differentiator(cutoff, 0.1)
+
+
+def test_a_cutoff_too_low_for_the_digits_of_a_double_is_refused() -> None:
+    times = np.arange(5000) * 1e-3
+    batch = batch_of(times, motion_at(times).rows)
+    with pytest.raises(StewartError, match=r'cut-off frequency: 0.4 Hz: must be at least 0.5 Hz'):
+        differentiated(Differentiator(0.4, 0.1), [batch])
+
+
+def test_without_scipy_one_line_says_what_to_install() -> None:
+    program = (
+        'import sys\n'
+        'sys.modules["scipy"] = None\n'
+        'from stewart_dynamics.errors import StewartError\n'
+        'from stewart_dynamics.replay.differentiate import Differentiator\n'
+        'try:\n'
+        '    Differentiator(10.0, 0.1)\n'
+        'except StewartError as exc:\n'
+        '    print(exc)\n')
+    ran = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                         check=False)
+    assert ran.stderr == ''
+    assert ran.stdout.count('\n') == 1
+    assert 'pip install "stewart_dynamics[differentiate]"' in ran.stdout
