@@ -23,18 +23,28 @@ share = f'share/{package_name}'
 # No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
 # knows them under other names. Everything else that an executable imports is here.
 install_requires = [
+    'lz4>=4',
+    'mcap>=1.2',
     'numba>=0.57; platform_machine in "x86_64 AMD64 aarch64 arm64"',
     'numpy>=1.26',
+    'orjson>=3.9',
+    'plotly>=6',  # plotly.js in the report
     'rosbags>=0.11',
     'ruamel.yaml>=0.18',
+    'tqdm>=4.64',
+    'zstandard>=0.21',
 ]
 extras_require = {
+    'cluster': ['distributed>=2024.1'],
+    'differentiate': ['scipy>=1.10'],
+    'parquet': ['pyarrow>=14'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
         'ros-rclpy[fastrtps]~=7.1.6',
     ],
     'test': [
         'colcon-common-extensions',
+        'distributed',
         'flake8',
         'flake8-blind-except',
         'flake8-builtins',
@@ -51,10 +61,11 @@ extras_require = {
         'mypy',
         'packaging',
         'pin',
+        'playwright',
+        'pyarrow',
         'pytest',
         'ruff',
         'scipy',
-        'tqdm',
         'setuptools>=70.1,<80',  # wheels without the package wheel; colcon needs less than 80
     ],
 }
@@ -67,8 +78,8 @@ setup(
     maintainer='The stewart_dynamics developers',
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
-    packages=[package_name],
-    package_data={package_name: ['py.typed']},
+    packages=[package_name, f'{package_name}.replay'],
+    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['*.html']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),

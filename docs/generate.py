@@ -28,7 +28,7 @@ import matplotlib
 import numpy as np
 
 from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
-from stewart_dynamics.replay import replay
+from stewart_dynamics.replay.one import replay
 from stewart_dynamics.trajectory import TrajectoryParameters
 
 matplotlib.use('Agg')

@@ -40,11 +40,17 @@ SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'launch', 'test', NAME)
 
 # Modules whose rosdep key is not their own name; '' where rosdep has no key.
 KEYS = {
-    'hypothesis': 'python3-hypothesis', 'matplotlib': 'python3-matplotlib', 'mcap': '',
-    'mcap_ros2': '', 'numba': 'python3-numba', 'numpy': 'python3-numpy',
-    'packaging': 'python3-packaging', 'pinocchio': 'pinocchio', 'pytest': 'python3-pytest',
-    'rosbags': 'python3-rosbags-pip', 'ruamel': 'python3-ruamel.yaml',
-    'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools', 'yaml': 'python3-yaml'}
+    'dask': '', 'distributed': '', 'hypothesis': 'python3-hypothesis', 'lz4': '',
+    'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'numba': 'python3-numba',
+    'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
+    'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
+    'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
+    'ruamel': 'python3-ruamel.yaml', 'scipy': 'python3-scipy',
+    'setuptools': 'python3-setuptools', 'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml',
+    'zstandard': ''}
+# Modules that are imported where an option asks for them, and the extra that brings them.
+OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'pyarrow': 'parquet',
+            'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'ruamel': 'ruamel.yaml', 'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin',
              'yaml': 'pyyaml'}
@@ -228,7 +234,8 @@ def test_launch_file_compiles(path: Path, tmp_path: Path) -> None:
 
 def test_package_xml_names_what_the_package_imports() -> None:
     """Each third-party module that is imported has its rosdep key in package.xml."""
-    needed = {KEYS.get(name, name) for name in third_party('launch', NAME)} - {''}
+    needed = {KEYS.get(name, name)
+              for name in third_party('launch', NAME) - set(OPTIONAL)} - {''}
     assert needed <= depends('depend', 'exec_depend')
 
 
@@ -252,7 +259,12 @@ def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None
     requirements = [Requirement(text) for text in distribution.requires or ()]
     always = {item.name for item in requirements if 'extra' not in str(item.marker)}
     imported = third_party(NAME) & set(KEYS)
-    assert {PIP_NAMES.get(name, name) for name in imported} <= always
+    assert {PIP_NAMES.get(name, name) for name in imported - set(OPTIONAL)} <= always
+    for name in imported & set(OPTIONAL):
+        assert not any(item.name == name for item in requirements
+                       if 'extra' not in str(item.marker))
+        assert any(item.name in (name, 'distributed') for item in requirements
+                   if f'extra == "{OPTIONAL[name]}"' in str(item.marker))
     assert not [name for name in always if name.startswith('ros-')]
     extras = {item.name for item in requirements} | {'pip'}
     imported = third_party(*SOURCES) & set(KEYS)

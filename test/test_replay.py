@@ -46,8 +46,9 @@ from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
-from stewart_dynamics.replay import (
-    BAD_INPUT, DONE, LIMIT_MET, main, NODE, PARTLY_READ, replay, Replayed)
+from stewart_dynamics.replay import main
+from stewart_dynamics.replay.one import (
+    BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ, replay, Replayed)
 from stewart_dynamics.rotation import from_quaternion
 from stewart_dynamics.setpoints import (
     ACCEL, COMBINED, INPUT_TYPES, MALFORMED, NOT_FINITE, NOT_JOINED, POSE, TOO_OLD,

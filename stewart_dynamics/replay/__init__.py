@@ -15,10 +15,17 @@
 
 """Recorded bags in; the node's outputs, summaries and reports out; needs no ROS."""
 
-from stewart_dynamics.replay.main import main
-from stewart_dynamics.replay.one import (
-    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, PARTLY_READ, replay, Replayed)
+from __future__ import annotations
 
-__all__ = [
-    'BAD_INPUT', 'DONE', 'LIMIT_MET', 'main', 'NODE', 'Options', 'PARTLY_READ', 'replay',
-    'Replayed']
+from collections.abc import Sequence
+import sys
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program stewart_replay; say in one line which library it lacks."""
+    try:
+        from stewart_dynamics.replay.main import main as program
+    except ModuleNotFoundError as exc:
+        print(f'stewart_replay: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
+        return 2
+    return program(arguments)

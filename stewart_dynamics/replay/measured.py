@@ -73,18 +73,20 @@ import struct
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from stewart_dynamics import lagrange
 from stewart_dynamics.cdr import MalformedError
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.inverse_dynamics import COULOMB_RATE
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.setpoints import MALFORMED, NOT_FINITE
 from stewart_dynamics.step import Batch, Outputs
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
+Flags = NDArray[np.bool_]
 
 # What waits for the other side at most, setpoints and measured samples.
 _SETPOINTS_WAITING = 2 ** 15
@@ -92,6 +94,20 @@ _SAMPLES_WAITING = 2 ** 18
 
 AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
 _UNITS = ('n',) * 3 + ('n_m',) * 3
+
+# Why a message is refused, beside being malformed or not finite.
+LACKING = 'lacks one of the joints'
+WITHOUT_EFFORT = 'without effort'
+UNEVEN = 'not as many efforts as names'
+
+_SECOND = 1_000_000_000
+_ORDERS = {0: '>', 1: '<'}
+_AFTER_STAMP = 12
+# Layouts that are known at once; messages of others are read one by one.
+_MOST_LAYOUTS = 8
+# Messages that are read at once, and those that may lack a joint before it is a mistake.
+_AT_ONCE = 4096
+_PATIENCE = 1000
 
 # Columns of what is kept of a setpoint.
 _SECONDS, _POSITION, _ROTATION, _ACCELERATION, _RATES, _FORCES = (
@@ -186,15 +202,17 @@ class Comparison:
 
     def _compared(self) -> Compared:
         setpoints = self._setpoints.take_before(self._samples.pass_number, self._samples.newest)
-        rows, measured = setpoints.rows, np.full((len(setpoints.stamps), 6), np.nan)
-        if len(rows):
-            samples = self._samples.all()
-            for number in np.unique(setpoints.passes):
-                mine = setpoints.passes == number
-                same = samples.passes == number
-                measured[mine] = _interpolated(
-                    setpoints.stamps[mine], samples.stamps[same], samples.rows[same], self._gap)
-            self._samples.forget_before(*self._setpoints.oldest())
+        rows = setpoints.rows
+        if not len(rows):
+            six = np.empty((0, 6))
+            return Compared(np.empty(0), six, six, six)
+        samples = self._samples.joined()
+        measured = np.full((len(rows), 6), np.nan)
+        for number in np.unique(setpoints.passes):
+            mine, same = setpoints.passes == number, samples.passes == number
+            measured[mine] = _interpolated(
+                setpoints.stamps[mine], samples.stamps[same], samples.rows[same], self._gap)
+        self._samples.forget_before(*self._setpoints.oldest())
         there = np.isfinite(measured[:, 0])
         known = there & np.isfinite(rows[:, _FORCES]).all(axis=1)
         self._without_force += int(np.count_nonzero(there & ~known))
@@ -334,6 +352,10 @@ class _Rows(NamedTuple):
     passes: NDArray[np.int64]
     rows: Array
 
+    def part(self, which: slice | Stamps | Flags) -> _Rows:
+        """Return some of them; a copy where they are not given by a slice."""
+        return _Rows(self.stamps[which], self.passes[which], self.rows[which])
+
 
 class _Waiting:
     """
@@ -371,27 +393,28 @@ class _Waiting:
             self._line_up(stamps, rows)
 
     def _line_up(self, stamps: Stamps, rows: Array) -> None:
-        """Number the passes of all but the last stamp; leave out what is out of order."""
+        """Give all rows but the last a pass; leave out what is out of order."""
         if self.pass_number < 0 and len(rows):
             self.pass_number, self.newest = 0, int(stamps[0]) - 1
         steps = np.diff(stamps)
         if len(rows) and stamps[0] > self.newest and steps.min() > 0:
-            passes = np.full(len(rows), self.pass_number)
+            passes: Stamps = np.full(len(rows), self.pass_number)
             self.newest = int(stamps[-2])
         else:
             passes = np.array(self._passes(stamps.tolist()), dtype=np.int64)
             self.out_of_order += int(np.count_nonzero(passes < 0))
         in_line = passes >= 0
         if in_line.any():
-            chunk = _Rows(*(each[in_line] for each in (stamps[:-1], passes, rows)))
+            chunk = _Rows(stamps[:-1], passes, rows).part(in_line)
             self._chunks.append(chunk)
             self._waiting += len(chunk.stamps)
         excess = self._waiting - self._most
         if excess > 0:
-            self._chunks = [_Rows(*(each[excess:].copy() for each in self.all()))]
+            self._chunks = [self.joined().part(np.arange(excess, self._waiting))]
             self._waiting = self._most
 
     def _passes(self, stamps: list[int]) -> list[int]:
+        """Return the passes of all but the last stamp, -1 of those out of order."""
         passes = []
         for stamp, after in zip(stamps[:-1], stamps[1:], strict=True):
             ahead = stamp > self.newest
@@ -415,18 +438,19 @@ class _Waiting:
             count = int(np.count_nonzero((chunk.passes < pass_number) | (
                 (chunk.passes == pass_number) & (chunk.stamps <= stamp))))
             if count:
-                ready.append(_Rows(*(each[:count] for each in chunk)))
+                ready.append(chunk.part(slice(0, count)))
                 self._waiting -= count
             if count < len(chunk.stamps):
-                self._chunks[0] = _Rows(*(each[count:] for each in chunk))
+                self._chunks[0] = chunk.part(slice(count, None))
                 break
             self._chunks.pop(0)
         return _rows(ready)
 
-    def all(self) -> _Rows:
+    def joined(self) -> _Rows:
         """Return the rows that wait."""
-        self._chunks = [_rows(self._chunks)]
-        return self._chunks[0]
+        rows = _rows(self._chunks)
+        self._chunks = [rows] if len(rows.stamps) else []
+        return rows
 
     def oldest(self) -> tuple[int, int]:
         """Return pass and stamp before which no row will be."""
@@ -436,12 +460,12 @@ class _Waiting:
 
     def forget_before(self, pass_number: int, stamp: int) -> None:
         """Forget the rows before this time but the last one of them."""
-        rows = self.all()
+        rows = self.joined()
         before = int(np.count_nonzero((rows.passes < pass_number) | (
             (rows.passes == pass_number) & (rows.stamps <= stamp))))
-        # a copy: a part would hold on to the whole
-        self._chunks = [_Rows(*(each[max(before - 1, 0):].copy() for each in rows))]
-        self._waiting = len(self._chunks[0].stamps)
+        if before > 1:
+            self._chunks = [rows.part(np.arange(before - 1, len(rows.stamps)))]
+            self._waiting = len(rows.stamps) - before + 1
 
 
 def _rows(chunks: list[_Rows]) -> _Rows:
@@ -531,8 +555,8 @@ class _Bins:
         self._high[:half] = np.maximum(self._high[0::2], self._high[1::2])
         self._first[:half] = np.minimum(self._first[0::2], self._first[1::2])
         self._last[:half] = np.maximum(self._last[0::2], self._last[1::2])
-        self._low[half:] = self._first[half:, ] = np.inf
-        self._high[half:] = self._last[half:] = -np.inf
+        self._low[half:], self._first[half:] = np.inf, np.inf
+        self._high[half:], self._last[half:] = -np.inf, -np.inf
         self.width *= 2.0
 
     def middle(self) -> tuple[Array, Array]:
@@ -568,30 +592,169 @@ class _Bins:
         return touches
 
 
+class _Layout(NamedTuple):
+    """What messages with the same names and counts have in common."""
+
+    template: Bytes
+    fixed: Bytes
+    """255 where a message's bytes are those of the template, 0 at stamp, numbers and gaps."""
+    order: str
+    """Of bytes, as NumPy has it."""
+    reason: str
+    """Why such messages are refused; empty where they are not."""
+    efforts: slice
+    """The bytes of all efforts."""
+    joints: list[int]
+    """Which of the efforts are those wanted."""
+    names: list[str]
+
+    @classmethod
+    def of(cls, data: bytes, joints: Sequence[str]) -> _Layout:
+        """Return the layout of a message, read field by field; MalformedError if it is none."""
+        if len(data) < _AFTER_STAMP or data[0] != 0 or data[1] not in _ORDERS:
+            raise MalformedError(f'{len(data)} bytes: not plain CDR with a header')
+        fields = _Fields(data, _ORDERS[data[1]])
+        fields.text()  # frame_id
+        names = [fields.text().decode(errors='replace') for _ in range(fields.count())]
+        fields.doubles()  # position
+        fields.doubles()  # velocity
+        efforts = fields.doubles()
+        number = (efforts.stop - efforts.start) // 8
+        reason = ''
+        if not set(joints) <= set(names):
+            reason = LACKING
+        elif number != len(names):
+            reason = UNEVEN if number else WITHOUT_EFFORT
+        wanted = [] if reason else [names.index(joint) for joint in joints]
+        return cls(np.frombuffer(data, dtype=np.uint8), fields.fixed, fields.order, reason,
+                   efforts, wanted, names)
+
+    def messages(self, whole: Bytes, begins: Stamps) -> Bytes:
+        """Return messages, (N, size), by where they begin."""
+        messages: Bytes = np.lib.stride_tricks.sliding_window_view(
+            whole, len(self.template))[begins]
+        return messages
+
+    def fits(self, messages: Bytes) -> Flags:
+        """Return which of them have this layout."""
+        off: Bytes = (messages ^ self.template) & self.fixed
+        return np.asarray(~off.any(axis=1))
+
+    def stamps(self, messages: Bytes) -> tuple[Flags, Stamps]:
+        """Return which stamps are sound, and the stamps, (N,) [ns]."""
+        seconds = messages[:, 4:8].copy().view(f'{self.order}i4')[:, 0].astype(np.int64)
+        nanoseconds = messages[:, 8:12].copy().view(f'{self.order}u4')[:, 0].astype(np.int64)
+        return nanoseconds < _SECOND, seconds * _SECOND + nanoseconds
+
+    def values(self, messages: Bytes) -> Array:
+        """Return the efforts wanted (N, 6)."""
+        numbers = messages[:, self.efforts].copy().view(f'{self.order}f8')
+        values: Array = numbers[:, self.joints].astype(float)
+        return values
+
+
+class _Fields:
+    """A message's fields one after the other, and which of its bytes they fix."""
+
+    def __init__(self, data: bytes, order: str) -> None:
+        self.order = order
+        self.fixed = np.zeros(len(data), dtype=np.uint8)
+        self.fixed[:2] = 255
+        self._data = data
+        self._at = _AFTER_STAMP
+
+    def count(self) -> int:
+        """Read the length of a sequence."""
+        begin = self._at + 3 & ~3
+        self._at = self._fix(begin, 4)
+        return int(struct.unpack_from(f'{self.order}I', self._data, begin)[0])
+
+    def text(self) -> bytes:
+        """Read a string."""
+        size = self.count()
+        begin, self._at = self._at, self._fix(self._at, size)
+        if size and self._data[self._at - 1] != 0:
+            raise MalformedError('a string does not end in a zero byte')
+        return self._data[begin:self._at][:-1]
+
+    def doubles(self) -> slice:
+        """Return where the numbers of a sequence are."""
+        number = self.count()
+        # the first of them is aligned, counted from the end of the encapsulation
+        begin = (self._at + 3 & ~7) + 4 if number else self._at
+        if begin + 8 * number > len(self._data):
+            raise MalformedError(f'{len(self._data)} bytes: too few for {number} numbers')
+        self._at = begin + 8 * number
+        return slice(begin, self._at)
+
+    def _fix(self, begin: int, size: int) -> int:
+        end = begin + size
+        if end > len(self._data):
+            raise MalformedError(f'{len(self._data)} bytes: must be at least {end}')
+        self.fixed[begin:end] = 255
+        return end
+
+
+class _Read(NamedTuple):
+    """What was read of messages, and why others were refused."""
+
+    stamps: Stamps
+    efforts: Array
+    taken: Flags
+    refused: Counter[str]
+
+    def take(self, layout: _Layout, whole: Bytes, begins: Stamps, lengths: Stamps,
+             which: Stamps) -> Stamps:
+        """Read those of the messages that have the layout, and return which have not."""
+        of_size = lengths[which] == len(layout.template)
+        others = [which[~of_size]]
+        same = which[of_size]
+        for begin in range(0, len(same), _AT_ONCE):
+            part = same[begin:begin + _AT_ONCE]
+            messages = layout.messages(whole, begins[part])
+            fits = layout.fits(messages)
+            if not fits.all():
+                others.append(part[~fits])
+                part, messages = part[fits], messages[fits]
+            if layout.reason:
+                self.refused[layout.reason] += len(part)
+                continue
+            sound, stamps = layout.stamps(messages)
+            values = layout.values(messages)
+            finite = np.isfinite(values).all(axis=1)
+            self.refused[MALFORMED] += int(np.count_nonzero(~sound))
+            self.refused[NOT_FINITE] += int(np.count_nonzero(sound & ~finite))
+            self.stamps[part], self.efforts[part], self.taken[part] = (
+                stamps, values, sound & finite)
+        return np.sort(np.concatenate(others))
+
+
 class Efforts:
     """
     Reads the efforts of a machine's joints from sensor_msgs/JointState as bytes.
 
-    All messages of a topic mostly have one layout: the same names, the same counts. One is read
+    Nearly all messages of a topic have one layout: the same names, the same counts. One is read
     field by field, and those whose bytes are the same but for stamp and numbers are read at once.
 
     Parameters
     ----------
     joints : sequence of str
-        Names of the six joints, in the order wanted; a message may hold others besides, in any
+        Names of the six joints in the order wanted. A message may hold others besides, in any
         order.
 
     """
 
     def __init__(self, joints: Sequence[str]) -> None:
-        self._joints = [joint.encode() for joint in joints]
+        self._joints = list(joints)
         self._layouts: list[_Layout] = []
         self._found = False
+        self._lacked = 0
+        self._lacking: list[str] = []
 
     def read(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike,
-             ) -> tuple[Stamps, Array, Counter[str]]:
+             ) -> tuple[Stamps, Array, dict[str, int]]:
         """
-        Return stamps (K,) [ns], efforts (K, 6) [N], and why the other messages were refused.
+        Return stamps (K,) [ns], efforts (K, 6) [N], and of other messages how many, by reason.
 
         Parameters
         ----------
@@ -600,35 +763,46 @@ class Efforts:
         starts, sizes : (M,)
             Where each begins, and its length in bytes.
 
-        Messages that lack a joint are another publisher's, and refused. Raises BagError where
-        there are such but none so far has had all the joints: it names what is missing, and
-        what there is.
+        Messages that lack a joint may be another publisher's, and are refused. Raises BagError
+        where a thousand did and none had them all.
 
         """
-        whole = np.frombuffer(data, dtype=np.uint8) if isinstance(data, bytes) else data
-        begin = np.asarray(starts, dtype=np.int64)
-        size = np.asarray(sizes, dtype=np.int64)
-        stamps = np.zeros(len(begin), dtype=np.int64)
-        efforts = np.full((len(begin), 6), np.nan)
-        reasons: Counter[str] = Counter()
-        taken = np.zeros(len(begin), dtype=bool)
-        lacking = ''
-        left = np.arange(len(begin))
+        whole = np.frombuffer(data, dtype=np.uint8)
+        begins, lengths = np.asarray(starts, dtype=np.int64), np.asarray(sizes, dtype=np.int64)
+        read = _Read(np.zeros(len(begins), dtype=np.int64),
+                     np.zeros((len(begins), len(self._joints))),
+                     np.zeros(len(begins), dtype=bool), Counter())
+        left: Stamps = np.arange(len(begins))
         for layout in self._layouts:
-            left = layout.read(whole, begin, size, left, stamps, efforts, taken)
+            left = read.take(layout, whole, begins, lengths, left)
         while len(left):
-            at, left = left[0], left[1:]
-            message = whole[begin[at]:begin[at] + size[at]].tobytes()
+            begin, length = int(begins[left[0]]), int(lengths[left[0]])
             try:
-                layout = _Layout.of(message, self._joints)
+                layout = _Layout.of(whole[begin:begin + length].tobytes(), self._joints)
             except MalformedError:
-                reasons[MALFORMED] += 1
+                read.refused[MALFORMED] += 1
+                left = left[1:]
                 continue
-            except _LackingError as exc:
-                reasons[exc.reason] += 1
-                lacking = lacking or str(exc)
-                continue
-            layout.read(whole, begin, size, np.array([at]), stamps, efforts, taken)
+            if layout.reason != LACKING:
+                self._found = True
+            else:
+                self._lacking = self._lacking or layout.names
             if len(self._layouts) < _MOST_LAYOUTS:
                 self._layouts.append(layout)
-                left = layout.read(whole, begin, size, left, stamps, efforts, taken)
+                left = read.take(layout, whole, begins, lengths, left)
+            else:
+                read.take(layout, whole, begins, lengths, left[:1])
+                left = left[1:]
+        self._lacked += read.refused[LACKING]
+        if self._lacked >= _PATIENCE:
+            self.check()
+        return read.stamps[read.taken], read.efforts[read.taken], dict(+read.refused)
+
+    def check(self) -> None:
+        """Raise BagError where messages lacked a joint, and none had them all."""
+        if self._lacked and not self._found:
+            missing = [joint for joint in self._joints if joint not in self._lacking]
+            raise BagError(
+                f'measured joint states: no message has {", ".join(missing)}; there are '
+                f'{", ".join(self._lacking) or "none"}: the names must be those of the '
+                'parameter joints')

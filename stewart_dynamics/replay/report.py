@@ -96,6 +96,8 @@ class Plot(NamedTuple):
     note: str = ''
     bounds: Sequence[Bound] = ()
     log: bool = False
+    touches: bool = False
+    """Shade when something touched the platform."""
     spikes: bool = False
     """A few samples may be far larger than all others: these are not to flatten them."""
 
@@ -238,6 +240,8 @@ class Report:
             'frames': {'times': _base64(times, '<f8'), 'numbers': _base64(frames, '<f8')},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
+            'touches': [[each['from_s'], each['to_s']] for each in (
+                summary['measured']['touches']['strongest'] if summary['measured'] else ())],
             'curves': curves,
             'plots': [plot._asdict() | {
                 'bounds': [bound._asdict() for bound in plot.bounds],
@@ -299,16 +303,16 @@ class Report:
                       Curve('computed', _COLORS[n], first + _COMPUTED + n),
                       Curve('residual', '#888888', first + _RESIDUAL + n, 'dot')]
                 for n, leg in enumerate(self._legs)}, 'residual: measured less computed',
-                spikes=True),
+                touches=True, spikes=True),
             Plot('residuals', '', 'Residual of every leg', 'N', self._of_legs(first + _RESIDUAL),
-                 'measured less computed force', spikes=True),
+                 'measured less computed force', touches=True, spikes=True),
             Plot('residual_force', '', 'Residual as a force on the platform', 'N',
                  _of_axes(wrench, 'F x', 'F y', 'F z'),
-                 'J_inv^T (measured - computed): what the model does not know, base axes',
-                 spikes=True),
+                 'J_inv^T (measured − computed): what the model does not know, base axes',
+                 touches=True, spikes=True),
             Plot('residual_moment', '', 'Residual as a moment on the platform', 'N m',
                  _of_axes(wrench + 3, 'M x', 'M y', 'M z'),
-                 'about its origin, base axes', spikes=True),
+                 'about its origin, base axes', touches=True, spikes=True),
         ]
 
     def _of_legs(self, first: int) -> dict[str, list[Curve]]:

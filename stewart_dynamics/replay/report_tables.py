@@ -263,10 +263,40 @@ class Tables:
             'the actuators in it.')
 
     def _measured(self) -> str:
-        found = self._summary['measured']
-        if not found:
+        m = self._summary['measured']
+        if m is None:
             return ''
-        return _section('comparison', 'Measured against computed', _measured_tables(found))
+        left_out = m['setpoints_not_compared']
+        note = (f'{_count(m["setpoints_compared"], "setpoint")} compared with '
+                f'{_count(m["samples"], "measured sample")} of '
+                f'<code>{escape(str(self._summary["inputs"]["measured"]))}</code>; '
+                f'{left_out["without_measurement"]:,} had none near enough, '
+                f'{left_out["without_force"]:,} no computed force. Residual: measured less '
+                'computed. The friction is what would explain it best beyond what the '
+                'parameters have; share is the part of it that this explains.')
+        legs = _table(
+            ['Leg', 'residual RMS<br>[N]', 'mean<br>[N]', 'peak<br>[N]', 'at<br>[s]',
+             'measured RMS<br>[N]', 'computed RMS<br>[N]', 'correlation',
+             'offset<br>[N]', 'Coulomb<br>[N]', 'viscous<br>[N s/m]', 'share'],
+            [[_leg(name, n), f'<b>{_number(leg["residual_rms_n"], 2)}</b>',
+              _number(leg['residual_mean_n'], 2), _number(leg['residual_peak_n'], 2),
+              _at(leg['residual_peak_at_s']), _number(leg['measured_rms_n'], 1),
+              _number(leg['computed_rms_n'], 1), _number(leg['correlation'], 4),
+              _number(leg['offset_n'], 2), _number(leg['coulomb_friction_n'], 2),
+              _number(leg['viscous_friction_n_s_m'], 2), _number(leg['friction_share'], 3)]
+             for n, (name, leg) in enumerate(m['legs'].items())])
+        axes = [[axis.replace('_', ' ').capitalize(), '[N m]' if unit == 'n_m' else '[N]', _number(values[f'rms_{unit}'], 2),
+                 _number(values[f'mean_{unit}'], 2), _number(values[f'peak_{unit}'], 2),
+                 _at(values['peak_at_s'])] for axis, values in m['wrench'].items()
+                for unit in ('n_m' if axis.startswith('moment') else 'n',)]
+        wrench = _table(['Residual on the platform', '', 'RMS', 'mean', 'peak', 'at [s]'], axes)
+        mass = m['mass']
+        if mass['unmodelled_kg'] is not None:
+            wrench += (f'<p>A mass of <b>{_digits(mass["unmodelled_kg"])} kg</b> more on the '
+                       f'platform would explain {_number(mass["share"], 3)} of the force.</p>')
+        return _section('comparison', 'Measured against computed',
+                        f'{legs}<div class="row"><div>{wrench}</div>{_touches(m["touches"])}</div>',
+                        note)
 
     def _singularity(self) -> str:
         s, p = self._summary['singularity'], self._parameters
@@ -351,23 +381,18 @@ def _section(key: str, title: str, content: str, note: str = '') -> str:
     return f'<section id="{key}"><h2>{title}</h2>{note}{content}</section>'
 
 
-def _measured_tables(found: Mapping[str, Any]) -> str:
-    """Return what the comparison gives: single values, then a table for what each leg has."""
-    single = [[escape(name), _plain(value)] for name, value in found.items()
-              if not isinstance(value, Mapping)]
-    tables = _table(['', ''], single, 'wide') if single else ''
-    for name, values in found.items():
-        if not isinstance(values, Mapping):
-            continue
-        if values and all(isinstance(each, Mapping) for each in values.values()):
-            keys = list(dict.fromkeys(key for each in values.values() for key in each))
-            tables += _table([escape(name), *map(escape, keys)], [
-                [escape(leg), *(_plain(each.get(key)) for key in keys)]
-                for leg, each in values.items()])
-        else:
-            tables += _table([escape(name), ''], [
-                [escape(key), _plain(value)] for key, value in values.items()], 'wide')
-    return tables
+def _touches(touches: Mapping[str, Any]) -> str:
+    """Return when something touched the platform, and with what load."""
+    if not touches['count']:
+        return '<p>Nothing touched the platform that stands out of the residual.</p>'
+    shown = touches['strongest'][:_SHOWN_TIMES]
+    rows = [[escape(each['axis'].replace('_', ' ')), _at(each['from_s']), _at(each['to_s']),
+             ', '.join(_number(f, 1) for f in each['force_n']),
+             ', '.join(_number(f, 1) for f in each['moment_n_m'])] for each in shown]
+    table = _table(['What touched it: most in', 'from [s]', 'to [s]', 'force x, y, z [N]',
+                    'moment x, y, z [N m]'], rows)
+    more = touches['count'] - len(shown)
+    return f'<div>{table}{f"<p>… {more:,} more</p>" if more else ""}</div>'
 
 
 def parameter_table(values: Mapping[str, Any]) -> str:

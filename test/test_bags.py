@@ -1,0 +1,146 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Where bags are found, and where the results of each go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from stewart_dynamics import BagError
+from stewart_dynamics.replay.bags import find_bags, folders_of_results
+
+
+def make(folder: Path, *names: str) -> Path:
+    """Make files, all of them empty: what is in a bag is not looked at."""
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    return folder
+
+
+def found(folder: Path, leave_out: Path | None = None) -> list[str]:
+    return [bag.relative_to(folder).as_posix() for bag in find_bags(folder, leave_out)]
+
+
+def results(output: Path, *paths: Path) -> dict[str, Path]:
+    return {folder.relative_to(output).as_posix(): bag
+            for bag, folder in folders_of_results(paths, output)}
+
+
+@pytest.mark.parametrize('names', [
+    ['metadata.yaml', 'x_0.mcap', 'x_1.mcap', 'other.mcap', 'deeper/metadata.yaml'],
+    ['metadata.yaml'],
+    # killed before it wrote metadata.yaml
+    ['x.mcap'], ['x.db3'], ['x_0.mcap', 'x_1.mcap', 'x_2.mcap', 'x_10.mcap']])
+def test_a_bag_is_itself(tmp_path: Path, names: list[str]) -> None:
+    folder = make(tmp_path / 'bag', *names)
+    assert find_bags(folder) == [folder]
+    assert find_bags(tmp_path) == [folder]
+    assert find_bags(folder / names[0]) == [folder / names[0]]
+
+
+def test_what_is_not_there_is_left_for_its_reader_to_say(tmp_path: Path) -> None:
+    assert find_bags(tmp_path / 'none') == [tmp_path / 'none']
+
+
+def test_bags_are_found_at_any_depth_in_order(tmp_path: Path) -> None:
+    make(tmp_path, 'b/metadata.yaml', 'b/x_0.mcap', 'b/inside/metadata.yaml', 'a/2/x_0.db3',
+         'a/1/y/z/metadata.yaml', 'loose/one.mcap', 'loose/two.db3', 'notes.txt', 'empty/notes')
+    assert found(tmp_path) == ['a/1/y/z', 'a/2', 'b', 'loose/one.mcap', 'loose/two.db3']
+
+
+@pytest.mark.parametrize('names', [
+    ['one.mcap', 'two.mcap'], ['x_0.mcap', 'x_0.db3'], ['x_0.mcap', 'y_1.mcap'],
+    ['x.mcap', 'x_0.mcap'], ['one.mcap', 'deeper/metadata.yaml']])
+def test_files_that_are_no_recording_together_are_bags_of_their_own(
+        tmp_path: Path, names: list[str]) -> None:
+    assert found(make(tmp_path, *names)) == sorted(
+        name.removesuffix('/metadata.yaml') for name in names)
+
+
+def test_hidden_names_and_links_are_passed_over(tmp_path: Path) -> None:
+    make(tmp_path / 'far', 'metadata.yaml')
+    make(tmp_path / 'far' / 'file.mcap')
+    near = make(tmp_path / 'near', 'bag/metadata.yaml', '.hidden/metadata.yaml', 'a/.x.mcap')
+    (near / 'linked').symlink_to(tmp_path / 'far')
+    (near / 'around').symlink_to(near)
+    (near / 'linked.mcap').symlink_to(tmp_path / 'far' / 'metadata.yaml')
+    assert found(near) == ['bag']
+    # what is named itself is followed
+    (tmp_path / 'link').symlink_to(near)
+    assert found(tmp_path / 'link') == ['bag']
+
+
+def test_results_are_no_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(tmp_path, 'bag/metadata.yaml', 'out/x/metadata.yaml',
+         'earlier/x/summary.json', 'earlier/x/bag/metadata.yaml', 'earlier/x/bag/bag.mcap')
+    assert found(tmp_path, tmp_path / 'out') == ['bag']
+    monkeypatch.chdir(tmp_path / 'bag')
+    assert found(tmp_path, Path('..', 'out')) == ['bag']
+    # unless somebody wants them
+    assert find_bags(tmp_path / 'earlier' / 'x' / 'bag') == [tmp_path / 'earlier' / 'x' / 'bag']
+
+
+def test_a_folder_without_bags_is_an_error(tmp_path: Path) -> None:
+    make(tmp_path, 'notes.txt', '.hidden/metadata.yaml', 'old.bag')
+    with pytest.raises(BagError, match='holds no bag') as caught:
+        find_bags(tmp_path)
+    assert f'{caught.value}'.startswith(f'{tmp_path}: ')
+    assert '\n' not in f'{caught.value}'
+
+
+def test_results_are_where_the_bags_are(tmp_path: Path) -> None:
+    bags = make(tmp_path / 'bags', 'day/1/metadata.yaml', 'day/2/x.mcap', 'day/3/p.mcap',
+                'day/3/q.v2.mcap', 'night/metadata.yaml')
+    output = tmp_path / 'out'
+    assert results(output, bags) == {
+        'day/1': bags / 'day/1', 'day/2': bags / 'day/2', 'day/3/p': bags / 'day/3/p.mcap',
+        'day/3/q.v2': bags / 'day/3/q.v2.mcap', 'night': bags / 'night'}
+    assert results(output, bags / 'night', bags / 'day/3/p.mcap', bags / 'day/2') == {
+        'night': bags / 'night', 'p': bags / 'day/3/p.mcap', '2': bags / 'day/2'}
+
+
+def test_a_bag_that_is_the_working_folder_has_a_name(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(make(tmp_path / 'bag', 'metadata.yaml'))
+    assert folders_of_results([Path('.')], Path('out')) == [(Path('.'), Path('out', 'bag'))]
+
+
+def test_files_keep_their_suffix_where_names_would_meet(tmp_path: Path) -> None:
+    bags = make(tmp_path / 'bags', 'a.mcap', 'a.db3', 'b.mcap', 'c.mcap', 'c/metadata.yaml',
+                'd.mcap', 'd/deeper/metadata.yaml')
+    assert results(tmp_path, bags) == {
+        'a.mcap': bags / 'a.mcap', 'a.db3': bags / 'a.db3', 'b': bags / 'b.mcap',
+        'c.mcap': bags / 'c.mcap', 'c': bags / 'c', 'd.mcap': bags / 'd.mcap',
+        'd/deeper': bags / 'd/deeper'}
+
+
+def test_results_that_would_meet_are_refused(tmp_path: Path) -> None:
+    make(tmp_path, 'one/x/metadata.yaml', 'one/y/metadata.yaml', 'two/x/metadata.yaml',
+         'three/a/x/in/metadata.yaml', 'three/a/y/metadata.yaml', 'index.html/metadata.yaml')
+    output = tmp_path / 'out'
+    for paths in ([tmp_path / 'one', tmp_path / 'two' / 'x'],
+                  [tmp_path / 'one' / 'x', tmp_path / 'one' / 'x'],
+                  [tmp_path / 'one' / 'x', tmp_path / 'one' / '..' / 'one' / 'x']):
+        with pytest.raises(BagError, match=f'the results of both would be {output / "x"}'):
+            folders_of_results(paths, output)
+    with pytest.raises(BagError, match=f'{output / "x" / "in"}, would be inside'):
+        folders_of_results([tmp_path / 'three' / 'a', tmp_path / 'two'], output)
+    with pytest.raises(BagError, match='where the table of all bags goes'):
+        folders_of_results([tmp_path / 'index.html', tmp_path / 'one' / 'x'], output)

@@ -1,0 +1,313 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The table of many bags: fleet.csv as other programs read it, index.html in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import csv
+from pathlib import Path
+import re
+import shutil
+from typing import Any
+
+import pytest
+
+from stewart_dynamics.replay.index import COLUMNS, row_of, write_fleet
+
+playwright = pytest.importorskip('playwright.sync_api')
+
+BROWSER = shutil.which('chromium') or shutil.which('chromium-browser') or shutil.which(
+    'google-chrome')
+FLAGS = ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync']
+in_browser = pytest.mark.skipif(not BROWSER, reason='there is no chromium')
+
+HOSTILE = ['<img src=x onerror=alert(1)>', '</script><script>alert(2)</script>',
+           '"><svg onload=alert(3)>', "'-alert(4)-'", 'javascript:alert(5)', '&lt;b&gt; &amp;',
+           '=1+1', '+1', '-1', '@SUM(A1)', '=HYPERLINK("http://x.invalid");a', 'a"b,c;d\ne',
+           '\tx', '<!-- <script>', 'caf\udce9', '℃ 50 %20#?.mcap', 'SHA256 FLEET']
+
+
+def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
+    """Return the parts of a summary that go into the table; the peaks are forces [N]."""
+    legs = {f'leg_{n}': {
+        'force_peak_n': peak, 'force_peak_at_s': n * 1.0,
+        'force_margin_n': None if peak is None else 100.0 - abs(peak),
+        'length_margin_m': None, 'rate_margin_m_s': 0.1 * n,
+        'force_rms_n': None if peak is None else 0.5 * abs(peak),
+        'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
+    return {'software': 'stewart_dynamics 9', 'complete': True,
+            'setpoints': {'answered': 1000, 'duration_s': 10.0}, 'legs': legs, 'limits': [],
+            'refused': [], 'singularity': {
+                'determinant_nearest_m3': 0.25, 'crossings': 0, 'condition_max': 4.5,
+                'warnings': 0}, **changes}
+
+
+def row(bag: str, code: int = 0, of: dict[str, Any] | None = None, error: str = '',
+        results: str | None = None) -> dict[str, Any]:
+    return {**row_of(code, of, error), 'bag': bag, 'results': results}
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / 'fleet.csv').open(newline='', encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+# fleet.csv
+
+def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
+    limits = [{'limit': f'limits.{limit}', 'leg': leg} for limit, leg in (
+        ('length_max', 'leg_2'), ('force_max', 'leg_1'), ('force_max', 'leg_3'))]
+    write_fleet(tmp_path, [row('a', 1, summary(
+        [3.0, -120.5, 7.0, 120.0], limits=limits, refused=[{'count': 3}, {'count': 4}],
+        singularity={'determinant_nearest_m3': -1e-7, 'crossings': 2, 'condition_max': 8e3,
+                     'warnings': 1}), results='deep/a')])
+    assert table(tmp_path) == [{
+        'bag': 'a', 'code': '1', 'result': 'limit met', 'complete': 'true', 'setpoints': '1000',
+        'duration_s': '10.0', 'force_worst_n': '-120.5', 'force_worst_leg': 'leg_1',
+        'force_worst_at_s': '1.0', 'force_margin_n': '-20.5', 'length_margin_m': '',
+        'rate_margin_m_s': '0.0', 'limits_broken': 'length_max: leg_2; force_max: leg_1, leg_3',
+        'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
+        'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'refused': '7',
+        'error': '', 'results': 'deep/a'}]
+
+
+def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
+    nothing = summary([None] * 6, singularity=dict.fromkeys(
+        ('determinant_nearest_m3', 'crossings', 'condition_max', 'warnings')))
+    write_fleet(tmp_path, [row('none', 0, nothing, results='none'), row('bad', 2, None, 'why')])
+    none, bad = table(tmp_path)
+    assert (none['force_worst_n'], none['force_worst_leg'], none['condition_max']) == ('',) * 3
+    assert {key: cell for key, cell in bad.items() if cell} == {
+        'bag': 'bad', 'code': '2', 'result': 'failed', 'error': 'why'}
+
+
+def test_no_cell_is_taken_for_a_formula_nor_falls_apart(tmp_path: Path) -> None:
+    write_fleet(tmp_path, [row(name, 2, None, name) for name in HOSTILE])
+    rows = table(tmp_path)
+    assert len(rows) == len(HOSTILE)
+    for name, cells in zip(HOSTILE, rows, strict=True):
+        name = name.encode('utf-8', 'backslashreplace').decode()
+        assert not re.match(r'[=+@\t\r\n-]', cells['bag'] + cells['error'])
+        # the same path, and the same words
+        assert cells['bag'] in (name, f'./{name}')
+        assert cells['error'] in (name, f"'{name}")
+    # no text stands outside quotes, where a semicolon would end a cell
+    text = (tmp_path / 'fleet.csv').read_text(encoding='utf-8')
+    assert not set(re.sub(r'"(?:[^"]|"")*"', '', text)) - set('0123456789.,\r\n')
+
+
+def test_files_are_replaced_whole(tmp_path: Path) -> None:
+    write_fleet(tmp_path, [row('first')])
+    before = (tmp_path / 'fleet.csv').read_bytes(), (tmp_path / 'index.html').read_bytes()
+    with pytest.raises(ValueError, match='JSON compliant'):
+        write_fleet(tmp_path, [{**row('second'), 'code': float('nan')}])
+    assert (tmp_path / 'index.html').read_bytes() == before[1]
+    write_fleet(tmp_path, [row('third')])
+    assert [cells['bag'] for cells in table(tmp_path)] == ['third']
+    assert (tmp_path / 'index.html').read_bytes() != before[1]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['fleet.csv', 'index.html']
+
+
+# index.html
+
+class Page:
+    """The page in a browser; what it complained of is kept."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        page.on('console', lambda message: self.complaints.append(message.text))
+        page.on('pageerror', lambda error: self.complaints.append(f'{error}'))
+        page.on('request', lambda request: self.requests.append(request.url))
+        page.on('dialog', lambda dialog: (self.complaints.append(dialog.message),
+                                          dialog.dismiss()))
+
+    def open(self, folder: Path, rows: list[dict[str, Any]]) -> None:
+        write_fleet(folder, rows)
+        self.page.goto((folder / 'index.html').as_uri())
+
+    def column(self, head: str) -> list[str]:
+        """Return the texts of a column, from above."""
+        texts: list[str] = self.page.eval_on_selector_all(
+            'tbody tr', '(lines, n) => lines.map((line) => line.children[n]?.innerText ?? "")',
+            self._number(head))
+        return texts
+
+    def sort(self, head: str) -> str:
+        self.page.click(f'th:nth-child({self._number(head) + 1}) button')
+        order: str = self.page.get_attribute(
+            f'th:nth-child({self._number(head) + 1})', 'aria-sort')
+        return order
+
+    @staticmethod
+    def _number(key: str) -> int:
+        return [column.key for column in COLUMNS if column.head].index(key)
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def page(browser: Any) -> Iterator[Page]:
+    """Return a page that must not have complained, nor asked for anything but itself."""
+    context = browser.new_context(viewport={'width': 1500, 'height': 800})
+    made = Page(context.new_page())
+    yield made
+    context.close()
+    assert made.complaints == []
+    assert {url.rpartition('/')[2] for url in made.requests} <= {'index.html', 'report.html'}
+
+
+PEAKS = [9.0, -100.0, None, 20.5, -3.0, 1000.0]
+
+
+def six() -> list[dict[str, Any]]:
+    names = ['b', 'a10', 'a9', 'C', 'd', 'e']
+    codes = [0, 1, 2, 3, 0, 1]
+    return [row(name, code, None if peak is None else summary([peak], limits=[
+        {'limit': 'limits.force_max', 'leg': 'leg_0'}] if abs(peak) >= 100 else []),
+        'some words' if code in (2, 3) else '', None if code == 2 else name)
+        for name, code, peak in zip(names, codes, PEAKS, strict=True)]
+
+
+@in_browser
+def test_a_click_on_a_head_sorts(page: Page, tmp_path: Path) -> None:
+    page.open(tmp_path, six())
+    assert page.column('bag') == ['b', 'a10', 'a9', 'C', 'd', 'e']
+    # by size, not as text; what has no value last
+    assert page.sort('force_worst_n') == 'ascending'
+    assert page.column('bag') == ['d', 'b', 'C', 'a10', 'e', 'a9']
+    assert page.column('force_worst_n')[:5] == [
+        '−3.00', '9.00', '20.50', '−100.00', '1\u202f000.00']
+    assert page.sort('force_worst_n') == 'descending'
+    assert page.column('bag') == ['e', 'a10', 'C', 'b', 'd', 'a9']
+    # the least margin, with its sign, is the worst
+    page.sort('force_margin_n')
+    assert page.column('bag') == ['e', 'a10', 'C', 'b', 'd', 'a9']
+    assert page.column('force_margin_n')[0] == '−900.00'
+    # names as a person sorts them
+    page.sort('bag')
+    assert page.column('bag') == ['a9', 'a10', 'b', 'C', 'd', 'e']
+    # results by how grave they are; what is alike stays in the order of the table
+    page.sort('result')
+    page.sort('result')
+    assert page.column('bag') == ['a9', 'C', 'a10', 'e', 'b', 'd']
+    assert page.page.locator('th[aria-sort]').count() == 1
+
+
+@in_browser
+def test_what_is_wrong_is_plain_to_see(page: Page, tmp_path: Path) -> None:
+    page.open(tmp_path, six())
+
+    def color(selector: str) -> list[int]:
+        text = page.page.eval_on_selector(selector, 'it => getComputedStyle(it).color')
+        return [int(number) for number in re.findall(r'\d+', text)]
+
+    for selector in ('tr:nth-child(2) td.limits_broken', 'tr:nth-child(3) .pill',
+                     'tr:nth-child(3) td.error', 'tr:nth-child(4) td.error',
+                     'tr:nth-child(6) td.bad'):
+        red, green, blue = color(f'tbody {selector}')
+        assert red > 2 * max(green, blue), selector
+    # a failed bag's words are beside its name, not beyond the numbers that it has not
+    assert page.page.inner_text('tbody tr:nth-child(3) td:nth-child(3)') == 'some words'
+
+
+@in_browser
+def test_rows_are_chosen_by_result_and_by_text(page: Page, tmp_path: Path) -> None:
+    page.open(tmp_path, six())
+    buttons = page.page.locator('nav button')
+    assert buttons.all_inner_texts() == ['all 6', 'done 2', 'limit met 2', 'partly read 1',
+                                         'failed 1']
+    page.page.click('nav button:nth-child(3)')
+    assert page.column('bag') == ['a10', 'e']
+    page.page.fill('#filter', 'A1')
+    assert page.column('bag') == ['a10']
+    assert page.page.inner_text('#shown') == '1 of 6'
+    page.page.click('nav button:nth-child(1)')
+    page.page.fill('#filter', 'some WORDS')
+    assert page.column('bag') == ['a9', 'C']
+    page.page.fill('#filter', '')
+    assert len(page.column('bag')) == 6
+    assert page.page.inner_text('#shown') == ''
+
+
+@in_browser
+def test_hostile_names_are_text(page: Page, tmp_path: Path) -> None:
+    page.open(tmp_path, [
+        *(row(name, 2, None, name) for name in HOSTILE),
+        *(row(name, 0, summary([1.0]), results=name.replace('/', '_')) for name in HOSTILE)])
+    shown = page.page.eval_on_selector_all(
+        'tbody tr td:first-child', 'cells => cells.map((cell) => cell.textContent)')
+    assert shown == HOSTILE * 2
+    for name in HOSTILE:
+        page.page.fill('#filter', name.replace('\udce9', '').replace('\n', ''))
+    page.page.fill('#filter', '')
+    page.sort('bag')
+    assert page.page.locator('main :is(img, svg, script, b)').count() == 0
+
+
+@in_browser
+def test_links_lead_to_reports(page: Page, tmp_path: Path) -> None:
+    names = [name.replace('/', '_') for name in HOSTILE] + ['deep/er/x']
+    for name in names:
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / 'report.html').write_text(f'<title>{names.index(name)}</title>')
+    page.open(tmp_path, [row(name, 0, summary([1.0]), results=name) for name in names])
+    links = page.page.eval_on_selector_all('tbody a', 'all => all.map((link) => link.href)')
+    for n, link in enumerate(links):
+        page.page.goto(link)
+        assert page.page.title() == f'{n}'
+    assert len(links) == len(names)
+
+
+@in_browser
+def test_a_bag_without_a_report_leads_to_its_folder(page: Page, tmp_path: Path) -> None:
+    (tmp_path / 'x').mkdir()
+    page.open(tmp_path, [row('x', 0, summary([1.0]), results='x')])
+    link = page.page.eval_on_selector('tbody a', 'link => link.href')
+    assert link == (tmp_path / 'x').as_uri()
+
+
+@in_browser
+def test_thousands_of_bags(page: Page, tmp_path: Path) -> None:
+    page.open(tmp_path, [row(f'{n}', 0, summary([float(n % 997)])) for n in range(1500)])
+    # a page that stays small, and a browser that is not asked for all rows at once
+    assert (tmp_path / 'index.html').stat().st_size < 300_000
+    assert 50 < len(page.column('bag')) < 500
+    page.page.fill('#filter', '1499')
+    assert page.column('bag') == ['1499']
+    page.page.fill('#filter', '')
+    page.sort('force_worst_n')
+    page.sort('force_worst_n')
+    assert page.column('bag')[:5] == ['996', '995', '994', '993', '992']
+    # the last row can be scrolled to
+    for _ in range(100):
+        if len(page.column('bag')) == 1500:
+            break
+        page.page.evaluate(
+            'new Promise((done) => { const main = document.querySelector("main");'
+            'main.addEventListener("scroll", done, {once: true});'
+            'main.scrollTop = main.scrollHeight; })')
+    assert len(page.column('bag')) == 1500
+    assert page.column('bag')[-1] == '997'

@@ -1,0 +1,521 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The report of a bag: what is in the file, and what a real browser makes of it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterator
+from html.parser import HTMLParser
+import json
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import time
+from typing import Any, TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+from stewart_dynamics import Motion, Parameters
+from stewart_dynamics.causes import CAUSES, ForceCauses
+from stewart_dynamics.replay.measured import Comparison
+from stewart_dynamics.replay.report import Report
+from stewart_dynamics.rotation import from_euler
+from stewart_dynamics.step import Batch, Outputs, Step
+from stewart_dynamics.summary import Summary
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+Array = NDArray[np.float64]
+
+CONFIG = Path(__file__).resolve().parent.parent / 'config'
+PARAMETERS = Parameters.from_yaml(CONFIG / 'platform.yaml')
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+FLAGS = ('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync',
+         '--use-angle=swiftshader', '--enable-unsafe-swiftshader')
+PATIENCE = 60.0  # [s]
+HOSTILE = ('</script><script>window.hacked=1</script>', '<img src=x onerror=window.hacked=1>',
+           '"><b>bold</b>', "';window.hacked=1;'", '${window.hacked=1}<br>', '<!--=data-->')
+
+
+class Given:
+    """A motion, what it gives, and the report of it."""
+
+    def __init__(self, seconds: Array, motions: Array, parameters: Parameters = PARAMETERS,
+                 ) -> None:
+        self.seconds, self.motions, self.parameters = seconds, motions, parameters
+        many = len(seconds)
+        stamps = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
+        self.setpoints = Batch(
+            stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps)
+        self.outputs: Outputs = Step(parameters).many(self.setpoints, None)
+        self.causes = ForceCauses(parameters)(motions, self.setpoints.wrenches)
+
+    def summary(self, **changes: Any) -> dict[str, Any]:
+        """Return what summary.json would hold."""
+        summary = Summary(self.parameters)
+        summary.add(self.seconds, self.setpoints, self.outputs, self.causes)
+        return {
+            'version': 1, 'software': 'stewart_dynamics 0.1.0', 'bag': 'bags/example', 'run': '',
+            'complete': True, 'missing': [], 'notices': [],
+            'inputs': {'node': '/stewart_dynamics', 'topics': {'setpoint/pose': '/a/pose'},
+                       'differentiated_cutoff_hz': None, 'measured': None},
+            'refused': [], 'measured': None, **summary.values(),
+            'parameters': {name: value.ravel().tolist() if isinstance(value, np.ndarray) else value
+                           for name, value in self.parameters.items()}, **changes}
+
+    def report(self, measured: bool = False) -> Report:
+        report = Report(self.parameters, measured)
+        if len(self.seconds):
+            report.add(self.seconds, self.setpoints, self.outputs, self.causes)
+        return report
+
+    def write(self, path: Path, **changes: Any) -> dict[str, Any]:
+        summary = self.summary(**changes)
+        self.report().write(path, summary)
+        return summary
+
+
+def trajectory(name: str, parameters: Parameters = PARAMETERS) -> Given:
+    """Return a motion of config/, as it is recorded in bags/."""
+    p = TrajectoryParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
+    seconds = sample_times(p) * 1e-9
+    return Given(seconds, motion_at(p, seconds).rows, parameters)
+
+
+class _Elements(HTMLParser):
+    """The elements of a page, and the text that a reader sees."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.names: list[str] = []
+        self.attributes: list[str] = []
+        self.text = ''
+        self._hidden = 0
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.names.append(tag)
+        self.attributes += [name for name, _ in attrs]
+        self._hidden += tag in ('script', 'style')
+
+    def handle_endtag(self, tag: str) -> None:
+        self._hidden -= tag in ('script', 'style')
+
+    def handle_data(self, data: str) -> None:
+        self.text += '' if self._hidden else f'{data} '
+
+
+def data_of(path: Path) -> Any:
+    """Return what the report gives its script."""
+    page = path.read_text(encoding='utf-8')
+    return json.loads(page.split('<script id="data" type="application/json">')[1].split(
+        '</script>')[0])
+
+
+def curve_of(data: Any, plot: str, number: int, variant: int = 0) -> tuple[Array, Array]:
+    """Return times and values of one curve in a plot."""
+    spec = next(each for each in data['plots'] if each['key'] == plot)
+    curve = data['curves'][spec['variants'][variant]['curves'][number]['curve']]
+    return (np.frombuffer(base64.b64decode(curve['times']), '<f8'),
+            np.frombuffer(base64.b64decode(curve['values']), '<f4').astype(float))
+
+
+# ---- the file
+
+
+def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
+    block = Given(np.arange(5000) * 1e-3, np.resize(trajectory('clear').motions, (5000, 24)))
+    report = Report(PARAMETERS, measured=True)
+    noise = np.random.default_rng(1).standard_normal((4, 5000, 6))
+    for n in range(200):
+        seconds = 5.0 * n + block.seconds
+        report.add(seconds, block.setpoints, block.outputs, block.causes)
+        report.add_measured(seconds, *noise[:3])
+    path = tmp_path / 'report.html'
+    report.write(path, block.summary())
+    assert data_of(path)['samples'] == 1_000_000
+    assert path.stat().st_size < 10e6
+
+
+def test_what_is_drawn_are_the_samples_and_every_peak(tmp_path: Path) -> None:
+    given = trajectory('singular')
+    summary = given.write(tmp_path / 'report.html')
+    data = data_of(tmp_path / 'report.html')
+    columns = {'position': given.motions[:, :3], 'velocity': given.motions[:, 12:15],
+               'angular_velocity': np.degrees(given.motions[:, 15:18]),
+               'acceleration': given.motions[:, 18:21],
+               'angular_acceleration': np.degrees(given.motions[:, 21:24]),
+               'lengths': given.outputs.lengths, 'rates': given.outputs.rates,
+               'forces': given.outputs.demanded_forces,
+               'powers': given.outputs.demanded_forces * given.outputs.rates,
+               'determinant': given.outputs.determinants[:, None],
+               'condition': given.outputs.conditions[:, None]}
+    for plot, truth in columns.items():
+        for n, column in enumerate(truth.T):
+            at, values = curve_of(data, plot, n)
+            assert np.array_equal(at, given.seconds), plot
+            assert np.array_equal(values, column.astype(np.float32)), plot
+    for n, leg in enumerate(summary['legs'].values()):
+        for plot, key in (('forces', 'force_peak_n'), ('powers', 'power_peak_w'),
+                          ('rates', 'rate_peak_m_s')):
+            _, values = curve_of(data, plot, n)
+            assert np.abs(values).max() == abs(np.float32(leg[key]))
+        parts = sum(curve_of(data, 'causes', 1 + c, n)[1] for c in range(len(CAUSES)))
+        whole = curve_of(data, 'causes', 0, n)[1]
+        assert np.abs(parts - whole).max() <= 1e-6 * np.abs(whole).max()
+
+
+def test_angles_are_the_papers_and_go_on_past_half_a_turn(tmp_path: Path) -> None:
+    seconds = np.arange(400) * 0.01
+    angles = np.stack([0.4 * np.sin(seconds), 0.3 * np.cos(seconds), 3.0 * seconds], axis=1)
+    motion = Motion(np.tile([0.0, 0.0, 1.1], (400, 1)), from_euler(angles))
+    given = Given(seconds, motion.rows)
+    report = Report(PARAMETERS)
+    for part in (slice(0, 150), slice(150, 151), slice(151, 400)):
+        report.add(seconds[part], Batch(*(each[part] for each in given.setpoints)),
+                   Outputs(*(each[part] for each in given.outputs)), given.causes[part])
+    report.write(tmp_path / 'report.html', given.summary())
+    data = data_of(tmp_path / 'report.html')
+    drawn = np.stack([curve_of(data, 'angles', n)[1] for n in range(3)], axis=1)
+    np.testing.assert_allclose(drawn, np.degrees(angles), atol=1e-4)
+
+
+def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
+    given = trajectory('clear', PARAMETERS.replaced({'joints': list(HOSTILE)}))
+    plain = trajectory('clear')
+    paths = tmp_path / 'hostile.html', tmp_path / 'plain.html'
+    bag = '/a/</script><script>window.hacked=1</script>\udcff/<!--=plotly-->'
+    refused = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2}]
+    given.write(paths[0], bag=bag, notices=[HOSTILE[1]], complete=False, missing=[HOSTILE[0]],
+                refused=refused, run='<i>', inputs={
+                    'node': '/n', 'topics': {'setpoint/pose': HOSTILE[0]},
+                    'differentiated_cutoff_hz': 5.0, 'measured': None})
+    plain.write(paths[1], bag='/a/b/c', notices=['n'], complete=False, missing=['m'],
+                refused=[{'topic': 't', 'reason': 'r', 'count': 2}], run='r', inputs={
+                    'node': '/n', 'topics': {'setpoint/pose': '/p'},
+                    'differentiated_cutoff_hz': 5.0, 'measured': None})
+    hostile, harmless = (_Elements(path.read_text(encoding='utf-8')) for path in paths)
+    assert hostile.names == harmless.names
+    assert hostile.attributes == harmless.attributes
+    assert not [name for name in hostile.attributes if name.startswith('on')]
+    assert hostile.names.count('script') == 3
+    for name in HOSTILE:
+        assert name in hostile.text
+    assert data_of(paths[0])['legs'] == list(HOSTILE)
+
+
+def test_what_is_wrong_with_a_bag_is_told(tmp_path: Path) -> None:
+    trajectory('singular').write(
+        tmp_path / 'report.html', complete=False, missing=['chunk 3: its CRC is wrong'],
+        notices=['the bag has no checksums'],
+        refused=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234}])
+    text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
+    for told in ('Only a part could be read', 'chunk 3: its CRC is wrong', 'not finite', '1,234',
+                 'Limits are broken', 'limits.force_max', 'A singularity is met',
+                 'crosses zero once', 'the bag has no checksums', 'reflected_mass'):
+        assert told in text, told
+
+
+def test_plotly_that_is_missing_is_told_in_one_line(tmp_path: Path) -> None:
+    # an entry that is None is how Python itself marks a module that cannot be imported
+    script = ("import sys; sys.modules['plotly'] = None\n"
+              'from pathlib import Path\n'
+              'from stewart_dynamics import Parameters\n'
+              'from stewart_dynamics.errors import StewartError\n'
+              'from stewart_dynamics.replay.report import Report\n'
+              f'report = Report(Parameters.from_yaml({str(CONFIG / "platform.yaml")!r}))\n'
+              'try:\n'
+              '    report.write(Path(sys.argv[1]), {})\n'
+              'except StewartError as exc:\n'
+              '    print(exc)\n')
+    path = tmp_path / 'report.html'
+    done = subprocess.run([sys.executable, '-c', script, path], capture_output=True, text=True,
+                          check=True)
+    assert 'pip install plotly' in done.stdout
+    assert done.stdout.count('\n') == 1
+    assert not path.exists()
+
+
+# ---- in a browser
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Browser]:
+    """Return a browser; the test is skipped where there is none."""
+    playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f'no browser on this machine: none of {", ".join(BROWSERS)}')
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(
+            executable_path=found, args=FLAGS, timeout=1000.0 * PATIENCE)
+        yield running
+        running.close()
+
+
+class Opened:
+    """A report in the browser, and whatever went wrong in it."""
+
+    def __init__(self, page: Page, path: Path) -> None:
+        self.page = page
+        self.faults: list[str] = []
+        self.requests: list[str] = []
+        page.set_default_timeout(1000.0 * PATIENCE)
+        page.on('pageerror', lambda error: self.faults.append(str(error)))
+        page.on('console', lambda message: self.faults.append(message.text)
+                if message.type == 'error' else None)
+        page.on('request', lambda request: self.requests.append(request.url))
+        self.url = path.as_uri()
+        page.goto(self.url)
+
+    def until(self, expression: str) -> None:
+        """Wait until an expression is true; the page's policy forbids playwright's own way."""
+        end = time.monotonic() + PATIENCE
+        while not self.page.evaluate(expression):
+            assert time.monotonic() < end, f'{expression} does not come true: {self.faults}'
+            self.page.wait_for_timeout(20)
+
+    def see(self, plot: str) -> None:
+        """Scroll to a plot, and wait until it is drawn."""
+        self.page.evaluate(f'document.getElementById({plot!r}).scrollIntoView('
+                           "{behavior: 'instant', block: 'center'})")
+        self.until(f'Boolean(document.getElementById({plot!r})._fullLayout)')
+
+    def see_everything(self) -> None:
+        for plot in self.page.evaluate('[...byCanvas.keys()].map(canvas => canvas.id)'):
+            self.see(plot)
+
+    def check(self) -> None:
+        """Nothing went wrong, and nothing but the file was asked for."""
+        assert self.faults == []
+        assert [url for url in self.requests if not url.startswith(('data:', 'blob:'))] == [
+            self.url]
+
+
+@pytest.fixture
+def opened(browser: Browser, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
+    """Return a function that writes a report and opens it."""
+    pages: list[Page] = []
+
+    def begin(given: Given, write: Callable[[Path], Any] | None = None, **changes: Any) -> Opened:
+        path = tmp_path / f'report_{len(pages)}.html'
+        (write or (lambda path: given.write(path, **changes)))(path)
+        pages.append(browser.new_page(viewport={'width': 1300, 'height': 900}))
+        return Opened(pages[-1], path)
+
+    yield begin
+    for page in pages:
+        page.close()
+
+
+def test_everything_is_drawn_without_an_error_or_the_network(
+        opened: Callable[..., Opened]) -> None:
+    given = trajectory('singular')
+
+    def write(path: Path) -> None:
+        report, comparison = given.report(measured=True), Comparison(PARAMETERS)
+        touched = given.outputs.demanded_forces + np.random.default_rng(1).normal(
+            size=given.outputs.demanded_forces.shape)
+        touched[200:260] += 300.0
+        comparison.add_measured(given.setpoints.stamps, touched)
+        comparison.add_setpoints(given.seconds, given.setpoints, given.outputs)
+        report.add_measured(*comparison.finish())
+        report.write(path, given.summary(measured=comparison.values()))
+    report = opened(given, write)
+    report.see_everything()
+    drawn = report.page.evaluate('[...byCanvas.keys()].map(canvas => canvas.id)')
+    assert len(drawn) == 19
+    assert report.page.evaluate("document.querySelectorAll('#platform canvas').length") > 0
+    report.check()
+
+
+def joints_shown(report: Opened) -> Array:
+    """Return the platform joints in the picture (6, 3)."""
+    return np.array(report.page.evaluate(
+        "(() => { const trace = document.getElementById('platform').data[4];"
+        ' return [0, 1, 2, 3, 4, 5].map(n => [trace.x[n], trace.y[n], trace.z[n]]); })()'))
+
+
+def joints_of(given: Given, sample: int) -> Array:
+    motion = given.motions[sample]
+    joints: Array = motion[:3] + PARAMETERS['geometry.platform_joints'] @ motion[3:12].reshape(
+        3, 3).T
+    return joints
+
+
+def test_the_slider_moves_platform_colours_and_cursor(opened: Callable[..., Opened]) -> None:
+    given = trajectory('clear')
+    report = opened(given)
+    report.see('platform')
+    np.testing.assert_allclose(joints_shown(report), joints_of(given, 0), atol=1e-12)
+    for sample in (437, 1000):
+        report.page.locator('#slider').fill(str(given.seconds[sample] + 0.002))
+        report.see('platform')
+        report.until(f'player.frame === {sample} && !player.busy')
+        np.testing.assert_allclose(joints_shown(report), joints_of(given, sample), atol=1e-12)
+        colors = report.page.evaluate("document.getElementById('platform').data[5].line.color")
+        np.testing.assert_allclose(colors[::3], given.outputs.demanded_forces[sample])
+        report.see('plot_forces')
+        report.until("document.querySelector('#plot_forces .cursor').style.display === 'block'")
+        place = report.page.evaluate(
+            "parseFloat(document.querySelector('#plot_forces .cursor').style.left)")
+        axis = report.page.evaluate(
+            '(({_offset, _length}) => [_offset, _length])'
+            "(document.getElementById('plot_forces')._fullLayout.xaxis)")
+        assert place == pytest.approx(axis[0] + axis[1] * sample / 1000, abs=1.5)
+        shown = report.page.locator('.plot:has(#plot_forces) .readout td').all_inner_texts()
+        np.testing.assert_allclose(
+            [float(text.replace('−', '-')) for text in shown],
+            given.outputs.demanded_forces[sample], rtol=1e-4)
+    report.check()
+
+
+def test_playing_takes_the_motion_to_its_end(opened: Callable[..., Opened]) -> None:
+    given = trajectory('clear')
+    report = opened(given)
+    report.see('platform')
+    report.page.select_option('#speed', '5')
+    report.page.locator('#play').click()
+    report.until('playing.since === null && time.cursor === report.end')
+    report.until('player.frame === 1000 && !player.busy')
+    np.testing.assert_allclose(joints_shown(report), joints_of(given, 1000), atol=1e-12)
+    report.check()
+
+
+def test_zooming_one_plot_zooms_all(opened: Callable[..., Opened]) -> None:
+    report = opened(trajectory('singular'))
+    ranges = "document.getElementById('plot_{}')._fullLayout.xaxis.range"
+    for plot in ('rates', 'lengths', 'forces'):  # one is drawn already, one is not yet
+        if plot != 'lengths':
+            report.see(f'plot_{plot}')
+    box = report.page.locator('#plot_forces').bounding_box()
+    assert box is not None
+    mouse = report.page.mouse
+    mouse.move(box['x'] + 300, box['y'] + 120)
+    mouse.down()
+    mouse.move(box['x'] + 500, box['y'] + 122, steps=5)
+    mouse.up()
+    report.until(f'{ranges.format("forces")}[0] > 0.5')
+    zoomed = report.page.evaluate(ranges.format('forces'))
+    assert 0.5 < zoomed[0] < zoomed[1] < 9.5
+    for plot in ('rates', 'lengths', 'position', 'causes'):
+        report.see(f'plot_{plot}')
+        report.until(f'sameRange({ranges.format(plot)}, {zoomed})')
+    report.page.locator('#whole').click()
+    report.until(f'sameRange({ranges.format("causes")}, [0, 10])')
+    report.see('plot_forces')
+    report.until(f'sameRange({ranges.format("forces")}, [0, 10])')
+    report.check()
+
+
+def test_a_spike_flattens_nothing_but_can_be_seen_whole(opened: Callable[..., Opened]) -> None:
+    given = trajectory('singular')
+    report = opened(given)
+    report.see('plot_forces')
+    extent = "document.getElementById('plot_forces')._fullLayout.yaxis.range"
+    most = float(np.abs(given.outputs.demanded_forces).max())
+    low, high = report.page.evaluate(extent)
+    assert 6000.0 < max(-low, high) < 0.05 * most
+    report.page.locator('.plot:has(#plot_forces) .tools button').click()
+    report.until(f'Math.max(...{extent}.map(Math.abs)) >= {most}')
+    drawn = report.page.evaluate(
+        "Math.max(...document.getElementById('plot_forces').data.flatMap("
+        'trace => Array.from(trace.y, Math.abs)))')
+    assert drawn == np.float32(most)
+    report.check()
+
+
+def test_a_time_in_a_table_moves_the_cursor_there(opened: Callable[..., Opened]) -> None:
+    given = trajectory('singular')
+    report = opened(given)
+    at = given.summary()['legs']['leg_5']['force_peak_at_s']
+    report.page.locator('#peaks tbody tr').nth(4).locator('button').nth(1).click()
+    report.until(f'time.cursor === {at!r}')
+    report.until(f"document.getElementById('now').textContent.startsWith('t = {at:.3f} s')")
+    report.check()
+
+
+def test_the_shown_leg_can_be_chosen_and_a_curve_hidden(opened: Callable[..., Opened]) -> None:
+    given = trajectory('clear')
+    report = opened(given)
+    report.see('plot_causes')
+    plot = report.page.locator('.plot:has(#plot_causes)')
+    plot.locator('select').select_option(label='leg_4')
+    first = "document.getElementById('plot_causes').data[0].y[0]"
+    report.until(f'{first} === {float(np.float32(given.outputs.demanded_forces[0, 3]))!r}')
+    plot.locator('.readout button').nth(1).click()
+    report.until("document.getElementById('plot_causes').data[1].visible === false")
+    report.check()
+
+
+def test_a_single_setpoint(opened: Callable[..., Opened]) -> None:
+    whole = trajectory('clear')
+    report = opened(Given(whole.seconds[:1], whole.motions[:1]))
+    report.see_everything()
+    report.see('plot_forces')
+    points = report.page.evaluate("document.querySelectorAll('#plot_forces path.point').length")
+    assert points == 6
+    report.page.locator('#play').click()
+    report.until('playing.since === null')
+    report.check()
+
+
+def test_poses_that_cannot_be_solved_leave_gaps(opened: Callable[..., Opened]) -> None:
+    whole = trajectory('clear')
+    motions = whole.motions.copy()
+    motions[300:400] = 0.0
+    motions[300:400, 3:12] = np.eye(3).ravel()
+    given = Given(whole.seconds, motions)
+    assert np.isnan(given.outputs.demanded_forces[300:400]).all()
+    report = opened(given)
+    report.see_everything()
+    report.page.locator('#slider').fill('3.5')
+    report.see('platform')
+    report.until("player.legValues[0][0].textContent === 'none'")
+    report.see('plot_forces')
+    missing = report.page.evaluate(
+        "Array.from(document.getElementById('plot_forces').data[0].y, Number.isNaN)")
+    assert np.flatnonzero(missing).tolist() == list(range(300, 400))
+    report.check()
+
+
+def test_without_any_setpoint(opened: Callable[..., Opened]) -> None:
+    report = opened(Given(np.empty(0), np.empty((0, 24))))
+    report.until("document.getElementById('plots').textContent.includes('nothing to draw')")
+    assert 'No setpoint could be answered' in report.page.inner_text('#verdict')
+    report.check()
+
+
+def test_hostile_names_are_shown_and_not_executed(opened: Callable[..., Opened]) -> None:
+    given = trajectory('clear', PARAMETERS.replaced({'joints': list(HOSTILE)}))
+    report = opened(given, bag=f'/a/{HOSTILE[1]}', notices=list(HOSTILE))
+    report.see_everything()
+    report.page.locator('#slider').fill('5')
+    report.see('platform')
+    report.until('player.frame === player.wanted && !player.busy')
+    assert report.page.evaluate('window.hacked') is None
+    assert report.page.evaluate("document.querySelectorAll('img, b b').length") == 0
+    for name in HOSTILE:
+        assert name in report.page.inner_text('#peaks')
+        assert name in report.page.locator('.plot:has(#plot_forces) .readout').inner_text()
+    report.check()
