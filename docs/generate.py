@@ -13,22 +13,26 @@
 # limitations under the License.
 
 """
-Make what the README shows: the picture of the paper's motion, and the tables of parameters.
+Make what the README shows: pictures of the paper's motion, and the tables of parameters.
 
-``make docs`` runs it. The picture is drawn from what stewart_replay writes for bags/singular.
+``make docs`` runs it. The pictures are drawn from bags/singular, by the joining and the step that
+node and replay have.
 """
 
 from __future__ import annotations
 
-import csv
+from contextlib import closing
 from pathlib import Path
-import tempfile
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
 
 from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
-from stewart_dynamics.replay.one import replay
+from stewart_dynamics.replay.one import NODE
+from stewart_dynamics.replay.recording import Recording
+from stewart_dynamics.setpoints import Setpoints
+from stewart_dynamics.step import Array, Batch, Outputs, Step
 from stewart_dynamics.trajectory import TrajectoryParameters
 
 matplotlib.use('Agg')
@@ -36,7 +40,9 @@ from matplotlib import pyplot  # noqa: E402, I100, I202
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / 'README.md'
-PICTURE = ROOT / 'docs' / 'singular.png'
+# Okabe and Ito's, which the colour-blind can tell apart.
+LEG_COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
+AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 
 
 def table(kind: type[ParameterSet]) -> str:
@@ -77,56 +83,156 @@ def readme(text: str) -> str:
     return text
 
 
-def draw(path: Path) -> None:
-    """Draw det(J) and the leg forces of the recorded singular motion."""
-    parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
-    with tempfile.TemporaryDirectory() as folder:
-        replay(ROOT / 'bags' / 'singular', parameters, Path(folder) / 'singular')
-        with (Path(folder) / 'singular' / 'legs.csv').open(encoding='utf-8') as file:
-            rows = list(csv.DictReader(file))
-    time = np.array([int(row['stamp (ns)']) for row in rows])
-    time = (time - time[0]) * 1e-9
-    det = np.array([float(row['det(J) (m^3)']) for row in rows])
-    warned = time[[row['singularity warning'] == '1' for row in rows]]
-    limit = parameters['limits.force_max'][0] / 1e3
-    pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
-                            'axes.spines.top': False, 'axes.spines.right': False})
+class Recorded(NamedTuple):
+    """The paper's motion as it was recorded, and what the node answers to it."""
+
+    parameters: Parameters
+    seconds: Array
+    motions: Array
+    outputs: Outputs
+
+    @classmethod
+    def of(cls, bag: Path) -> Recorded:
+        """Take a bag through the joining and the step that node and replay have."""
+        parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+        setpoints = Setpoints(parameters, lambda refusal, details: None, print)
+        with closing(Recording(bag)) as recording:
+            parts = [setpoints.take_many(messages) for messages, _ in recording.messages(
+                {f'{NODE}/{topic}': topic for topic in setpoints.topics})]
+        batch = Batch._make(np.concatenate(part) for part in zip(*parts, strict=True))
+        outputs = Step(parameters).many(batch, None)
+        return cls(parameters, (batch.stamps - batch.stamps[0]) * 1e-9, batch.motions, outputs)
+
+    @property
+    def crossing(self) -> tuple[int, float]:
+        """The last sample before det(J) is zero, and when it is."""
+        det, time = self.outputs.determinants, self.seconds
+        at = int(np.flatnonzero(np.sign(det[:-1]) != np.sign(det[1:]))[0])
+        return at, float(time[at] + det[at] / (det[at] - det[at + 1]) * (time[at + 1] - time[at]))
+
+
+def draw_determinant(axes: Any, recorded: Recorded) -> None:
+    """Draw det(J), its crossing and the warning."""
+    time, det = recorded.seconds, recorded.outputs.determinants
+    _, crossing = recorded.crossing
+    axes.plot(time, det, color='black')
+    axes.axhline(0.0, color='firebrick', linewidth=0.8)
+    axes.plot(crossing, 0.0, 'o', color='firebrick', markersize=5)
+    axes.annotate(f'crosses zero\nat t = {crossing:.2f} s', (crossing, 0.0),
+                  xytext=(6, 42), textcoords='offset points', ha='center', color='firebrick',
+                  arrowprops={'arrowstyle': '-', 'color': 'firebrick', 'linewidth': 0.8})
+    axes.set_ylabel('det(J)  [m³]')
+    warned = time[recorded.outputs.warnings]
+    axes.annotate('singularity\nwarning', (warned[0], det.max()), xytext=(4, 0), va='top',
+                  textcoords='offset points', color='darkgoldenrod')
+    axes.axvspan(warned[0], warned[-1], color='gold', alpha=0.25, linewidth=0)
+
+
+def draw_forces(axes: Any, recorded: Recorded) -> None:
+    """Draw the forces demanded, cut at three times the limit, and the warning."""
+    time = recorded.seconds
+    at, crossing = recorded.crossing
+    limit = recorded.parameters['limits.force_max'][0] / 1e3
+    forces = recorded.outputs.demanded_forces / 1e3
+    for leg, force, color in zip(recorded.parameters['joints'], forces.T, LEG_COLORS, strict=True):
+        # No line from the one branch to the other.
+        axes.plot(np.insert(time, at + 1, crossing), np.insert(force, at + 1, np.nan),
+                  label=leg.replace('_', ' '), linewidth=1.4, color=color)
+    axes.set_ylim(-3.0 * limit, 3.0 * limit)
+    for sign in (-1.0, 1.0):
+        axes.axhline(sign * limit, color='0.35', linestyle='--', linewidth=1.0)
+    axes.annotate('limits.force_max', (0.05, limit), xytext=(0, 4),
+                  textcoords='offset points', color='0.35')
+    axes.set_ylabel('leg force  [kN], + pushes')
+    axes.legend(ncols=3, loc='lower left', frameon=False)
+    warned = time[recorded.outputs.warnings]
+    axes.axvspan(warned[0], warned[-1], color='gold', alpha=0.25, linewidth=0)
+
+
+def draw_platform(axes: Any, recorded: Recorded) -> None:
+    """Draw the platform where it begins and where it ends."""
+    p = recorded.parameters
+    base = p['geometry.base_joints']
+    axes.plot(*np.vstack([base, base[:1]]).T, color='0.35')
+    for n, (name, style) in enumerate((('initial', '-'), ('final', '--'))):
+        row = recorded.motions[-n]
+        joints = row[:3] + p['geometry.platform_joints'] @ row[3:12].reshape(3, 3).T
+        axes.plot(*np.vstack([joints, joints[:1]]).T, color='black', linestyle=style, label=name)
+        for leg, color in enumerate(LEG_COLORS):
+            axes.plot(*np.stack([base[leg], joints[leg]]).T, color=color, linestyle=style,
+                      linewidth=1.2)
+    axes.set_box_aspect((1.0, 1.0, 0.8))
+    axes.set(xlabel='x  [m]', ylabel='y  [m]', zlabel='z  [m]')
+    axes.view_init(elev=22, azim=-62)
+    axes.legend(loc='upper left', frameon=False)
+
+
+def draw_singular(path: Path, recorded: Recorded) -> None:
+    """Draw det(J) above the leg forces."""
     figure, (above, below) = pyplot.subplots(
         2, 1, sharex=True, figsize=(8, 6), height_ratios=(2, 3), layout='constrained')
-    above.plot(time, det, color='black')
-    above.axhline(0.0, color='firebrick', linewidth=0.8)
-    at = int(np.flatnonzero(np.sign(det[:-1]) != np.sign(det[1:]))[0])
-    crossing = time[at] + det[at] / (det[at] - det[at + 1]) * (time[at + 1] - time[at])
-    above.plot(crossing, 0.0, 'o', color='firebrick', markersize=5)
-    above.annotate(f'crosses zero at t = {crossing:.2f} s', (crossing, 0.0),
-                   xytext=(-6, 52), textcoords='offset points', ha='right', color='firebrick',
-                   arrowprops={'arrowstyle': '-', 'color': 'firebrick', 'linewidth': 0.8})
-    above.set_ylabel('det(J)  [m³]')
-    for leg in parameters['joints']:
-        force = np.array([float(row[f'{leg} demanded force (N)']) for row in rows]) / 1e3
-        # No line from the one branch to the other.
-        below.plot(np.insert(time, at + 1, crossing), np.insert(force, at + 1, np.nan),
-                   label=leg.replace('_', ' '), linewidth=1.4)
-    below.set_ylim(-3.0 * limit, 3.0 * limit)
-    for sign in (-1.0, 1.0):
-        below.axhline(sign * limit, color='0.35', linestyle='--', linewidth=1.0)
-    below.annotate('limits.force_max', (0.05, limit), xytext=(0, 4),
-                   textcoords='offset points', color='0.35')
-    below.set_ylabel('leg force  [kN], + pushes')
+    draw_determinant(above, recorded)
+    draw_forces(below, recorded)
     below.set_xlabel('time  [s]')
-    below.legend(ncols=3, loc='lower left', frameon=False)
-    below.set_xlim(time[0], time[-1])
-    for axes in (above, below):
-        axes.axvspan(warned[0], warned[-1], color='gold', alpha=0.25, linewidth=0)
-    above.annotate('singularity warning', (warned[0], det.max()), xytext=(4, -6),
-                   textcoords='offset points', color='darkgoldenrod')
-    # No date and no version in the file: the same numbers give the same bytes.
-    figure.savefig(path, dpi=130, metadata={'Software': None})
+    below.set_xlim(recorded.seconds[0], recorded.seconds[-1])
+    save(figure, path)
+
+
+def draw_figures(path: Path, recorded: Recorded) -> None:
+    """Draw the paper's figures 12 to 18."""
+    figure = pyplot.figure(figsize=(11, 17), layout='constrained')
+    motions, outputs = recorded.motions, recorded.outputs
+    panels = [
+        ('12: position', 'position  [m]', motions[:, 0:3], ('X', 'Y', 'Z')),
+        ('12: orientation', 'angle  [deg]', np.degrees(euler(motions[:, 3:12])),
+         ('alpha', 'beta', 'gamma')),
+        ('13: velocity', 'v  [m/s]', motions[:, 12:15], ('x', 'y', 'z')),
+        ('13: angular velocity', 'ω  [deg/s]', np.degrees(motions[:, 15:18]), ('x', 'y', 'z')),
+        ('14: acceleration', 'a  [m/s²]', motions[:, 18:21], ('x', 'y', 'z')),
+        ('14: angular acceleration', 'dω/dt  [deg/s²]', np.degrees(motions[:, 21:24]),
+         ('x', 'y', 'z')),
+        ('15: leg lengths', 'length  [m]', outputs.lengths,
+         [leg.replace('_', ' ') for leg in recorded.parameters['joints']])]
+    for n, (title, label, values, names) in enumerate(panels, start=1):
+        axes = figure.add_subplot(5, 2, n)
+        for name, column, color in zip(
+                names, values.T, LEG_COLORS if len(names) == 6 else AXIS_COLORS, strict=True):
+            axes.plot(recorded.seconds, column, label=name, color=color)
+        axes.set(title=f'Figure {title}', ylabel=label)
+        axes.legend(ncols=3, frameon=False)
+    axes = figure.add_subplot(5, 2, 8, projection='3d')
+    axes.set_title('Figure 16: initial and final platform')
+    draw_platform(axes, recorded)
+    for n, (title, draw) in enumerate((('17: det(J)', draw_determinant),
+                                       ('18: leg forces', draw_forces)), start=9):
+        axes = figure.add_subplot(5, 2, n)
+        axes.set(title=f'Figure {title}', xlabel='time  [s]')
+        draw(axes, recorded)
+    for axes in figure.axes:
+        if axes.name != '3d':
+            axes.set_xlim(recorded.seconds[0], recorded.seconds[-1])
+    save(figure, path)
+
+
+def euler(rotations: Array) -> Array:
+    """Return alpha, beta, gamma (N, 3) [rad] of R = Rz(gamma) Ry(beta) Rx(alpha), rows of nine."""
+    r = rotations.reshape(-1, 3, 3)
+    return np.stack([np.arctan2(r[:, 2, 1], r[:, 2, 2]), -np.arcsin(r[:, 2, 0]),
+                     np.arctan2(r[:, 1, 0], r[:, 0, 0])], axis=1)
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a picture: no date and no version in it, the same numbers give the same bytes."""
+    figure.savefig(path, dpi=110, metadata={'Software': None})
 
 
 def main() -> None:
-    """Make the picture and the tables."""
-    draw(PICTURE)
+    """Make the pictures and the tables."""
+    recorded = Recorded.of(ROOT / 'bags' / 'singular')
+    pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
+                            'axes.spines.top': False, 'axes.spines.right': False})
+    draw_singular(ROOT / 'docs' / 'singular.png', recorded)
+    draw_figures(ROOT / 'docs' / 'figures.png', recorded)
     README.write_text(readme(README.read_text(encoding='utf-8')), encoding='utf-8')
 
 
