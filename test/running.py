@@ -238,7 +238,7 @@ class Sample(NamedTuple):
 
     def motion(self) -> Motion:
         """Return the motion as the library has it."""
-        length = math.hypot(*self.quaternion)
+        length = math.sqrt(sum(q * q for q in self.quaternion))
         x, y, z, w = (number / length for number in self.quaternion)
         return Motion(self.position, np.reshape(from_quaternion(x, y, z, w), (3, 3)),
                       self.twist[:3], self.twist[3:], self.accel[:3], self.accel[3:])
