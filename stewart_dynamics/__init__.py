@@ -14,6 +14,7 @@
 
 """Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs, for ROS 2."""
 
+from stewart_dynamics.causes import CAUSES, ForceCauses
 from stewart_dynamics.errors import (
     BagError, MotionError, ParameterError, SingularityError, StewartError)
 from stewart_dynamics.motion import Motion
@@ -21,5 +22,5 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import InverseDynamics, StewartPlatform
 
 __all__ = [
-    'BagError', 'InverseDynamics', 'Motion', 'MotionError', 'ParameterError', 'Parameters',
-    'SingularityError', 'StewartError', 'StewartPlatform']
+    'BagError', 'CAUSES', 'ForceCauses', 'InverseDynamics', 'Motion', 'MotionError',
+    'ParameterError', 'Parameters', 'SingularityError', 'StewartError', 'StewartPlatform']

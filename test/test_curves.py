@@ -71,6 +71,7 @@ def test_every_extreme_of_every_bucket_is_drawn_at_its_time(
     for channel, truth in enumerate(values):
         at, drawn = curves.drawn(channel)
         assert np.all(np.diff(at) >= 0.0)
+        assert np.isfinite(drawn).sum() <= np.isfinite(truth).sum()
         points = set(zip(at.tolist(), drawn.tolist(), strict=True))
         there = set(zip(times.tolist(), truth.tolist(), strict=True))
         assert all(point in there for point in points if not math.isnan(point[1]))

@@ -17,11 +17,12 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 import csv
 import json
 import math
 from pathlib import Path
+import re
 import resource
 import shutil
 import signal
@@ -37,6 +38,7 @@ from mcap_ros2.decoder import DecoderFactory
 import messages
 from messages import STORE, UPRIGHT
 import numpy as np
+import pyarrow.parquet
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
@@ -46,6 +48,7 @@ from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
+from stewart_dynamics.causes import CAUSES
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ, replay, Replayed)
@@ -882,3 +885,237 @@ def test_limits_that_are_broken_are_named(
         assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
                      '--output', str(tmp_path / params.stem)]) == 0
         assert said in capsys.readouterr().out
+
+
+# Topics under other names
+
+def named(of: Iterable[Recorded], **names: str) -> list[Recorded]:
+    """Return messages under other topics: of the pose, twist, accel or wrench."""
+    return [(names.get(topic.rpartition('/')[2], f'{NODE}/{topic}'), when, data)
+            for topic, when, data in of]
+
+
+def write_named(folder: Path, of: Iterable[Recorded], **names: str) -> Path:
+    kinds = {name.rpartition('/')[2]: INPUT_TYPES[
+        f'setpoint/{key}' if key != 'wrench' else WRENCH] for key, name in names.items()}
+    kinds |= {topic.rpartition('/')[2]: kind for topic, kind in INPUT_TYPES.items()
+              if topic.rpartition('/')[2] not in kinds}
+    return write_bag(folder, named(of, **names), **kinds)
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / 'legs.csv').open(newline='', encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+def test_remapped_topics_are_found_by_their_type(tmp_path: Path) -> None:
+    bag = write_named(tmp_path / 'bag', motion(20), pose='/cmd/where', twist='/cmd/speed',
+                      accel='/cmd/push')
+    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
+    inputs = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['inputs']
+    assert inputs['topics'] == {POSE: '/cmd/where', TWIST: '/cmd/speed', ACCEL: '/cmd/push'}
+
+
+def test_a_namespace_is_found_by_the_end_of_the_name(tmp_path: Path) -> None:
+    of = named(motion(20), **{key: f'/cell/{NODE}/setpoint/{key}'
+                              for key in ('pose', 'twist', 'accel')})
+    bag = write_bag(tmp_path / 'bag', [*of, ('/elsewhere', RECORDED, messages.pose(0))],
+                    elsewhere=INPUT_TYPES[POSE], pose=INPUT_TYPES[POSE],
+                    twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
+    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
+
+
+def test_what_is_ambiguous_is_listed_and_can_be_chosen(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = named(motion(20), pose='/a/where') + [
+        ('/b/where2', RECORDED, messages.pose(0, (0.0, 0.0, 1.2)))]
+    bag = write_bag(tmp_path / 'bag', of, where=INPUT_TYPES[POSE], where2=INPUT_TYPES[POSE],
+                    twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
+    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert '/a/where, /b/where2: choose one by --pose' in said
+    assert run(bag, tmp_path / 'out', '--pose', '/a/where', '--no-report') == DONE
+    assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
+    capsys.readouterr()
+    for topic, words in (('/none', 'has no topic /none; it holds /a/where (geometry'),
+                         (f'{NODE}/{TWIST}', 'must be a geometry_msgs/msg/PoseStamped')):
+        assert words in refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'x',
+                                '--pose', topic)
+    assert not (tmp_path / 'x').exists()
+
+
+def test_a_wrench_is_never_found_by_its_type(tmp_path: Path) -> None:
+    of = named(motion(5), wrench='/cell/load')
+    of.insert(0, ('/cell/load', RECORDED, messages.wrench(0, (0.0, 0.0, -1000.0, 0, 0, 0))))
+    bag = write_bag(tmp_path / 'bag', of, load=INPUT_TYPES[WRENCH], pose=INPUT_TYPES[POSE],
+                    twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
+    assert run(bag, tmp_path / 'free', '--no-report') == DONE
+    assert run(bag, tmp_path / 'loaded', '--no-report', '--wrench', '/cell/load') == DONE
+    free, loaded = (rows_of(tmp_path / name / 'bag')[0]['leg_1 force (N)'] for name in (
+        'free', 'loaded'))
+    assert float(loaded) > float(free) + 100.0
+
+
+def test_combined_by_its_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_bag(tmp_path / 'bag', [
+        ('/cmd/all', RECORDED + n * MS, messages.combined(n * MS)) for n in range(1, 9)],
+        all=INPUT_TYPES[COMBINED])
+    assert '--combined takes' in refused(
+        capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert run(bag, tmp_path / 'out', '--combined', '/cmd/all', '--no-report') == DONE
+    assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
+
+
+# What else is written
+
+def test_summary_and_report_are_written(tmp_path: Path) -> None:
+    assert run(ROOT / 'bags' / 'flawed', tmp_path) == DONE
+    folder = tmp_path / 'flawed'
+    assert sorted(path.name for path in folder.iterdir()) == [
+        'bag', 'legs.csv', 'report.html', 'summary.json']
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    rows = rows_of(folder)
+    assert summary['version'] == 1
+    assert summary['complete']
+    assert summary['setpoints']['answered'] == len(rows)
+    for leg, found in summary['legs'].items():
+        forces = np.array([float(row[f'{leg} demanded force (N)']) for row in rows])
+        assert abs(found['force_peak_n']) == np.max(np.abs(forces))
+        lengths = [float(row[f'{leg} length (m)']) for row in rows]
+        assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
+    assert set(summary['causes']['leg_1']) == set(CAUSES)
+    assert summary['parameters']['platform.mass'] == 150.0
+
+
+def keys_of(value: Any, prefix: str = '') -> set[str]:
+    """Return the keys of a document, those of legs, causes and axes by one of them."""
+    found: set[str] = set()
+    for key, inner in value.items() if isinstance(value, dict) else ():
+        if prefix not in ('inputs.topics', 'parameters'):
+            found |= {key} | keys_of(inner, f'{prefix}.{key}'.strip('.'))
+    if isinstance(value, list) and value:
+        found |= keys_of(value[0], prefix)
+    return found
+
+
+def test_without_a_report(tmp_path: Path) -> None:
+    assert run(ROOT / 'bags' / 'clear', tmp_path, '--no-report') == DONE
+    assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
+        'bag', 'legs.csv', 'summary.json']
+    assert json.loads((tmp_path / 'clear' / 'summary.json').read_text())['causes'] is None
+
+
+def test_parquet_has_the_columns_and_numbers_of_csv(tmp_path: Path) -> None:
+    assert run(ROOT / 'bags' / 'singular', tmp_path, '--no-report') == DONE
+    assert run(ROOT / 'bags' / 'singular', tmp_path / 'p', '--no-report', '--parquet') == DONE
+    folder = tmp_path / 'p' / 'singular'
+    assert not (folder / 'legs.csv').exists()
+    table = pyarrow.parquet.read_table(folder / 'legs.parquet')
+    rows = rows_of(tmp_path / 'singular')
+    assert table.column_names == list(rows[0])
+    for name in table.column_names:
+        values = table[name].to_pylist()
+        assert values == [(int(row[name]) if 'stamp' in name else float(row[name]))
+                          for row in rows]
+
+
+def test_force_replaces_results_and_nothing_else(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
+    capsys.readouterr()
+    assert '--force replaces results' in refused(
+        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path)
+    (tmp_path / 'clear' / 'of before').touch()
+    assert run(ROOT / 'bags' / 'clear', tmp_path, '--force', '--no-report') == DONE
+    assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
+        'bag', 'legs.csv', 'summary.json']
+    assert [path.name for path in tmp_path.iterdir()] == ['clear']
+    capsys.readouterr()
+    other = tmp_path / 'other' / 'clear'
+    other.mkdir(parents=True)
+    (other / 'thesis.tex').touch()
+    assert 'holds no results of a replay' in refused(
+        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', other.parent, '--force')
+    assert [path.name for path in other.iterdir()] == ['thesis.tex']
+
+
+def test_force_keeps_old_results_where_new_ones_fail(tmp_path: Path) -> None:
+    assert run(write_bag(tmp_path / 'a' / 'bag', motion(5)), tmp_path / 'out') == DONE
+    before = (tmp_path / 'out' / 'bag' / 'legs.csv').read_bytes()
+    broken = tmp_path / 'b' / 'bag.mcap'
+    broken.parent.mkdir()
+    broken.write_bytes(b'no bag')
+    assert run(broken, tmp_path / 'out', '--force') == BAD_INPUT
+    assert (tmp_path / 'out' / 'bag' / 'legs.csv').read_bytes() == before
+
+
+# Bags that have only poses
+
+def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = motion(400)
+    bag = write_bag(tmp_path / 'bag', of[::3])
+    assert '--differentiate makes' in refused(
+        capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5', '--no-report') == DONE
+    printed = capsys.readouterr().out
+    assert 'smoothing splines through the poses, cut-off frequency 5 Hz' in printed
+    assert run(write_bag(tmp_path / 'whole', of), tmp_path / 'out', '--no-report') == DONE
+    made, whole = (rows_of(tmp_path / 'out' / name) for name in ('bag', 'whole'))
+    assert [row['stamp (ns)'] for row in made] == [row['stamp (ns)'] for row in whole]
+    # away from the ends as the twist and acceleration that were recorded
+    for one, other in zip(made[50:-50], whole[50:-50], strict=True):
+        assert float(one['leg_1 rate (m/s)']) == pytest.approx(
+            float(other['leg_1 rate (m/s)']), abs=2e-5)
+        assert float(one['leg_1 force (N)']) == pytest.approx(
+            float(other['leg_1 force (N)']), abs=0.5)
+    summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
+    assert summary['inputs']['differentiated_cutoff_hz'] == 5.0
+    with AnyReader([tmp_path / 'out' / 'bag' / 'bag']) as reader:
+        times = [when for connection, when, _ in reader.messages()
+                 if connection.topic.endswith('leg_states')]
+    assert times == [when for _, when, _ in of[::3]]
+
+
+# Compared with what was measured
+
+def joint_state(stamp: int, names: Sequence[str], efforts: Sequence[float]) -> bytes:
+    kinds = STORE.types
+    header = kinds['std_msgs/msg/Header'](
+        kinds['builtin_interfaces/msg/Time'](*divmod(stamp, SECOND)), '')
+    empty = np.empty(0)
+    return bytes(STORE.serialize_cdr(
+        kinds['sensor_msgs/msg/JointState'](header, list(names), empty, empty,
+                                            np.array(efforts)), 'sensor_msgs/msg/JointState'))
+
+
+def test_measured_forces_tell_what_touched_the_platform(tmp_path: Path) -> None:
+    load = np.array([30.0, -10.0, -200.0, 5.0, 8.0, -4.0])
+    of = motion(200)
+    heave = Motion(
+        [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 201)], np.eye(3),
+        [(0.0, 0.0, 0.05 * math.cos(0.01 * n)) for n in range(1, 201)], None,
+        [(0.0, 0.0, -0.05 * math.sin(0.01 * n)) for n in range(1, 201)])
+    touched = np.where((np.arange(200) >= 100)[:, None], load, np.zeros(6))
+    forces = PLATFORM.inverse_dynamics(heave, touched).forces
+    names = list(PARAMETERS['joints'])[::-1]
+    for n in range(200):
+        stamp = (n + 1) * 10 * MS
+        of.append(('/machine/state', RECORDED + stamp + 3, joint_state(
+            stamp, ['other', *names], [0.0, *forces[n][::-1]])))
+    of.sort(key=lambda each: each[1])
+    bag = write_bag(tmp_path / 'bag', of, state='sensor_msgs/msg/JointState')
+    assert run(bag, tmp_path / 'out', '--measured', '/machine/state') == DONE
+    found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
+    assert found['setpoints_compared'] == 200
+    # half of the time it was there: the peaks of the residual are its negative
+    for axis, value in zip(('x', 'y', 'z'), load, strict=False):
+        peak = found['wrench'][f'force_{axis}']
+        assert peak['peak_n'] == pytest.approx(-value, rel=1e-9)
+        assert peak['peak_at_s'] >= 0.99
+    documented = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
+    summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
+    names = set(PARAMETERS['joints'])
+    for key in keys_of(summary) - names - {f'{kind}_{axis}' for kind in ('force', 'moment')
+                                           for axis in 'xyz'}:
+        assert re.search(rf'[`.]{key}\b', documented), key

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator
+import functools
 from html.parser import HTMLParser
 import json
 from pathlib import Path
@@ -53,7 +54,7 @@ FLAGS = ('--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
          '--disable-background-networking', '--disable-component-update', '--disable-sync',
          '--use-angle=swiftshader', '--enable-unsafe-swiftshader')
 PATIENCE = 60.0  # [s]
-HOSTILE = ('</script><script>window.hacked=1</script>', '<img src=x onerror=window.hacked=1>',
+HOSTILE = ('</script ><script >window.hacked=1</script >', '<img src=x onerror=window.hacked=1>',
            '"><b>bold</b>', "';window.hacked=1;'", '${window.hacked=1}<br>', '<!--=data-->')
 
 
@@ -125,11 +126,29 @@ class _Elements(HTMLParser):
         self.text += '' if self._hidden else f'{data} '
 
 
+def write_measured(given: Given, path: Path) -> None:
+    """Write the report of a motion whose measured forces differ, and for a while by far."""
+    report, comparison = given.report(measured=True), Comparison(PARAMETERS)
+    forces = given.outputs.demanded_forces
+    measured = forces + np.random.default_rng(1).normal(size=forces.shape)
+    measured[200:260] += 300.0
+    for compared in (
+            comparison.add_measured(given.setpoints.stamps, measured),
+            comparison.add_setpoints(given.seconds, given.setpoints, given.outputs),
+            comparison.finish()):
+        report.add_measured(*compared)
+    report.write(path, given.summary(measured=comparison.values()))
+
+
+def data_text(path: Path) -> str:
+    """Return what the report gives its script, as it stands in the file."""
+    page = path.read_text(encoding='utf-8')
+    return page.split('<script id="data" type="application/json">')[1].split('</script>')[0]
+
+
 def data_of(path: Path) -> Any:
     """Return what the report gives its script."""
-    page = path.read_text(encoding='utf-8')
-    return json.loads(page.split('<script id="data" type="application/json">')[1].split(
-        '</script>')[0])
+    return json.loads(data_text(path))
 
 
 def curve_of(data: Any, plot: str, number: int, variant: int = 0) -> tuple[Array, Array]:
@@ -221,6 +240,7 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
     assert hostile.names.count('script') == 3
     for name in HOSTILE:
         assert name in hostile.text
+    assert not set('<>&') & set(data_text(paths[0]))
     assert data_of(paths[0])['legs'] == list(HOSTILE)
 
 
@@ -234,6 +254,22 @@ def test_what_is_wrong_with_a_bag_is_told(tmp_path: Path) -> None:
                  'Limits are broken', 'limits.force_max', 'A singularity is met',
                  'crosses zero once', 'the bag has no checksums', 'reflected_mass'):
         assert told in text, told
+
+
+def test_measured_forces_and_touches_are_told_and_drawn(tmp_path: Path) -> None:
+    given = trajectory('clear')
+    write_measured(given, tmp_path / 'report.html')
+    data = data_of(tmp_path / 'report.html')
+    at, residual = curve_of(data, 'residuals', 3)
+    assert np.array_equal(at, given.seconds)
+    assert residual[:200].mean() == pytest.approx(0.0, abs=0.5)
+    assert residual[200:260].mean() == pytest.approx(300.0, abs=1.0)
+    (begun, ended), = data['touches']
+    assert begun == pytest.approx(2.0, abs=0.1)
+    assert ended == pytest.approx(2.6, abs=0.1)
+    text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
+    assert 'Measured against computed' in text
+    assert 'Touched, most in' in text
 
 
 def test_plotly_that_is_missing_is_told_in_one_line(tmp_path: Path) -> None:
@@ -332,16 +368,7 @@ def test_everything_is_drawn_without_an_error_or_the_network(
         opened: Callable[..., Opened]) -> None:
     given = trajectory('singular')
 
-    def write(path: Path) -> None:
-        report, comparison = given.report(measured=True), Comparison(PARAMETERS)
-        touched = given.outputs.demanded_forces + np.random.default_rng(1).normal(
-            size=given.outputs.demanded_forces.shape)
-        touched[200:260] += 300.0
-        comparison.add_measured(given.setpoints.stamps, touched)
-        comparison.add_setpoints(given.seconds, given.setpoints, given.outputs)
-        report.add_measured(*comparison.finish())
-        report.write(path, given.summary(measured=comparison.values()))
-    report = opened(given, write)
+    report = opened(given, functools.partial(write_measured, given))
     report.see_everything()
     drawn = report.page.evaluate('[...byCanvas.keys()].map(canvas => canvas.id)')
     assert len(drawn) == 19

@@ -271,11 +271,11 @@ class _Bar:
         self._setpoints = [0] * len(sizes)
         self._ended = 0
         self._lock = threading.Lock()  # Dask tells how far it is from a thread of its own
+        self._begun = time.monotonic()
         self._line = tqdm(
-            total=sum(sizes), disable=None if show is None else not show, file=sys.stderr,
-            dynamic_ncols=True, smoothing=0.1,
+            desc=self._words(), total=sum(sizes), disable=None if show is None else not show,
+            file=sys.stderr, dynamic_ncols=True, smoothing=0.1,
             bar_format='{percentage:3.0f}%|{bar}| {desc}, {remaining} left')
-        self._show(0)
 
     def at(self, number: int, read: int, setpoints: int) -> None:
         """Take it that so many bytes and setpoints of a bag are done."""
@@ -284,21 +284,20 @@ class _Bar:
             read = min(read, self._sizes[number])
             more = read - self._read[number]
             self._read[number], self._setpoints[number] = read, setpoints
-            self._show(more)
+            self._line.set_description_str(self._words(), refresh=False)
+            self._line.update(more)
 
     def end(self, number: int, ended: Ended) -> None:
         """Take it that a bag has ended."""
         self._ended += 1
         self.at(number, self._sizes[number], int(ended.row.get('setpoints') or 0))
 
-    def _show(self, more: int) -> None:
+    def _words(self) -> str:
         setpoints = sum(self._setpoints)
-        passed = self._line.format_dict['elapsed']
+        passed = time.monotonic() - self._begun
         rate = _short(setpoints / passed) if setpoints and passed else '?'
-        self._line.set_description_str(
-            f'{self._ended}/{len(self._sizes)} bags, {_short(setpoints)} setpoints, {rate}/s',
-            refresh=False)
-        self._line.update(more)
+        return (f'{self._ended}/{len(self._sizes)} bags, {_short(setpoints)} setpoints, '
+                f'{rate}/s')
 
     def close(self) -> None:
         """End the line."""

@@ -67,25 +67,17 @@ touches
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-import struct
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from stewart_dynamics import lagrange
-from stewart_dynamics.cdr import MalformedError
-from stewart_dynamics.errors import BagError
 from stewart_dynamics.inverse_dynamics import COULOMB_RATE
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.setpoints import MALFORMED, NOT_FINITE
 from stewart_dynamics.step import Batch, Outputs
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 
 # What waits for the other side at most, setpoints and measured samples.
@@ -94,20 +86,6 @@ _SAMPLES_WAITING = 2 ** 18
 
 AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
 _UNITS = ('n',) * 3 + ('n_m',) * 3
-
-# Why a message is refused, beside being malformed or not finite.
-LACKING = 'lacks one of the joints'
-WITHOUT_EFFORT = 'without effort'
-UNEVEN = 'not as many efforts as names'
-
-_SECOND = 1_000_000_000
-_ORDERS = {0: '>', 1: '<'}
-_AFTER_STAMP = 12
-# Layouts that are known at once; messages of others are read one by one.
-_MOST_LAYOUTS = 8
-# Messages that are read at once, and those that may lack a joint before it is a mistake.
-_AT_ONCE = 4096
-_PATIENCE = 1000
 
 # Columns of what is kept of a setpoint.
 _SECONDS, _POSITION, _ROTATION, _ACCELERATION, _RATES, _FORCES = (
@@ -227,22 +205,27 @@ class Comparison:
         return compared
 
     def _gather(self, compared: Compared, rows: Array) -> None:
-        seconds, measured, computed, wrench = compared
+        seconds, wrench = compared.seconds, compared.wrench
+        self._bins.add(seconds, wrench)
+        # legs and axes first: sums along what lies side by side are many times as fast
+        measured, computed, rates, loads, accelerations = map(np.ascontiguousarray, (
+            compared.measured.T, compared.computed.T, rows[:, _RATES].T, wrench.T,
+            rows[:, _ACCELERATION].T))
         residual = measured - computed
         self._legs.add(seconds, residual)
-        self._wrench.add(seconds, wrench)
-        self._bins.add(seconds, wrench)
-        self._measured_squares += np.sum(measured ** 2, axis=0)
-        self._computed += [np.sum(computed, axis=0), np.sum(computed ** 2, axis=0),
-                           np.sum(computed * measured, axis=0)]
+        self._wrench.add(seconds, loads)
+        self._measured_squares += np.sum(measured ** 2, axis=1)
+        self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
+                           np.sum(computed * measured, axis=1)]
         # as the dynamics have friction: offset, Coulomb's, viscous
-        rates = rows[:, _RATES].T
-        terms = np.stack([np.ones_like(rates), np.clip(rates / COULOMB_RATE, -1.0, 1.0), rates], 1)
-        self._fit += terms @ np.swapaxes(terms, 1, 2)
-        self._fitted += (terms @ residual.T[:, :, None])[:, :, 0]
-        drive = rows[:, _ACCELERATION] - self._parameters['gravity']
-        force = wrench[:, :3]
-        self._mass += [np.vdot(drive, drive), np.vdot(drive, force), np.vdot(force, force)]
+        terms = np.ones_like(rates), np.clip(rates / COULOMB_RATE, -1.0, 1.0), rates
+        for row, one in enumerate(terms):
+            self._fitted[:, row] += np.sum(one * residual, axis=1)
+            for column, other in enumerate(terms):
+                self._fit[:, row, column] += np.sum(one * other, axis=1)
+        drive, force = accelerations - self._parameters['gravity'][:, None], loads[:3]
+        # not vdot: threads of BLAS that wait for a busy processor cost far more than the sums
+        self._mass += [np.sum(drive ** 2), np.sum(drive * force), np.sum(force ** 2)]
 
     def values(self) -> dict[str, Any]:
         """Return what the module says, for summary.json."""
@@ -323,13 +306,14 @@ class Comparison:
 
 
 def _wrench(parameters: Parameters, position: Array, rotation: Array, forces: Array) -> Array:
-    """Return J_inv^T forces (N, 6)."""
-    at = lagrange.legs(parameters, position, rotation)
-    pushes = at.directions * forces[..., None]
-    x, y, z = np.moveaxis(pushes, -1, 0)
-    ax, ay, az = np.moveaxis(at.arms, -1, 0)
-    moments = ay * z - az * y, az * x - ax * z, ax * y - ay * x
-    return np.stack([each.sum(axis=-1) for each in (x, y, z, *moments)], axis=-1)
+    """Return J_inv^T forces (N, 6), without J_inv: sums of s_i f_i and of a_i x s_i f_i."""
+    # axis, leg, sample
+    arms = parameters['geometry.platform_joints'] @ np.moveaxis(rotation, 0, -1)
+    legs = arms + position.T[:, None, :] - parameters['geometry.base_joints'].T[:, :, None]
+    pushes = legs * (forces.T / np.sqrt(np.sum(legs ** 2, axis=0)))
+    (ax, ay, az), (x, y, z) = arms, pushes
+    parts = x, y, z, ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    return np.stack([np.sum(part, axis=0) for part in parts], axis=1)
 
 
 def _interpolated(stamps: Stamps, at: Stamps, values: Array, gap: int) -> Array:
@@ -477,35 +461,37 @@ def _rows(chunks: list[_Rows]) -> _Rows:
 
 
 class _Statistics:
-    """Sums, squares and peaks of columns."""
+    """Sums, squares and peaks of quantities."""
 
-    def __init__(self, columns: int) -> None:
+    def __init__(self, quantities: int) -> None:
         self.count = 0
-        self.sums = np.zeros(columns)
-        self.squares = np.zeros(columns)
-        self._peaks = np.zeros(columns)
-        self._peaks_at = np.zeros(columns)
+        self.sums = np.zeros(quantities)
+        self.squares = np.zeros(quantities)
+        self._peaks = np.zeros(quantities)
+        self._peaks_at = np.zeros(quantities)
 
     def add(self, seconds: Array, values: Array) -> None:
-        self.count += len(values)
-        self.sums += np.sum(values, axis=0)
-        self.squares += np.sum(values ** 2, axis=0)
-        at = np.argmax(np.abs(values), axis=0)
-        columns = np.arange(values.shape[1])
-        larger = (np.abs(values[at, columns]) > np.abs(self._peaks)) | (self.count == len(values))
-        self._peaks[larger] = values[at, columns][larger]
+        """Take values (quantities, N) at times (N,)."""
+        first = not self.count
+        self.count += len(seconds)
+        self.sums += np.sum(values, axis=1)
+        self.squares += np.sum(values ** 2, axis=1)
+        at = np.argmax(np.abs(values), axis=1)
+        peaks = values[np.arange(len(values)), at]
+        larger = (np.abs(peaks) > np.abs(self._peaks)) | first
+        self._peaks[larger] = peaks[larger]
         self._peaks_at[larger] = seconds[at][larger]
 
-    def named(self, column: int, prefix: str, unit: str) -> dict[str, float | None]:
+    def named(self, number: int, prefix: str, unit: str) -> dict[str, float | None]:
         """Return RMS, mean and peak under names with units; null where there was nothing."""
         names = [f'{prefix}rms_{unit}', f'{prefix}mean_{unit}', f'{prefix}peak_{unit}',
                  f'{prefix}peak_at_s']
         if not self.count:
             return dict.fromkeys(names)
         return dict(zip(names, [
-            float(np.sqrt(self.squares[column] / self.count)),
-            float(self.sums[column] / self.count),
-            float(self._peaks[column]), float(self._peaks_at[column])], strict=True))
+            float(np.sqrt(self.squares[number] / self.count)),
+            float(self.sums[number] / self.count),
+            float(self._peaks[number]), float(self._peaks_at[number])], strict=True))
 
 
 class _Touch(NamedTuple):
@@ -590,219 +576,3 @@ class _Bins:
                 float(begins[part[0]]), float(ends[part[-1]]), axis, float(times[axis]),
                 tuple((-peaks).tolist())))
         return touches
-
-
-class _Layout(NamedTuple):
-    """What messages with the same names and counts have in common."""
-
-    template: Bytes
-    fixed: Bytes
-    """255 where a message's bytes are those of the template, 0 at stamp, numbers and gaps."""
-    order: str
-    """Of bytes, as NumPy has it."""
-    reason: str
-    """Why such messages are refused; empty where they are not."""
-    efforts: slice
-    """The bytes of all efforts."""
-    joints: list[int]
-    """Which of the efforts are those wanted."""
-    names: list[str]
-
-    @classmethod
-    def of(cls, data: bytes, joints: Sequence[str]) -> _Layout:
-        """Return the layout of a message, read field by field; MalformedError if it is none."""
-        if len(data) < _AFTER_STAMP or data[0] != 0 or data[1] not in _ORDERS:
-            raise MalformedError(f'{len(data)} bytes: not plain CDR with a header')
-        fields = _Fields(data, _ORDERS[data[1]])
-        fields.text()  # frame_id
-        names = [fields.text().decode(errors='replace') for _ in range(fields.count())]
-        fields.doubles()  # position
-        fields.doubles()  # velocity
-        efforts = fields.doubles()
-        number = (efforts.stop - efforts.start) // 8
-        reason = ''
-        if not set(joints) <= set(names):
-            reason = LACKING
-        elif number != len(names):
-            reason = UNEVEN if number else WITHOUT_EFFORT
-        wanted = [] if reason else [names.index(joint) for joint in joints]
-        return cls(np.frombuffer(data, dtype=np.uint8), fields.fixed, fields.order, reason,
-                   efforts, wanted, names)
-
-    def messages(self, whole: Bytes, begins: Stamps) -> Bytes:
-        """Return messages, (N, size), by where they begin."""
-        messages: Bytes = np.lib.stride_tricks.sliding_window_view(
-            whole, len(self.template))[begins]
-        return messages
-
-    def fits(self, messages: Bytes) -> Flags:
-        """Return which of them have this layout."""
-        off: Bytes = (messages ^ self.template) & self.fixed
-        return np.asarray(~off.any(axis=1))
-
-    def stamps(self, messages: Bytes) -> tuple[Flags, Stamps]:
-        """Return which stamps are sound, and the stamps, (N,) [ns]."""
-        seconds = messages[:, 4:8].copy().view(f'{self.order}i4')[:, 0].astype(np.int64)
-        nanoseconds = messages[:, 8:12].copy().view(f'{self.order}u4')[:, 0].astype(np.int64)
-        return nanoseconds < _SECOND, seconds * _SECOND + nanoseconds
-
-    def values(self, messages: Bytes) -> Array:
-        """Return the efforts wanted (N, 6)."""
-        numbers = messages[:, self.efforts].copy().view(f'{self.order}f8')
-        values: Array = numbers[:, self.joints].astype(float)
-        return values
-
-
-class _Fields:
-    """A message's fields one after the other, and which of its bytes they fix."""
-
-    def __init__(self, data: bytes, order: str) -> None:
-        self.order = order
-        self.fixed = np.zeros(len(data), dtype=np.uint8)
-        self.fixed[:2] = 255
-        self._data = data
-        self._at = _AFTER_STAMP
-
-    def count(self) -> int:
-        """Read the length of a sequence."""
-        begin = self._at + 3 & ~3
-        self._at = self._fix(begin, 4)
-        return int(struct.unpack_from(f'{self.order}I', self._data, begin)[0])
-
-    def text(self) -> bytes:
-        """Read a string."""
-        size = self.count()
-        begin, self._at = self._at, self._fix(self._at, size)
-        if size and self._data[self._at - 1] != 0:
-            raise MalformedError('a string does not end in a zero byte')
-        return self._data[begin:self._at][:-1]
-
-    def doubles(self) -> slice:
-        """Return where the numbers of a sequence are."""
-        number = self.count()
-        # the first of them is aligned, counted from the end of the encapsulation
-        begin = (self._at + 3 & ~7) + 4 if number else self._at
-        if begin + 8 * number > len(self._data):
-            raise MalformedError(f'{len(self._data)} bytes: too few for {number} numbers')
-        self._at = begin + 8 * number
-        return slice(begin, self._at)
-
-    def _fix(self, begin: int, size: int) -> int:
-        end = begin + size
-        if end > len(self._data):
-            raise MalformedError(f'{len(self._data)} bytes: must be at least {end}')
-        self.fixed[begin:end] = 255
-        return end
-
-
-class _Read(NamedTuple):
-    """What was read of messages, and why others were refused."""
-
-    stamps: Stamps
-    efforts: Array
-    taken: Flags
-    refused: Counter[str]
-
-    def take(self, layout: _Layout, whole: Bytes, begins: Stamps, lengths: Stamps,
-             which: Stamps) -> Stamps:
-        """Read those of the messages that have the layout, and return which have not."""
-        of_size = lengths[which] == len(layout.template)
-        others = [which[~of_size]]
-        same = which[of_size]
-        for begin in range(0, len(same), _AT_ONCE):
-            part = same[begin:begin + _AT_ONCE]
-            messages = layout.messages(whole, begins[part])
-            fits = layout.fits(messages)
-            if not fits.all():
-                others.append(part[~fits])
-                part, messages = part[fits], messages[fits]
-            if layout.reason:
-                self.refused[layout.reason] += len(part)
-                continue
-            sound, stamps = layout.stamps(messages)
-            values = layout.values(messages)
-            finite = np.isfinite(values).all(axis=1)
-            self.refused[MALFORMED] += int(np.count_nonzero(~sound))
-            self.refused[NOT_FINITE] += int(np.count_nonzero(sound & ~finite))
-            self.stamps[part], self.efforts[part], self.taken[part] = (
-                stamps, values, sound & finite)
-        return np.sort(np.concatenate(others))
-
-
-class Efforts:
-    """
-    Reads the efforts of a machine's joints from sensor_msgs/JointState as bytes.
-
-    Nearly all messages of a topic have one layout: the same names, the same counts. One is read
-    field by field, and those whose bytes are the same but for stamp and numbers are read at once.
-
-    Parameters
-    ----------
-    joints : sequence of str
-        Names of the six joints in the order wanted. A message may hold others besides, in any
-        order.
-
-    """
-
-    def __init__(self, joints: Sequence[str]) -> None:
-        self._joints = list(joints)
-        self._layouts: list[_Layout] = []
-        self._found = False
-        self._lacked = 0
-        self._lacking: list[str] = []
-
-    def read(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike,
-             ) -> tuple[Stamps, Array, dict[str, int]]:
-        """
-        Return stamps (K,) [ns], efforts (K, 6) [N], and of other messages how many, by reason.
-
-        Parameters
-        ----------
-        data : bytes or array of them
-            It holds all messages.
-        starts, sizes : (M,)
-            Where each begins, and its length in bytes.
-
-        Messages that lack a joint may be another publisher's, and are refused. Raises BagError
-        where a thousand did and none had them all.
-
-        """
-        whole = np.frombuffer(data, dtype=np.uint8)
-        begins, lengths = np.asarray(starts, dtype=np.int64), np.asarray(sizes, dtype=np.int64)
-        read = _Read(np.zeros(len(begins), dtype=np.int64),
-                     np.zeros((len(begins), len(self._joints))),
-                     np.zeros(len(begins), dtype=bool), Counter())
-        left: Stamps = np.arange(len(begins))
-        for layout in self._layouts:
-            left = read.take(layout, whole, begins, lengths, left)
-        while len(left):
-            begin, length = int(begins[left[0]]), int(lengths[left[0]])
-            try:
-                layout = _Layout.of(whole[begin:begin + length].tobytes(), self._joints)
-            except MalformedError:
-                read.refused[MALFORMED] += 1
-                left = left[1:]
-                continue
-            if layout.reason != LACKING:
-                self._found = True
-            else:
-                self._lacking = self._lacking or layout.names
-            if len(self._layouts) < _MOST_LAYOUTS:
-                self._layouts.append(layout)
-                left = read.take(layout, whole, begins, lengths, left)
-            else:
-                read.take(layout, whole, begins, lengths, left[:1])
-                left = left[1:]
-        self._lacked += read.refused[LACKING]
-        if self._lacked >= _PATIENCE:
-            self.check()
-        return read.stamps[read.taken], read.efforts[read.taken], dict(+read.refused)
-
-    def check(self) -> None:
-        """Raise BagError where messages lacked a joint, and none had them all."""
-        if self._lacked and not self._found:
-            missing = [joint for joint in self._joints if joint not in self._lacking]
-            raise BagError(
-                f'measured joint states: no message has {", ".join(missing)}; there are '
-                f'{", ".join(self._lacking) or "none"}: the names must be those of the '
-                'parameter joints')

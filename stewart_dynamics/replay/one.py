@@ -41,16 +41,14 @@ from stewart_dynamics.causes import ForceCauses
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.differentiate import Differentiator
-try:
-    from stewart_dynamics.replay.measured import Comparison, Efforts
-except ImportError:
-    pass
+from stewart_dynamics.replay.efforts import Efforts
+from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Table
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.setpoints import Messages, Setpoints
 from stewart_dynamics.singularity import Singularity
-from stewart_dynamics.step import Batch, Outputs, Stamps, Step
+from stewart_dynamics.step import Batch, Stamps, Step
 from stewart_dynamics.summary import Summary
 
 DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
@@ -106,7 +104,7 @@ class Replayed(NamedTuple):
 
 
 def replay(
-        bag: Path, parameters: Parameters, folder: Path, options: Options = Options(),  # noqa: B008
+        bag: Path, parameters: Parameters, folder: Path, options: Options | None = None,
         progress: Progress | None = None) -> Replayed:
     """
     Compute a bag's outputs into a folder: a bag, a table, a summary and a report.
@@ -119,7 +117,7 @@ def replay(
         The machine's.
     folder : Path
         It appears when all is written; it must not exist, unless ``options.force``.
-    options : Options
+    options : Options, optional
         Topics and what is written.
     progress : callable, optional
         Told of the bytes read and the setpoints answered since the last call.
@@ -128,6 +126,7 @@ def replay(
     Raises StewartError: a library that is needed for an option is missing.
 
     """
+    options = options or Options()
     _check_free(folder, options)
     source = ('pose' if options.cutoff is not None
               else 'combined' if 'combined' in options.topics else None)
@@ -167,10 +166,11 @@ class _Run:
         self._stamp: int | None = None
         self._elapsed = 0
         self._summary = Summary(parameters)
+        # Poses farther apart than a period of the cut-off frequency say nothing of it.
         self._differentiator = None if options.cutoff is None else Differentiator(
-            options.cutoff, parameters['setpoint.timeout'])
+            options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
         self._comparison = None if options.measured is None else Comparison(parameters)
-        self._efforts = None if options.measured is None else Efforts(parameters['joints'])
+        self._efforts = Efforts(parameters['joints'])
         self.report: Report | None = None
         self._causes = None
         if options.report:
@@ -205,6 +205,7 @@ class _Run:
             for notice in self._differentiator.notices():
                 self._notice(notice)
         if self._comparison is not None:
+            self._efforts.check()
             self._compared(self._comparison.finish())
         self._table.close()
         self._bag.close()

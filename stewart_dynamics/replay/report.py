@@ -240,6 +240,8 @@ class Report:
             'frames': {'times': _base64(times, '<f8'), 'numbers': _base64(frames, '<f8')},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
+            'allWarnings': singularity['warnings'],
+            'allCrossings': singularity['crossings'],
             'touches': [[each['from_s'], each['to_s']] for each in (
                 summary['measured']['touches']['strongest'] if summary['measured'] else ())],
             'curves': curves,

@@ -126,8 +126,11 @@ class Tables:
         if points['restarts']:
             text.append(_count(points['restarts'], 'restart'))
         text += [f'not read: {escape(each)}' for each in s['missing']]
-        state = _GOOD if s['complete'] else _BAD
-        title = 'The whole bag was read' if s['complete'] else 'Only a part could be read'
+        state, title = _GOOD, 'The whole bag was read'
+        if refused:
+            state, title = _WARN, 'Some messages were refused'
+        if not s['complete']:
+            state, title = _BAD, 'Only a part could be read'
         if not points['answered']:
             state, title = _BAD, 'No setpoint could be answered'
         return state, title, '<br>'.join(text)
@@ -285,18 +288,21 @@ class Tables:
               _number(leg['offset_n'], 2), _number(leg['coulomb_friction_n'], 2),
               _number(leg['viscous_friction_n_s_m'], 2), _number(leg['friction_share'], 3)]
              for n, (name, leg) in enumerate(m['legs'].items())])
-        axes = [[axis.replace('_', ' ').capitalize(), '[N m]' if unit == 'n_m' else '[N]', _number(values[f'rms_{unit}'], 2),
-                 _number(values[f'mean_{unit}'], 2), _number(values[f'peak_{unit}'], 2),
-                 _at(values['peak_at_s'])] for axis, values in m['wrench'].items()
-                for unit in ('n_m' if axis.startswith('moment') else 'n',)]
-        wrench = _table(['Residual on the platform', '', 'RMS', 'mean', 'peak', 'at [s]'], axes)
+        axes = []
+        for axis, values in m['wrench'].items():
+            unit, name = (('n_m', 'N m') if axis.startswith('moment') else ('n', 'N'))
+            axes.append([
+                f'{axis.replace("_", " ").capitalize()} [{name}]',
+                *(_number(values[f'{each}_{unit}'], 2) for each in ('rms', 'mean', 'peak')),
+                _at(values['peak_at_s'])])
+        wrench = _table(['Residual on the platform', 'RMS', 'mean', 'peak', 'at [s]'], axes)
         mass = m['mass']
         if mass['unmodelled_kg'] is not None:
             wrench += (f'<p>A mass of <b>{_digits(mass["unmodelled_kg"])} kg</b> more on the '
                        f'platform would explain {_number(mass["share"], 3)} of the force.</p>')
+        below = f'<div>{wrench}</div>{_touches(m["touches"])}'
         return _section('comparison', 'Measured against computed',
-                        f'{legs}<div class="row"><div>{wrench}</div>{_touches(m["touches"])}</div>',
-                        note)
+                        f'{legs}<div class="row">{below}</div>', note)
 
     def _singularity(self) -> str:
         s, p = self._summary['singularity'], self._parameters
@@ -389,10 +395,12 @@ def _touches(touches: Mapping[str, Any]) -> str:
     rows = [[escape(each['axis'].replace('_', ' ')), _at(each['from_s']), _at(each['to_s']),
              ', '.join(_number(f, 1) for f in each['force_n']),
              ', '.join(_number(f, 1) for f in each['moment_n_m'])] for each in shown]
-    table = _table(['What touched it: most in', 'from [s]', 'to [s]', 'force x, y, z [N]',
-                    'moment x, y, z [N m]'], rows)
+    table = _table(['Touched, most in', 'from [s]', 'to [s]', 'by a force x, y, z [N]',
+                    'by a moment x, y, z [N m]'], rows)
     more = touches['count'] - len(shown)
-    return f'<div>{table}{f"<p>… {more:,} more</p>" if more else ""}</div>'
+    told = f'<p>… {more:,} more</p>' if more else ''
+    return (f'<div>{table}{told}<p class="note">What the surroundings put on the platform, at its '
+            'origin, base axes: the opposite of the residual.</p></div>')
 
 
 def parameter_table(values: Mapping[str, Any]) -> str:
@@ -403,8 +411,9 @@ def parameter_table(values: Mapping[str, Any]) -> str:
         shown = '<br>'.join(_plain(value[n:n + 3]) for n in range(0, 18, 3)) if is_points else (
             _plain(value))
         unit = PARAMETERS[name].unit if name in PARAMETERS else ''
+        unit = unit.replace('^2', '²')
         rows.append([f'<code>{escape(name)}</code>', shown, escape(unit)])
-    return _table(['Parameter', 'value', 'unit'], rows, 'wide')
+    return _table(['Parameter', 'value', 'unit'], rows, 'wide units')
 
 
 def _plain(value: Any) -> str:

@@ -1,0 +1,195 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Efforts in recorded JointState messages: any layout, any order of names, spoiled bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from messages import STORE
+import numpy as np
+import pytest
+from referees import rng
+
+from stewart_dynamics.errors import BagError
+from stewart_dynamics.replay.efforts import Efforts
+
+SECOND = 1_000_000_000
+JOINTS = [f'leg_{n}' for n in range(1, 7)]
+
+
+def joint_state(stamp: int, names: Sequence[str], effort: Sequence[float], frame: str = '',
+                positions: int = 0, velocities: int = 0, little_endian: bool = True) -> bytes:
+    """Return a JointState, serialized by rosbags."""
+    sec, nanosec = divmod(stamp, SECOND)
+    kind = 'sensor_msgs/msg/JointState'
+    header = STORE.types['std_msgs/msg/Header'](
+        STORE.types['builtin_interfaces/msg/Time'](sec, nanosec), frame)
+    message = STORE.types[kind](
+        header, list(names), np.arange(float(positions)), np.arange(float(velocities)),
+        np.array(effort, dtype=float))
+    return bytes(STORE.serialize_cdr(message, kind, little_endian=little_endian))
+
+
+def joined(messages: Sequence[bytes]) -> tuple[bytes, list[int], list[int]]:
+    """Return messages in one buffer, with bytes between them that are of no message."""
+    data, starts = b'', []
+    for number, message in enumerate(messages):
+        data += bytes(number % 3 + 1)
+        starts.append(len(data))
+        data += message
+    return data, starts, [len(message) for message in messages]
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(st.data())
+def test_efforts_are_what_rosbags_wrote(data: st.DataObject) -> None:
+    text = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=12)
+    numbers = st.floats(-1e9, 1e9)
+    more = data.draw(st.lists(text.filter(lambda name: name not in JOINTS), max_size=4))
+    messages, expected = [], []
+    for _ in range(data.draw(st.integers(1, 4))):
+        # a layout, and a few messages of it
+        names = data.draw(st.permutations([*JOINTS, *more]))
+        frame, little = data.draw(text), data.draw(st.booleans())
+        counts = data.draw(st.sampled_from([(0, 0), (len(names), 0), (len(names), len(names))]))
+        for _ in range(data.draw(st.integers(1, 4))):
+            stamp = data.draw(st.integers(-2 ** 31 * SECOND, 2 ** 31 * SECOND - 1))
+            effort = data.draw(st.lists(numbers, min_size=len(names), max_size=len(names)))
+            messages.append(joint_state(stamp, names, effort, frame, *counts, little))
+            expected.append((stamp, [effort[names.index(joint)] for joint in JOINTS]))
+    stamps, efforts, refused = Efforts(JOINTS).read(*joined(messages))
+    assert stamps.tolist() == [stamp for stamp, _ in expected]
+    assert efforts.tolist() == [effort for _, effort in expected]
+    assert refused == {}
+
+
+def test_many_layouts_in_many_calls_keep_their_order() -> None:
+    # more layouts than are kept, each in every call
+    efforts = Efforts(JOINTS)
+    for call in range(3):
+        messages = [joint_state(call * 100 + n, [*JOINTS, 'x' * (n % 12)], [float(n)] * 7)
+                    for n in range(60)]
+        buffer, starts, sizes = joined(messages)
+        stamps, read, refused = efforts.read(
+            np.frombuffer(buffer, dtype=np.uint8), np.array(starts), np.array(sizes))
+        assert stamps.tolist() == [call * 100 + n for n in range(60)]
+        assert read[:, 0].tolist() == [float(n) for n in range(60)]
+        assert refused == {}
+
+
+def test_what_is_no_effort_is_refused_and_counted() -> None:
+    good = joint_state(7, JOINTS, range(6))
+    bad = {
+        'without effort': [joint_state(1, JOINTS, [], positions=6)] * 2,
+        'not as many efforts as names': [joint_state(1, JOINTS, range(5)),
+                                         joint_state(1, JOINTS, range(7)),
+                                         joint_state(1, [*JOINTS, 'more'], range(6))],
+        'not finite': [joint_state(1, JOINTS, [0, 1, 2, value, 4, 5])
+                       for value in (math.nan, math.inf, -math.inf)],
+        'lacks one of the joints': [joint_state(1, ['gripper'], [1.0]),
+                                    joint_state(1, JOINTS[:5], range(5)),
+                                    joint_state(1, [], [])],
+        'malformed': [b'', b'\0', good[:20], good[:-1], b'\0\2' + good[2:], b'\1' + good[1:],
+                      good[:8] + (SECOND).to_bytes(4, 'little') + good[12:]],
+    }
+    messages = [good]
+    for each in bad.values():
+        messages += [*each, good]
+    for turn in (1, -1):
+        stamps, efforts, refused = Efforts(JOINTS).read(*joined(messages[::turn]))
+        assert stamps.tolist() == [7] * 6
+        assert efforts.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] * 6
+        assert refused == {reason: len(each) for reason, each in bad.items()}
+
+
+def test_numbers_of_joints_that_are_not_asked_for_may_be_anything() -> None:
+    message = joint_state(7, ['gripper', *JOINTS], [math.nan, *range(6)])
+    _, efforts, refused = Efforts(JOINTS).read(*joined([message]))
+    assert efforts.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]]
+    assert refused == {}
+
+
+def test_what_stands_in_the_gaps_between_fields_does_not_count() -> None:
+    names = [f'{joint}x' for joint in JOINTS]
+    good = joint_state(7, names, range(6))
+    # rclpy leaves in gaps what the memory held: every byte that no field takes may be anything
+    efforts = Efforts(names)
+    efforts.read(*joined([good]))
+    gaps = 0
+    for at in range(2, len(good)):
+        spoiled = good[:at] + bytes([good[at] ^ 0xff]) + good[at + 1:]
+        try:
+            read = STORE.deserialize_cdr(spoiled, 'sensor_msgs/msg/JointState')
+            same = (list(read.name) == names and list(read.effort) == list(range(6))
+                    and read.header.stamp.nanosec == 7 and read.header.frame_id == ''
+                    and not len(read.position) and not len(read.velocity))
+        except Exception:  # rosbags lets bare errors through
+            continue
+        if same:
+            gaps += 1
+            _, numbers, refused = efforts.read(*joined([spoiled]))
+            assert numbers.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] and not refused
+    assert gaps > 6
+
+
+def test_spoiled_bytes_never_break_it() -> None:
+    random = rng()
+    good = joint_state(7, ['a', *JOINTS], range(7), 'base', positions=7)
+    messages = []
+    for _ in range(2000):
+        message = bytearray(good)
+        for at in random.integers(0, len(good), random.integers(1, 4)):
+            message[at] = random.integers(0, 256)
+        messages.append(bytes(message[:random.integers(0, len(good) + 1)]
+                              if random.random() < 0.3 else message))
+    # the good one first: else it could be that none has all the joints
+    stamps, efforts, refused = Efforts(JOINTS).read(*joined([good, *messages]))
+    assert len(stamps) + sum(refused.values()) == 2001
+    assert np.isfinite(efforts).all()
+    assert stamps[0] == 7
+
+
+def test_a_joint_that_no_message_has_is_named() -> None:
+    names = ['leg_1', 'leg_2', 'leg_3', 'leg_4', 'leg_5', 'cylinder_6']
+    efforts = Efforts(JOINTS)
+    stamps, _, refused = efforts.read(*joined([joint_state(1, names, range(6))]))
+    assert not len(stamps) and refused == {'lacks one of the joints': 1}
+    with pytest.raises(BagError, match='no message has leg_6; there are leg_1, .*, cylinder_6:'):
+        efforts.check()
+    # many of them are said at once
+    with pytest.raises(BagError, match='no message has leg_6'):
+        efforts.read(*joined([joint_state(1, names, range(6))] * 1000))
+
+
+def test_another_publishers_joints_are_no_mistake() -> None:
+    efforts = Efforts(JOINTS)
+    other = joint_state(1, ['gripper'], [2.0])
+    efforts.read(*joined([other] * 500))
+    stamps, _, _ = efforts.read(*joined([*[other] * 800, joint_state(1, JOINTS, range(6))]))
+    assert len(stamps) == 1
+    efforts.read(*joined([other] * 2000))
+    efforts.check()
+
+
+def test_no_messages_give_nothing() -> None:
+    efforts = Efforts(JOINTS)
+    stamps, values, refused = efforts.read(b'', [], [])
+    assert stamps.shape == (0,) and values.shape == (0, 6) and refused == {}
+    efforts.check()

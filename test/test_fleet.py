@@ -1,0 +1,547 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Many bags: on this machine and on a cluster, whatever becomes of one of them.
+
+Processes are killed for real, where the files that they hold open show that they are in the
+middle of a bag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+import csv
+import errno
+import fcntl
+import json
+import logging
+import math
+import os
+from pathlib import Path
+import pickle
+import pty
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from typing import Any
+
+from distributed import LocalCluster
+import messages
+import numpy as np
+import pytest
+from referees import ROOT
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from stewart_dynamics import BagError, Parameters, StewartError
+from stewart_dynamics.replay.bags import folders_of_results
+from stewart_dynamics.replay.fleet import Fleet, replay_fleet
+from stewart_dynamics.replay.one import (
+    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, PARTLY_READ, replay)
+
+PARAMS = ROOT / 'config' / 'platform.yaml'
+PARAMETERS = Parameters.from_yaml(PARAMS)
+PLAIN = Options(report=False)
+SECOND = 1_000_000_000
+KINDS = {'pose': messages.pose, 'twist': messages.twist, 'accel': messages.accel}
+
+
+def heave(folder: Path, number: int, amplitude: float = 0.05) -> Path:
+    """Write a bag of setpoints 1 ms apart."""
+    templates = {name: bytearray(make(SECOND)) for name, make in KINDS.items()}
+    # after the stamp, one number differs: z
+    place = {name: len(template) - 8 * (5 if name == 'pose' else 4)
+             for name, template in templates.items()}
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {
+            name: writer.add_connection(
+                f'{NODE}/setpoint/{name}', getattr(messages, name.upper()),
+                typestore=messages.STORE) for name in KINDS}
+        for n in range(number):
+            stamp, t = SECOND + n * 1_000_000, n * 0.001
+            z = (1.1 + amplitude * math.sin(t), amplitude * math.cos(t), -amplitude * math.sin(t))
+            for value, (name, template) in zip(z, templates.items(), strict=True):
+                struct.pack_into('<iI', template, 4, *divmod(stamp, SECOND))
+                struct.pack_into('<d', template, place[name], value)
+                writer.write(connections[name], stamp, bytes(template))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a bag that takes so long that a process can be caught in the middle of it."""
+    return heave(tmp_path_factory.mktemp('long') / 'long', 60_000)
+
+
+@pytest.fixture
+def bags(tmp_path: Path, long_bag: Path) -> Path:
+    """Return a folder of bags: a long one and ten short ones, one of which meets limits."""
+    folder = tmp_path / 'bags'
+    shutil.copytree(long_bag, folder / 'long')
+    for n in range(9):
+        heave(folder / 'short' / f'{n}', 50 + n)
+    shutil.copytree(ROOT / 'bags' / 'singular', folder / 'singular')
+    return folder
+
+
+@pytest.fixture(scope='module')
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
+    with LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+            local_directory=f'{tmp_path_factory.mktemp("dask")}') as made:
+        yield made
+
+
+def until(condition: Callable[[], Any], what: str) -> Any:
+    """Return what a condition gives as soon as it is something."""
+    end = time.monotonic() + 60.0
+    while not (found := condition()):
+        assert time.monotonic() < end, f'waited for {what}'
+        time.sleep(0.002)
+    return found
+
+
+def process_in(folder: Path, bag: str) -> int | None:
+    """Return the process that is writing the results of a bag."""
+    for process in Path('/proc').glob('[0-9]*'):
+        try:
+            held = [os.readlink(file) for file in (process / 'fd').iterdir()]
+        except OSError:  # has ended, or is not ours
+            continue
+        if any(file.startswith(f'{folder}/.{bag}.') for file in held):
+            return int(process.name)
+    return None
+
+
+def hidden(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob('.*') if folder in path.parents]
+
+
+def rows(output: Path) -> dict[str, dict[str, str]]:
+    """Return fleet.csv by bag."""
+    with (output / 'fleet.csv').open(newline='', encoding='utf-8') as file:
+        found = list(csv.DictReader(file))
+    by_bag = {row['bag']: row for row in found}
+    assert len(by_bag) == len(found)
+    return by_bag
+
+
+def check_whole(folder: Path, bag: Path) -> str:
+    """Check that a bag has its results, all of them; return the name of the run."""
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    answered = summary['setpoints']['answered']
+    assert summary['complete']
+    with AnyReader([bag]) as reader:
+        assert answered == sum(c.msgcount for c in reader.connections
+                               if c.topic == f'{NODE}/setpoint/pose')
+    with AnyReader([folder / 'bag']) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections}[f'{NODE}/leg_forces'] == answered
+    with (folder / 'legs.csv').open(encoding='utf-8') as file:
+        assert sum(1 for _ in file) == answered + 1
+    return str(summary['run'])
+
+
+def check_each_once(fleet: Fleet, pairs: list[tuple[Path, Path]], output: Path) -> None:
+    """Check that every bag is done, once, and that nothing else is there."""
+    assert [(each.bag, each.folder) for each in fleet.ended] == pairs
+    assert [each.error for each in fleet.ended] == [''] * len(pairs)
+    runs = {check_whole(folder, bag) for bag, folder in pairs}
+    assert len(runs) == 1
+    assert runs != {''}
+    assert list(rows(output)) == [f'{bag}' for bag, _ in pairs]
+    assert {path.parent for path in output.rglob('summary.json')} == {f for _, f in pairs}
+    assert hidden(output) == []
+    assert (output / 'index.html').stat().st_size > 1000
+
+
+# On this machine
+
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_every_bag_is_done_once(bags: Path, tmp_path: Path, jobs: int) -> None:
+    output = tmp_path / 'out' / 'of two'
+    pairs = folders_of_results([bags], output)
+    assert len(pairs) == 11
+    fleet = replay_fleet(pairs, PARAMETERS, output, PLAIN, jobs)
+    check_each_once(fleet, pairs, output)
+    assert [each.code for each in fleet.ended] == [DONE] * 10 + [LIMIT_MET]
+    assert (fleet.code(strict=False), fleet.code(strict=True)) == (DONE, LIMIT_MET)
+    assert fleet.text() == '11 bags: 10 done, 1 limit met'
+    # the row of a bag is its summary's
+    summary = json.loads((output / 'singular' / 'summary.json').read_text(encoding='utf-8'))
+    row = rows(output)[f'{bags / "singular"}']
+    peak = max(summary['legs'].items(), key=lambda leg: abs(leg[1]['force_peak_n']))
+    assert (row['force_worst_leg'], float(row['force_worst_n'])) == (
+        peak[0], peak[1]['force_peak_n'])
+    assert float(row['determinant_nearest_m3']) == (
+        summary['singularity']['determinant_nearest_m3'])
+    assert (row['crossings'], row['warnings'], row['results']) == ('1', '1', 'singular')
+
+
+def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
+    whole = (bags / 'long' / 'long.mcap').read_bytes()
+    (bags / 'cut').mkdir()
+    (bags / 'cut' / 'cut.mcap').write_bytes(whole[:len(whole) // 2])
+    (bags / 'noise').mkdir()
+    (bags / 'noise' / 'noise.mcap').write_bytes(b'\x00\xff' * 1000)
+    heave(bags / 'other', 3)
+    shutil.copytree(ROOT / 'bags' / 'flawed', bags / 'flawed')
+    output = tmp_path / 'out'
+    (output / 'other').mkdir(parents=True)
+    pairs = [*folders_of_results([bags], output), (tmp_path / 'none', output / 'none')]
+    fleet = replay_fleet(pairs, PARAMETERS, output, PLAIN, jobs=2)
+    ended = {each.bag.name: each for each in fleet.ended}
+    assert {name: each.code for name, each in ended.items() if each.code} == {
+        'cut': PARTLY_READ, 'noise': BAD_INPUT, 'none': BAD_INPUT, 'other': BAD_INPUT,
+        'singular': LIMIT_MET}
+    assert fleet.code(strict=True) == BAD_INPUT
+    assert fleet._replace(ended=(ended['singular'], ended['cut'])).code(True) == PARTLY_READ
+    # each is named, with what is wrong, in one line
+    head, *told = fleet.text().splitlines()
+    assert head == '16 bags: 11 done, 1 limit met, 1 partly read, 3 failed'
+    assert len(told) == 4
+    for name, why in (('cut', 'cut.mcap: '), ('noise', 'neither MCAP nor sqlite3'),
+                      ('none', 'no such file'), ('other', 'exists already')):
+        line = ended[name].error
+        assert line in told
+        assert line.startswith(f'{ended[name].bag}: ')
+        assert why in line
+        row = rows(output)[f'{ended[name].bag}']
+        assert row['error']
+        assert row['error'] in line
+    assert int(rows(output)[f'{bags / "cut"}']['setpoints']) > 100
+    assert rows(output)[f'{bags / "cut"}']['complete'] == 'false'
+    assert int(rows(output)[f'{bags / "flawed"}']['refused']) > 100
+    assert rows(output)[f'{bags / "noise"}']['results'] == ''
+    assert list((output / 'other').iterdir()) == []
+    assert hidden(output) == []
+
+
+def test_results_are_not_written_over(bags: Path, tmp_path: Path) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags / 'short'], output)
+    first = replay_fleet(pairs, PARAMETERS, output, PLAIN)
+    before = {path: path.read_bytes() for path in output.rglob('*') if path.is_file()}
+    with pytest.raises(BagError, match='fleet.csv: exists already'):
+        replay_fleet(pairs, PARAMETERS, output, PLAIN)
+    assert {path: path.read_bytes() for path in output.rglob('*') if path.is_file()} == before
+    again = replay_fleet(pairs, PARAMETERS, output, PLAIN._replace(force=True), jobs=2)
+    check_each_once(again, pairs, output)
+    assert [each.row for each in again.ended] == [each.row for each in first.ended]
+    (output / 'index.html').unlink()
+    (output / 'index.html').mkdir()
+    with pytest.raises(BagError, match='index.html: exists already and is a folder'):
+        replay_fleet(pairs, PARAMETERS, output, PLAIN._replace(force=True))
+
+
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_a_bag_that_its_run_has_finished_is_done(
+        bags: Path, tmp_path: Path, jobs: int, cluster: LocalCluster) -> None:
+    """As a process leaves it that dies before it can say so."""
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    options = PLAIN._replace(run='this')
+    for bag, folder in pairs[:3]:
+        replay(bag, PARAMETERS, folder, options)
+    replay(*(pairs[-1][0], PARAMETERS, pairs[-1][1]), PLAIN._replace(run='another'))
+    times = {folder: folder.stat().st_mtime_ns for _, folder in pairs[:3]}
+    scheduler = cluster.scheduler_address if jobs == 1 else None
+    fleet = replay_fleet(pairs, PARAMETERS, output, options, jobs, scheduler)
+    assert [each.code for each in fleet.ended] == [DONE] * 10 + [BAD_INPUT]
+    assert 'exists already' in fleet.ended[-1].error
+    assert {folder: folder.stat().st_mtime_ns for folder in times} == times
+    assert {check_whole(folder, bag) for bag, folder in pairs[:-1]} == {'this'}
+    # what it says of them is what it says of the others
+    rest = replay_fleet(pairs[:3], PARAMETERS, tmp_path / 'rest', PLAIN._replace(force=True))
+    assert [each.row for each in rest.ended] == [each.row for each in fleet.ended[:3]]
+
+
+def test_a_process_that_dies_takes_no_bag_along(bags: Path, tmp_path: Path) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    with ThreadPoolExecutor() as apart:
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN, 2)
+        pid = until(lambda: process_in(output, 'long'), 'a process in the middle of a bag')
+        assert pid != os.getpid()
+        os.kill(pid, signal.SIGKILL)
+        left = hidden(output)
+        fleet = running.result()
+    assert any(path.name.startswith('.long.') for path in left)
+    check_each_once(fleet, pairs, output)
+
+
+def test_a_bag_whose_processes_die_is_given_up(bags: Path, tmp_path: Path) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    with ThreadPoolExecutor() as apart:
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN, 2)
+        first = until(lambda: process_in(output, 'long'), 'a process in the middle of a bag')
+        os.kill(first, signal.SIGKILL)
+        second = until(lambda: (pid := process_in(output, 'long')) != first and pid,
+                       'another process in the middle of it')
+        os.kill(second, signal.SIGKILL)
+        fleet = running.result()
+    assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
+    long = fleet.ended[0]
+    assert long.error == (f'{bags / "long"}: the process that replayed it died 2 times, the last '
+                          'time by signal SIGKILL (SIGKILL: was there too little memory?)')
+    assert not long.folder.exists()
+    assert hidden(output) == []
+    for bag, folder in pairs[1:]:
+        check_whole(folder, bag)
+    assert len(rows(output)) == len(pairs)
+
+
+def test_replaced_results_come_back_where_new_ones_were_never_whole(
+        bags: Path, tmp_path: Path) -> None:
+    """As a process leaves them that dies between the two renames."""
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags / 'short'], output)
+    old = output / '.long.this.partial.abc.replaced'
+    for path in (old, output / '.0.this.partial.abc', output / '.0.other.partial.abc'):
+        path.mkdir(parents=True)
+        (path / 'summary.json').touch()
+    replay_fleet([*pairs, (tmp_path / 'none', output / 'long')], PARAMETERS, output,
+                 PLAIN._replace(run='this'))
+    assert (output / 'long' / 'summary.json').exists()
+    # nor is anything removed that another run may still need
+    assert [path.name for path in output.iterdir() if path.name.startswith('.')] == [
+        '.0.other.partial.abc']
+
+
+def test_names_as_bad_as_they_come(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ['=1+1', '-1', '@x', '+x', '<b>', 'a\nb', 'a;b', "'", os.fsdecode(b'caf\xe9')]
+    for name in names:
+        heave(tmp_path / 'bags' / name, 3)
+    monkeypatch.chdir(tmp_path / 'bags')
+    output = tmp_path / 'out'
+    pairs = folders_of_results([Path('.')], output)
+    assert {f'{bag}' for bag, _ in pairs} == set(names)
+    fleet = replay_fleet(pairs, PARAMETERS, output, Options(), jobs=2)
+    assert [each.error for each in fleet.ended] == [''] * len(names)
+    assert set(rows(output)) == {'./=1+1', './-1', './@x', './+x', '<b>', 'a\nb', 'a;b', "'",
+                                 'caf\\udce9'}
+    assert {folder for folder in output.iterdir() if folder.is_dir()} == {
+        output / name for name in names}
+
+
+# How far it is
+
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_progress_comes_from_inside_the_bags(
+        bags: Path, tmp_path: Path, jobs: int, capfd: pytest.CaptureFixture[str]) -> None:
+    pairs = folders_of_results([bags], tmp_path / 'out')
+    fleet = replay_fleet(pairs, PARAMETERS, tmp_path / 'out', PLAIN, jobs, show_progress=True)
+    lines = capfd.readouterr().err.replace('\r', '\n').splitlines()
+    told = [re.search(r'(\d+)%.* (\d+)/11 bags, (\S+) setpoints, (\S+)/s, (\S+) left', line)
+            for line in lines]
+    seen = [found.groups() for found in told if found]
+    # in the middle there is nothing but the long bag
+    assert any(10 < int(percent) < 90 for percent, *_ in seen)
+    assert [int(percent) for percent, *_ in seen] == sorted(int(percent) for percent, *_ in seen)
+    total = sum(int(f'{each.row["setpoints"]}') for each in fleet.ended)
+    percent, number, setpoints, rate, left = seen[-1]
+    assert (percent, number, left) == ('100', '11', '00:00')
+    assert float(setpoints.removesuffix('k')) == pytest.approx(total / 1000, rel=0.01)
+    assert float(rate.removesuffix('k')) > 0.0
+
+
+def test_progress_is_for_terminals(
+        bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    pairs = folders_of_results([bags / 'short'], tmp_path / 'out')
+    replay_fleet(pairs, PARAMETERS, tmp_path / 'out', PLAIN)
+    assert capfd.readouterr() == ('', '')
+    ours, its = pty.openpty()
+    fcntl.ioctl(its, termios.TIOCSWINSZ, struct.pack('4H', 24, 100, 0, 0))
+    program = subprocess.Popen(
+        [sys.executable, '-m', 'stewart_dynamics.replay', f'{bags}', '--params', f'{PARAMS}',
+         '--output', f'{tmp_path / "seen"}', '--no-report', '--jobs', '2'], stderr=its,
+        stdout=subprocess.DEVNULL)
+    os.close(its)
+    seen = b''
+    try:
+        while more := os.read(ours, 65536):
+            seen += more
+    except OSError as exc:  # so Linux says that nobody holds the other end
+        assert exc.errno == errno.EIO
+    assert program.wait(60) == DONE
+    assert re.search(r'\D[1-8]\d%.* \d+/11 bags, \d\S*k setpoints, \S+/s, 00:\d\d left',
+                     seen.decode())
+
+
+# How it is ended
+
+def program(bags: Path, output: Path, *options: str) -> subprocess.Popen[str]:
+    """Start the program as the head of a group of processes, as a shell does."""
+    return subprocess.Popen(
+        [sys.executable, '-m', 'stewart_dynamics.replay', f'{bags}', '--params', f'{PARAMS}',
+         '--output', f'{output}', '--no-report', *options],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def group_is_gone(leader: int) -> bool:
+    try:
+        os.killpg(leader, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize('where', ['here', 'processes', 'cluster'])
+def test_an_interrupt_leaves_nothing_half_done(
+        bags: Path, tmp_path: Path, where: str, cluster: LocalCluster) -> None:
+    output = tmp_path / 'out'
+    options = {'here': (), 'processes': ('--jobs', '2'),
+               'cluster': ('--scheduler', cluster.scheduler_address)}[where]
+    running = program(bags, output, *options)
+    until(lambda: process_in(output, 'long'), 'the middle of a bag')
+    os.killpg(running.pid, signal.SIGINT)
+    out, err = running.communicate(timeout=60)
+    assert (running.returncode, out, err) == (130, '', '')
+    assert hidden(output) == []
+    assert not (output / 'long').exists()
+    assert not (output / 'fleet.csv').exists()
+    assert not (output / 'index.html').exists()
+    until(lambda: group_is_gone(running.pid), 'the end of its processes')
+    # those that were finished are whole
+    for folder in (path.parent for path in output.rglob('summary.json')):
+        check_whole(folder, bags / folder.relative_to(output))
+
+
+def test_processes_end_with_the_one_that_started_them(bags: Path, tmp_path: Path) -> None:
+    output = tmp_path / 'out'
+    running = program(bags, output, '--jobs', '2')
+    until(lambda: process_in(output, 'long'), 'the middle of a bag')
+    running.kill()
+    running.wait()
+    until(lambda: group_is_gone(running.pid), 'the end of its processes')
+    running.communicate(timeout=60)
+    assert hidden(output) == []
+
+
+# On a cluster
+
+def test_a_cluster_gives_what_this_machine_gives(
+        bags: Path, tmp_path: Path, cluster: LocalCluster,
+        monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    heave(bags / 'wrong', 3)
+    (bags / 'wrong' / 'wrong.mcap').write_bytes(b'no bag')
+    # paths mean the same in the workers, wherever they were started
+    monkeypatch.chdir(tmp_path)
+    here, there = Path('here'), Path('there')
+    own = replay_fleet(folders_of_results([Path('bags')], here), PARAMETERS, here, PLAIN)
+    pairs = folders_of_results([Path('bags')], there)
+    fleet = replay_fleet(pairs, PARAMETERS, there, PLAIN, scheduler=cluster.scheduler_address,
+                         show_progress=True)
+    assert [(each.bag, each.folder) for each in fleet.ended] == pairs
+    assert [each.row for each in fleet.ended][:-1] == [each.row for each in own.ended][:-1]
+    assert list(rows(there)) == list(rows(here))
+    # but that workers say in full where a bag is
+    assert fleet.ended[-1].error == f'{tmp_path}/{own.ended[-1].error}'
+    for folder in (folder for bag, folder in pairs if bag.name != 'wrong'):
+        ours = here / folder.relative_to(there)
+        assert (folder / 'legs.csv').read_bytes() == (ours / 'legs.csv').read_bytes()
+        assert (folder / 'bag' / 'bag.mcap').read_bytes() == (
+            ours / 'bag' / 'bag.mcap').read_bytes()
+    assert fleet.code(strict=False) == BAD_INPUT
+    assert '100%' in capfd.readouterr().err
+
+
+def test_every_bag_is_done_once_though_a_worker_is_killed(
+        bags: Path, tmp_path: Path, cluster: LocalCluster) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    workers = {worker.pid for worker in cluster.workers.values()}
+    with ThreadPoolExecutor() as apart:
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
+                               scheduler=cluster.scheduler_address)
+        pid = until(lambda: process_in(output, 'long'), 'a worker in the middle of a bag')
+        assert pid in workers
+        os.kill(pid, signal.SIGKILL)
+        left = hidden(output)
+        fleet = running.result()
+    # It left a part behind, and somebody else did the whole.
+    assert any(path.name.startswith('.long.') for path in left)
+    check_each_once(fleet, pairs, output)
+
+
+def test_a_bag_that_kills_its_workers_is_given_up(
+        bags: Path, tmp_path: Path, cluster: LocalCluster) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    killed: set[int] = set()
+
+    def another() -> int | None:
+        pid = process_in(output, 'long')
+        return pid if pid not in killed else None
+
+    with ThreadPoolExecutor() as apart:
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
+                               scheduler=cluster.scheduler_address)
+        for _ in range(4):
+            pid = until(another, 'another worker in the middle of it')
+            killed.add(pid)
+            os.kill(pid, signal.SIGKILL)
+        fleet = running.result()
+    assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
+    assert 'all 4 workers that replayed it died' in fleet.ended[0].error
+    assert hidden(output) == []
+    for bag, folder in pairs[1:]:
+        check_whole(folder, bag)
+
+
+@pytest.mark.parametrize('address', ['tcp://127.0.0.1:1', 'nonsense', 'foo://x', ''])
+def test_a_cluster_that_is_not_there_is_an_error(
+        bags: Path, tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('stewart_dynamics.replay.fleet._PATIENCE', 1.0)
+    output = tmp_path / 'out'
+    with pytest.raises(StewartError, match=f'^{address}: no Dask scheduler answers there: \\w'):
+        replay_fleet(folders_of_results([bags], output), PARAMETERS, output, PLAIN,
+                     scheduler=address)
+    assert list(output.iterdir()) == []
+
+
+def test_dask_is_asked_for_only_where_it_is_needed(bags: Path, tmp_path: Path) -> None:
+    (tmp_path / 'sitecustomize.py').write_text(
+        "import sys\nsys.modules['distributed'] = sys.modules['dask'] = None\n")
+    arguments = [sys.executable, '-m', 'stewart_dynamics.replay', f'{bags / "short"}',
+                 '--params', f'{PARAMS}', '--no-report']
+    for options, code, said in (
+            (['--output', f'{tmp_path / "a"}', '--jobs', '2'], DONE, r'^$'),
+            (['--output', f'{tmp_path / "b"}', '--scheduler', 'tcp://127.0.0.1:1'], BAD_INPUT,
+             r"^stewart_replay: .*pip install 'stewart_dynamics\[cluster\]'.*\n$")):
+        ended = subprocess.run(
+            [*arguments, *options], capture_output=True, text=True, timeout=60, check=False,
+            env={**os.environ, 'PYTHONPATH': f'{tmp_path}'})
+        assert ended.returncode == code
+        assert re.match(said, ended.stderr)
+
+
+def test_what_goes_to_other_processes_can_go_there() -> None:
+    fleet = Fleet(())
+    for each in (PLAIN, Options(topics={'pose': '/p'}), fleet):
+        assert pickle.loads(pickle.dumps(each)) == each
+    assert fleet.code(strict=True) == DONE
+    there = pickle.loads(pickle.dumps(PARAMETERS))
+    assert all(np.array_equal(there[name], PARAMETERS[name]) for name in PARAMETERS)
+    assert list(there) == list(PARAMETERS)

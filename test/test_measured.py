@@ -1,0 +1,469 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Measured leg forces against computed ones: known loads, clocks out of line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import json
+import math
+from typing import Any, NamedTuple
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import random_parameters, rng, size_of
+
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.replay.measured import Comparison
+from stewart_dynamics.step import Batch, Outputs, Step
+
+Array = NDArray[np.float64]
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+TIMEOUT = 0.1
+
+
+class Case(NamedTuple):
+    """A machine in a motion, and what the step gives for it."""
+
+    parameters: Parameters
+    motion: Motion
+    seconds: Array
+    setpoints: Batch
+    outputs: Outputs
+
+    def forces(self, wrench: Any = None, parameters: Parameters | None = None) -> Array:
+        """Return the leg forces of the motion under a load, of this machine or another."""
+        forces: Array = StewartPlatform(parameters or self.parameters).inverse_dynamics(
+            self.motion, wrench).forces
+        return forces
+
+    def part(self, which: Any) -> Case:
+        """Return some of the setpoints."""
+        motion = Motion(*(each[which] for each in (
+            self.motion.position, self.motion.rotation, self.motion.linear_velocity,
+            self.motion.angular_velocity, self.motion.linear_acceleration,
+            self.motion.angular_acceleration)))
+        batch = Batch(*(each[which] for each in self.setpoints))
+        return Case(self.parameters, motion, self.seconds[which], batch,
+                    Step(self.parameters).many(batch, None))
+
+
+def case_of(seed: int = 0, many: int = 500, step: float = 0.01,
+            stamps: Sequence[int] | None = None) -> Case:
+    """Return a random machine that moves about its middle."""
+    random = rng(seed)
+    parameters = random_parameters(random)
+    size = size_of(parameters)
+    times = np.arange(many) * step
+    amplitudes, w = random.uniform(0.05, 0.15, (2, 3)), random.uniform(2.0, 6.0, (2, 3))
+    phases = random.uniform(0.0, 6.0, (2, 3))
+
+    def wave(part: int, order: int) -> Array:
+        return amplitudes[part] * w[part] ** order * np.sin(
+            times[:, None] * w[part] + phases[part] + order * math.pi / 2.0)
+
+    motion = Motion.from_euler(
+        size * (wave(0, 0) + [0.0, 0.0, 1.0]), wave(1, 0), size * wave(0, 1), wave(1, 1),
+        size * wave(0, 2), wave(1, 2))
+    stamp = np.array(stamps) if stamps is not None else START + np.arange(many) * round(step * 1e9)
+    batch = Batch(stamp, motion.rows, np.zeros((many, 6)), np.diff(stamp, prepend=stamp[0]) < 0,
+                  stamp)
+    seconds = np.cumsum(np.diff(stamp, prepend=stamp[0]).clip(0)) * 1e-9
+    return Case(parameters, motion, seconds, batch, Step(parameters).many(batch, None))
+
+
+def compared(comparison: Comparison, *given: Any) -> list[Array]:
+    """Return all that was compared: given are parts, each a case or (stamps, efforts)."""
+    blocks = []
+    for each in given:
+        if isinstance(each, Case):
+            blocks.append(comparison.add_setpoints(each.seconds, each.setpoints, each.outputs))
+        else:
+            blocks.append(comparison.add_measured(*each))
+    blocks.append(comparison.finish())
+    return [np.concatenate(each) for each in zip(*blocks, strict=True)]
+
+
+# The residual and its wrench
+
+@pytest.mark.parametrize('seed', range(4))
+def test_the_residual_wrench_is_the_negative_of_the_load_that_touched(seed: int) -> None:
+    case = case_of(seed)
+    load = rng(seed).uniform(-300.0, 300.0, (500, 6))
+    forces = case.forces(load)
+    comparison = Comparison(case.parameters)
+    seconds, measured, computed, wrench = compared(
+        comparison, case, (case.setpoints.stamps, forces))
+    assert np.array_equal(seconds, case.seconds)
+    assert np.array_equal(measured, forces)
+    assert np.array_equal(computed, case.outputs.demanded_forces)
+    assert np.max(np.abs(wrench + load)) < 1e-9 * np.max(np.abs(forces))
+    # by the library's matrix
+    j_inv = StewartPlatform(case.parameters).jacobian(case.motion.position, case.motion.rotation)
+    assert np.allclose(wrench, np.einsum('nij,ni->nj', j_inv, measured - computed),
+                       rtol=0.0, atol=1e-9 * np.max(np.abs(forces)))
+
+    values = comparison.values()
+    assert values['setpoints_compared'] == 500
+    assert values['setpoints_not_compared'] == {'without_measurement': 0, 'without_force': 0}
+    for number, (axis, unit) in enumerate([
+            ('force_x', 'n'), ('force_y', 'n'), ('force_z', 'n'),
+            ('moment_x', 'n_m'), ('moment_y', 'n_m'), ('moment_z', 'n_m')]):
+        column, found = wrench[:, number], values['wrench'][axis]
+        at = int(np.argmax(np.abs(column)))
+        assert found == {
+            f'rms_{unit}': pytest.approx(np.sqrt(np.mean(column ** 2)), rel=1e-12),
+            f'mean_{unit}': pytest.approx(np.mean(column), rel=1e-9),
+            f'peak_{unit}': column[at], 'peak_at_s': seconds[at]}
+    residual = measured - computed
+    for number, joint in enumerate(case.parameters['joints']):
+        found = values['legs'][joint]
+        at = int(np.argmax(np.abs(residual[:, number])))
+        assert found['residual_peak_n'] == residual[at, number]
+        assert found['residual_peak_at_s'] == seconds[at]
+        assert found['residual_rms_n'] == pytest.approx(
+            np.sqrt(np.mean(residual[:, number] ** 2)), rel=1e-12)
+        assert found['residual_mean_n'] == pytest.approx(np.mean(residual[:, number]), rel=1e-9)
+        assert found['measured_rms_n'] == pytest.approx(
+            np.sqrt(np.mean(measured[:, number] ** 2)), rel=1e-12)
+        assert found['computed_rms_n'] == pytest.approx(
+            np.sqrt(np.mean(computed[:, number] ** 2)), rel=1e-12)
+        assert found['correlation'] == pytest.approx(
+            np.corrcoef(measured[:, number], computed[:, number])[0, 1], rel=1e-9)
+    assert 'NaN' not in json.dumps(values)
+
+
+def test_a_load_that_the_model_knows_leaves_no_residual() -> None:
+    case = case_of()
+    load = rng().uniform(-300.0, 300.0, (500, 6))
+    batch = case.setpoints
+    with_load = Batch(batch.stamps, batch.motions, load, batch.restarts, batch.times)
+    outputs = Step(case.parameters).many(with_load, None)
+    comparison = Comparison(case.parameters)
+    _, _, _, wrench = compared(
+        comparison, Case(case.parameters, case.motion, case.seconds, with_load, outputs),
+        (batch.stamps, case.forces(load)))
+    assert np.max(np.abs(wrench)) < 1e-9
+    assert comparison.values()['touches']['count'] == 0
+
+
+def test_the_friction_that_is_missing_is_found() -> None:
+    case = case_of()
+    given = case.parameters
+    more = given.replaced({
+        'actuator.coulomb_friction': given['actuator.coulomb_friction'] + [3, 6, 9, 12, 15, 0],
+        'actuator.viscous_friction': given['actuator.viscous_friction'] + [90, 70, 50, 30, 0, 9]})
+    comparison = Comparison(given)
+    compared(comparison, case, (case.setpoints.stamps,
+                                case.forces(parameters=more) + [1.0, 0.0, -2.0, 0.0, 0.0, 0.0]))
+    legs = list(comparison.values()['legs'].values())
+    for leg, coulomb, viscous, offset in zip(
+            legs, [3, 6, 9, 12, 15, 0], [90, 70, 50, 30, 0, 9], [1, 0, -2, 0, 0, 0], strict=True):
+        assert leg['coulomb_friction_n'] == pytest.approx(coulomb, abs=1e-8)
+        assert leg['viscous_friction_n_s_m'] == pytest.approx(viscous, abs=1e-7)
+        assert leg['offset_n'] == pytest.approx(offset, abs=1e-8)
+        assert leg['friction_share'] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_payload_that_is_missing_is_found() -> None:
+    case = case_of()
+    given = case.parameters
+    # about the platform's origin: the mass there, the center of mass and inertia made up for it
+    mass, at = given['platform.mass'], given['platform.center_of_mass']
+    heavier = given.replaced({
+        'platform.mass': mass + 35.0, 'platform.center_of_mass': at * mass / (mass + 35.0)})
+    shift = mass * 35.0 / (mass + 35.0)
+    square = shift * (at @ at * np.eye(3) - np.outer(at, at))
+    heavier = heavier.replaced({
+        'platform.inertia': given['platform.inertia'] + square[np.triu_indices(3)]})
+    comparison = Comparison(given)
+    _, _, _, wrench = compared(
+        comparison, case, (case.setpoints.stamps, case.forces(parameters=heavier)))
+    found = comparison.values()['mass']
+    assert found['unmodelled_kg'] == pytest.approx(35.0, rel=1e-9)
+    assert found['share'] == pytest.approx(1.0, rel=1e-9)
+    # heavier: the legs push against gravity, that is the sign of the residual wrench
+    assert np.mean(wrench[:, :3] @ given['gravity']) < 0.0
+
+
+# What touched it, and when
+
+def test_a_touch_is_found_with_its_time_and_load() -> None:
+    case = case_of(many=3000)
+    random = rng()
+    load = np.zeros((3000, 6))
+    load[1200:1230, 2] = -400.0
+    load[2000:2005, 3] = 900.0
+    noise = random.normal(0.0, 1.0, (3000, 6))
+    comparison = Comparison(case.parameters)
+    compared(comparison, case, (case.setpoints.stamps, case.forces(load) + noise))
+    touches = comparison.values()['touches']
+    assert touches['count'] == 2
+    push, blow = touches['strongest']
+    assert push['from_s'] == pytest.approx(12.0, abs=touches['resolution_s'])
+    assert push['to_s'] == pytest.approx(12.29, abs=touches['resolution_s'])
+    assert push['axis'] == 'force_z'
+    assert push['force_n'][2] == pytest.approx(-400.0, abs=30.0)
+    assert blow['from_s'] == pytest.approx(20.0, abs=touches['resolution_s'])
+    assert blow['axis'] == 'moment_x'
+    assert blow['moment_n_m'][0] == pytest.approx(900.0, abs=30.0)
+    assert touches['resolution_s'] < 0.01
+
+
+def test_a_payload_and_noise_are_no_touch() -> None:
+    case = case_of(many=3000)
+    load = np.array([0.0, 0.0, -500.0, 30.0, 0.0, 0.0]) + np.zeros((3000, 1))
+    comparison = Comparison(case.parameters)
+    compared(comparison, case, (case.setpoints.stamps,
+                                case.forces(load) + rng().normal(0.0, 20.0, (3000, 6))))
+    assert comparison.values()['touches']['count'] == 0
+
+
+def test_times_of_touches_hold_in_a_recording_of_hours() -> None:
+    case = case_of(many=2000)
+    comparison = Comparison(case.parameters)
+    # the same 20 s over and over, 10 minutes apart, for 9 hours
+    at_s = 600.0 * 31 + 7.0
+    for turn in range(54):
+        load = np.zeros((2000, 6))
+        if turn == 31:
+            load[700:720, 0] = 1000.0
+        later = 600 * turn
+        batch = Batch(case.setpoints.stamps + later * SECOND, *list(case.setpoints)[1:])
+        comparison.add_measured(batch.stamps, case.forces(load))
+        comparison.add_setpoints(case.seconds + later, batch, case.outputs)
+    comparison.finish()
+    touches = comparison.values()['touches']
+    assert touches['count'] == 1
+    touch = touches['strongest'][0]
+    assert touch['axis'] == 'force_x'
+    assert touch['force_n'][0] == pytest.approx(1000.0, rel=1e-6)
+    assert touches['resolution_s'] <= 4.0
+    assert abs(touch['from_s'] - at_s) <= touches['resolution_s']
+    assert abs(touch['to_s'] - at_s - 0.19) <= touches['resolution_s']
+
+
+def test_the_strongest_hundred_touches_are_listed_in_order_of_time() -> None:
+    case = case_of(many=20_000)
+    load = np.zeros((20_000, 6))
+    strengths = rng().uniform(3000.0, 9000.0, 150)
+    for number, strength in enumerate(strengths):
+        load[100 + 120 * number, 1] = strength
+    comparison = Comparison(case.parameters)
+    compared(comparison, case, (case.setpoints.stamps, case.forces(load)))
+    touches = comparison.values()['touches']
+    assert touches['count'] == 150
+    found = [each['force_n'][1] for each in touches['strongest']]
+    assert found == pytest.approx([each for each in strengths
+                                   if each >= np.sort(strengths)[50]], rel=1e-6)
+    times = [each['from_s'] for each in touches['strongest']]
+    assert times == sorted(times)
+
+
+# Time
+
+def test_between_two_samples_forces_are_interpolated_and_never_beyond_them() -> None:
+    case = case_of(many=100)
+    stamps = case.setpoints.stamps
+    slope, level = rng().normal(size=(2, 6))
+    # every 30 ms from 85 ms on, a hole of 200 ms after 505 ms, an end at 895 ms
+    at = START + np.array([ms for ms in range(85, 900, 30) if not 505 < ms < 685]) * 1_000_000
+    efforts = level + ((at - START) * 1e-9)[:, None] * slope
+    seconds, measured, _, _ = compared(comparison := Comparison(case.parameters), case,
+                                       (at, efforts))
+    within = np.array([(85 <= 10 * n <= 505 or 685 <= 10 * n <= 895) for n in range(100)])
+    assert np.array_equal(seconds, case.seconds[within])
+    assert np.allclose(measured, level + seconds[:, None] * slope, rtol=1e-12)
+    values = comparison.values()
+    assert values['setpoints_not_compared']['without_measurement'] == 100 - within.sum()
+    assert values['gap_limit_s'] == TIMEOUT
+    # samples exactly as far apart as the limit still count, and one at the very stamp alone
+    case = case_of(many=100)
+    seconds, *_ = compared(Comparison(case.parameters), case,
+                           (stamps[[10, 20, 50]], np.zeros((3, 6))))
+    assert np.array_equal(seconds, case.seconds[[*range(10, 21), 50]])
+
+
+def test_where_forces_cannot_be_computed_nothing_is_compared() -> None:
+    case = case_of()
+    case.outputs.demanded_forces[7:11] = np.nan
+    comparison = Comparison(case.parameters)
+    seconds, measured, computed, wrench = compared(
+        comparison, case, (case.setpoints.stamps, np.ones((500, 6))))
+    assert np.array_equal(seconds, np.delete(case.seconds, slice(7, 11)))
+    assert np.isfinite(computed).all() and np.isfinite(wrench).all()
+    assert comparison.values()['setpoints_not_compared'] == {
+        'without_measurement': 0, 'without_force': 4}
+
+
+def test_nothing_compared_gives_null() -> None:
+    case = case_of(many=3)
+    comparison = Comparison(case.parameters)
+    for each in compared(comparison, case):
+        assert len(each) == 0
+    values = json.loads(json.dumps(comparison.values(), allow_nan=False))
+    assert values['setpoints_compared'] == values['samples'] == 0
+    assert values['setpoints_not_compared']['without_measurement'] == 3
+    assert values['legs']['leg_1'] == dict.fromkeys(values['legs']['leg_1'])
+    assert values['wrench']['force_x'] == dict.fromkeys(values['wrench']['force_x'])
+    assert values['mass'] == {'unmodelled_kg': None, 'share': None}
+    assert values['touches']['count'] == 0
+
+
+def test_standing_still_tells_no_friction() -> None:
+    case = case_of(many=1)
+    still = Motion(case.motion.position, case.motion.rotation)
+    rows = np.repeat(still.rows, 50, axis=0)
+    stamps = START + np.arange(50) * 10_000_000
+    batch = Batch(stamps, rows, np.zeros((50, 6)), np.zeros(50, dtype=bool), stamps)
+    outputs = Step(case.parameters).many(batch, None)
+    comparison = Comparison(case.parameters)
+    comparison.add_setpoints(np.arange(50) * 0.01, batch, outputs)
+    comparison.add_measured(stamps, np.full((50, 6), 100.0))
+    comparison.finish()
+    leg = json.loads(json.dumps(comparison.values(), allow_nan=False))['legs']['leg_1']
+    assert leg['coulomb_friction_n'] is None and leg['friction_share'] is None
+    assert leg['correlation'] is None
+    assert leg['measured_rms_n'] == pytest.approx(100.0)
+
+
+def looping(many: int, times: int) -> list[int]:
+    """Return stamps that begin anew, as of a bag that loops."""
+    return [START + n * 10_000_000 for _ in range(times) for n in range(many)]
+
+
+def test_a_pass_is_compared_with_the_samples_of_the_same_pass() -> None:
+    case = case_of(many=120, stamps=looping(40, 3))
+    # in each pass another force
+    efforts = np.repeat([[1.0], [2.0], [3.0]], 40, axis=0) * np.ones(6)
+    whole = compared(Comparison(case.parameters), case, (case.setpoints.stamps, efforts))
+    assert np.array_equal(whole[1], efforts)
+    assert np.array_equal(whole[0], case.seconds)
+    # samples that lead by a whole pass, and setpoints that do
+    for parts in ([(case.setpoints.stamps[:70], efforts[:70]), case.part(slice(0, 30)),
+                   (case.setpoints.stamps[70:], efforts[70:]), case.part(slice(30, 120))],
+                  [case.part(slice(0, 90)), (case.setpoints.stamps, efforts),
+                   case.part(slice(90, 120))]):
+        again = compared(comparison := Comparison(case.parameters), *parts)
+        for a, b in zip(again, whole, strict=True):
+            assert np.allclose(a, b, rtol=1e-12)
+        assert comparison.values()['samples_jumped_back'] == 2
+
+
+def test_samples_without_the_setpoints_jump_are_not_taken_for_another_pass() -> None:
+    case = case_of(many=80, stamps=looping(40, 2))
+    efforts = np.ones((40, 6))
+    comparison = Comparison(case.parameters)
+    seconds, *_ = compared(comparison, case, (case.setpoints.stamps[:40], efforts))
+    assert np.array_equal(seconds, case.seconds[:40])
+    assert comparison.values()['setpoints_not_compared']['without_measurement'] == 40
+
+
+def test_single_samples_out_of_line_are_left_out() -> None:
+    case = case_of(many=100)
+    stamps, efforts = case.setpoints.stamps.copy(), rng().normal(size=(100, 6))
+    whole = compared(Comparison(case.parameters), case, (stamps, efforts))
+    wild = np.full((1, 6), 1e6)
+    for at, stamp in (
+            (50, stamps[50] - 5 * SECOND),  # late by far
+            (50, stamps[45]), (50, stamps[49]),  # late by less than the timeout, twice the same
+            (50, stamps[50] + 3600 * SECOND)):  # from the future
+        spoiled = np.insert(stamps, at, stamp), np.insert(efforts, at, wild, axis=0)
+        for cut in (None, 50, 51):
+            comparison = Comparison(case.parameters)
+            parts = [spoiled] if cut is None else [
+                tuple(each[:cut] for each in spoiled), tuple(each[cut:] for each in spoiled)]
+            again = compared(comparison, case, *parts)
+            for a, b in zip(again, whole, strict=True):
+                assert np.array_equal(a, b)
+            values = comparison.values()
+            assert values['samples_out_of_order'] == 1
+            assert values['samples_jumped_back'] == 0
+            assert values['samples'] == 101
+
+
+def reference(stamps: list[int], at: list[int], gap: int) -> list[int]:
+    """Return which setpoints have samples around them, one by one; time goes forward in both."""
+    found = []
+    for number, stamp in enumerate(stamps):
+        before = [each for each in at if each <= stamp]
+        after = [each for each in at if each >= stamp]
+        if before and after and min(after) - max(before) <= gap:
+            found.append(number)
+    return found
+
+
+@settings(derandomize=True, deadline=None, max_examples=80)
+@given(st.lists(st.integers(1, 150), min_size=1, max_size=60),
+       st.lists(st.integers(1, 150), min_size=1, max_size=60), st.integers(-100, 2000),
+       st.lists(st.tuples(st.booleans(), st.integers(0, 20)), max_size=30))
+def test_cuts_and_turns_change_nothing(
+        steps: list[int], sample_steps: list[int], offset: int,
+        turns: list[tuple[bool, int]]) -> None:
+    milliseconds = 1_000_000
+    stamps = (START + np.cumsum(steps) * milliseconds).tolist()
+    at = START + (offset + np.cumsum(sample_steps)) * milliseconds
+    case = case_of(many=len(steps), stamps=stamps)
+    efforts = rng().normal(size=(len(at), 6))
+    whole = compared(once := Comparison(case.parameters), case, (at, efforts))
+    assert np.array_equal(
+        whole[0], case.seconds[reference(stamps, at.tolist(), round(TIMEOUT * 1e9))])
+
+    again = Comparison(case.parameters)
+    parts: list[Any] = []
+    done = [0, 0]
+    for of_setpoints, number in [*turns, (True, 99), (False, 99)]:
+        side = 0 if of_setpoints else 1
+        part = slice(done[side], done[side] + number)
+        done[side] += number
+        parts.append(case.part(part) if of_setpoints and number and part.start < len(stamps)
+                     else (at[part], efforts[part]) if not of_setpoints
+                     else (at[:0], efforts[:0]))
+    cut = compared(again, *parts)
+    for a, b in zip(cut, whole, strict=True):
+        assert np.array_equal(a, b)
+    assert again.values()['setpoints_not_compared'] == once.values()['setpoints_not_compared']
+
+
+def test_what_waits_in_vain_is_given_up_and_counted() -> None:
+    case = case_of(many=5000)
+    comparison = Comparison(case.parameters)
+    far = 0
+    for turn in range(20):
+        far = turn * 50 * SECOND
+        batch = Batch(case.setpoints.stamps + far, *list(case.setpoints)[1:])
+        comparison.add_setpoints(case.seconds + far * 1e-9, batch, case.outputs)
+    # of the last ones that wait all are compared, of what was before them none
+    late = comparison.add_measured(case.setpoints.stamps + far, case.forces())
+    rest = comparison.finish()
+    assert len(late.seconds) + len(rest.seconds) == 5000
+    values = comparison.values()
+    assert values['setpoints_compared'] == 5000
+    assert values['setpoints_not_compared']['without_measurement'] == 95_000
+
+    comparison = Comparison(case.parameters)
+    for turn in range(100):
+        comparison.add_measured(case.setpoints.stamps + turn * 50 * SECOND, case.forces())
+    assert values['samples'] == 5000
+    far = 99 * 50 * SECOND
+    batch = Batch(case.setpoints.stamps + far, *list(case.setpoints)[1:])
+    comparison.add_setpoints(case.seconds + far * 1e-9, batch, case.outputs)
+    comparison.finish()
+    assert comparison.values()['setpoints_compared'] == 5000
