@@ -23,13 +23,16 @@ from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
+import shutil
+import tempfile
 from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
+from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
-from stewart_dynamics.replay.one import NODE
+from stewart_dynamics.replay.one import NODE, replay
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.setpoints import Setpoints
 from stewart_dynamics.step import Array, Batch, Outputs, Step
@@ -42,6 +45,7 @@ ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / 'README.md'
 # Okabe and Ito's, which the colour-blind can tell apart.
 LEG_COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 
 
@@ -214,6 +218,27 @@ def draw_figures(path: Path, recorded: Recorded) -> None:
     save(figure, path)
 
 
+def draw_report(path: Path) -> None:
+    """Take a picture of the report of the recorded motion, where there is a browser."""
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        print(f'no browser ({", ".join(BROWSERS)}): {path.name} is left as it is')
+        return
+    parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        replay(Path('bags/singular'), parameters, Path(folder) / 'singular')
+        page = playwright.chromium.launch(executable_path=browser, args=[
+            '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+        ]).new_page(viewport={'width': 1300, 'height': 900})
+        page.goto((Path(folder) / 'singular' / 'report.html').as_uri())
+        page.locator('#slider').fill('7.6')
+        page.locator('#motion').scroll_into_view_if_needed()
+        page.locator('#motion h2').evaluate('heading => heading.scrollIntoView()')
+        page.locator('#motion canvas').first.wait_for()
+        page.wait_for_timeout(3000)  # software draws the machine slowly
+        page.screenshot(path=path)
+
+
 def euler(rotations: Array) -> Array:
     """Return alpha, beta, gamma (N, 3) [rad] of R = Rz(gamma) Ry(beta) Rx(alpha), rows of nine."""
     r = rotations.reshape(-1, 3, 3)
@@ -233,6 +258,7 @@ def main() -> None:
                             'axes.spines.top': False, 'axes.spines.right': False})
     draw_singular(ROOT / 'docs' / 'singular.png', recorded)
     draw_figures(ROOT / 'docs' / 'figures.png', recorded)
+    draw_report(ROOT / 'docs' / 'report.png')
     README.write_text(readme(README.read_text(encoding='utf-8')), encoding='utf-8')
 
 

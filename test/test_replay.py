@@ -1116,6 +1116,7 @@ def test_measured_forces_tell_what_touched_the_platform(tmp_path: Path) -> None:
     documented = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
     summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
     names = set(PARAMETERS['joints'])
-    for key in keys_of(summary) - names - {f'{kind}_{axis}' for kind in ('force', 'moment')
-                                           for axis in 'xyz'}:
+    names |= {f'{kind}_{axis}{unit}' for kind, unit in (('force', '_n'), ('moment', '_n_m'))
+              for axis in 'xyz' for unit in ('', unit)}
+    for key in keys_of(summary) - names:
         assert re.search(rf'[`.]{key}\b', documented), key
