@@ -58,7 +58,7 @@ class Cause(Enum):
     CROSSED = 'det(J) changed its sign since the last sample'
 
 
-CAUSES = tuple(Cause)
+WARNING_CAUSES = tuple(Cause)
 
 
 @inlined
@@ -113,8 +113,8 @@ class Singularity(NamedTuple):
             thresholds(parameters), self.warning, self.stopped, self.determinant, determinant,
             determinant_rate, condition)
         return Singularity(
-            cause > 0, stopped, CAUSES[cause], determinant or self.determinant, time,
-            self.crossings + (CAUSES[cause] is Cause.CROSSED))
+            cause > 0, stopped, WARNING_CAUSES[cause], determinant or self.determinant, time,
+            self.crossings + (WARNING_CAUSES[cause] is Cause.CROSSED))
 
 
 def thresholds(parameters: Parameters) -> Array:

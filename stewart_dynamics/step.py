@@ -34,7 +34,7 @@ from stewart_dynamics.compiled import entry_point, source_digest
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.singularity import (
-    Cause, CAUSES, Singularity, state_after, thresholds, UNSOLVABLE_CONDITION)
+    Cause, Singularity, state_after, thresholds, UNSOLVABLE_CONDITION, WARNING_CAUSES)
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -188,8 +188,8 @@ class Outputs(NamedTuple):
     def singularity(self, n: int = -1) -> Singularity:
         """Return the state after one of them."""
         cause, stopped, determinant, time, crossings = self.states[n].tolist()
-        return Singularity(cause > 0.0, stopped > 0.0, CAUSES[int(cause)], determinant, time,
-                           int(crossings))
+        return Singularity(cause > 0.0, stopped > 0.0, WARNING_CAUSES[int(cause)], determinant,
+                           time, int(crossings))
 
 
 # A row of states.
@@ -251,7 +251,7 @@ def _entry_point(source: str) -> Callable[..., None]:
     return watch
 
 
-_CROSSED = CAUSES.index(Cause.CROSSED)
+_CROSSED = WARNING_CAUSES.index(Cause.CROSSED)
 _watch = _entry_point(source_digest('compiled', 'cdr', 'inverse_dynamics', 'singularity', 'step'))
 
 
@@ -303,8 +303,10 @@ class Step:
         results = self._platform.solve(setpoints.motions, setpoints.wrenches)
         many = len(results)
         past = before or Singularity()
-        state = np.array((CAUSES.index(past.cause) or past.warning, past.stopped,
-                          past.determinant, past.time_to_crossing, past.crossings), dtype=float)
+        # A warning may have been taken over without its cause.
+        cause = WARNING_CAUSES.index(past.cause) or past.warning
+        state = np.array((cause, past.stopped, past.determinant, past.time_to_crossing,
+                          past.crossings), dtype=float)
         forces, states = np.empty((many, 6)), np.empty((many, STATE))
         answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
         _watch(self._settings, setpoints.stamps, setpoints.restarts, state, results, forces,
