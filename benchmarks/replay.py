@@ -143,7 +143,7 @@ class Turn(NamedTuple):
     seconds: float
     """The whole program."""
     processor: float
-    """[s]"""
+    """Time of all cores together [s]; other programs that run hardly change it."""
     peak: float
     """Memory [MB]."""
     report: float
@@ -217,7 +217,7 @@ def make_bag(path: Path, setpoints: int) -> None:
         summary = written(*declared, Statistics(
             message_count=3 * setpoints, schema_count=3, channel_count=3, attachment_count=0,
             metadata_count=0, chunk_count=len(chunks), message_start_time=STEP,
-            message_end_time=end, channel_message_counts={n: setpoints for n in (1, 2, 3)}),
+            message_end_time=end, channel_message_counts=dict.fromkeys((1, 2, 3), setpoints)),
             *chunks)
         footer = written(Footer(
             summary_start=summary_start, summary_offset_start=0, summary_crc=0))[:-4]
@@ -258,11 +258,14 @@ def written(*records: McapRecord) -> bytes:
 def take_turn(one: Contestant, bag: Path, setpoints: int) -> Turn:
     """Let a contestant go through a bag; stop if it did not find every setpoint."""
     results = bag.with_name('results')
+    # Python's own compiled files are kept, as usual, but where the bags are.
+    environment = {**os.environ, 'PYTHONPYCACHEPREFIX': str(bag.with_name('pycache'))}
+    environment.pop('PYTHONDONTWRITEBYTECODE', None)
     before = processor_time()
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, '-c', one.program + ENDING, str(bag), str(results), *one.options],
-        capture_output=True, text=True)
+        capture_output=True, text=True, env=environment, cwd=bag.parent)
     seconds = time.perf_counter() - start
     processor = processor_time() - before
     if done.returncode:
@@ -294,7 +297,7 @@ def measure(bag: Path, setpoints: int, single: Path, rounds: int) -> dict[str, l
 
 def speed_table(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
     """Return what each took, beside what rosbags alone took in the same round."""
-    cells = [(f'{setpoints:,} setpoints', 's', 'min .. max', 'of it start', 'cores',
+    cells = [(f'{setpoints:,} setpoints', 's', 'min .. max', 'of it start', 'processor s',
               'times rosbags', 'min .. max', 'without start')]
     for one in CONTESTANTS:
         own, its = turns[one.name], turns[ALONE.name]
@@ -309,7 +312,7 @@ def speed_table(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
             one.name, f'{statistics.median(seconds):.2f}',
             f'{min(seconds):.2f} .. {max(seconds):.2f}',
             f'{statistics.median(turn.start.seconds for turn in own):.2f}',
-            f'{statistics.median(turn.whole.processor / turn.whole.seconds for turn in own):.1f}',
+            f'{statistics.median(turn.whole.processor for turn in own):.2f}',
             f'{statistics.median(ratios):.2f}',
             '' if one is ALONE else f'{min(ratios):.2f} .. {max(ratios):.2f}',
             f'{statistics.median(without_start):.2f}'))

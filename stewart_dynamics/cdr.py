@@ -252,8 +252,12 @@ class Layout:
             free[at:at + 8 * count] = True
             fields[f'numbers at {at}'] = (('<f8', (count,)), at)
             self._parts.append(f'numbers at {at}')
-        self._fixed = [f'byte {at}' for at in np.flatnonzero(~free).tolist()]
-        fields.update({name: ('u1', int(name[5:])) for name in self._fixed})
+        # What all have in common, in runs of bytes: what it is called, and what it is.
+        edges = np.flatnonzero(np.diff(free, prepend=True, append=True)).tolist()
+        self._fixed = {}
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            fields[f'fixed at {begin}'] = (f'V{end - begin}', begin)
+            self._fixed[f'fixed at {begin}'] = np.void(message[begin:end])
         self.dtype = np.dtype({
             'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
             'offsets': [at for _, at in fields.values()], 'itemsize': self.size})
@@ -284,10 +288,10 @@ class Layout:
             Where each begins; each is of ``size``.
 
         """
-        rows = at_any_byte(data, self.dtype)[starts]
+        rows = at_any_byte(data, self.size)[starts].view(self.dtype)
         stamps = rows['sec'] * np.int64(1_000_000_000) + rows['nanosec']
         alike = bool((rows['nanosec'] < 1_000_000_000).all()) and all(
-            bool((rows[name] == self._message[int(name[5:])]).all()) for name in self._fixed)
+            bool((rows[name] == fixed).all()) for name, fixed in self._fixed.items())
         if not alike:
             return None
         return stamps, np.concatenate([rows[name] for name in self._parts], axis=1)
@@ -301,17 +305,21 @@ class Layout:
             rows['sec'], rows['nanosec'] = np.divmod(stamps, 1_000_000_000)
         for name, values in zip(self._parts, numbers, strict=True):
             rows[name] = values
-        return rows
+        return rows.view(f'V{self.size}')
 
 
 FLOAT64_ARRAY = Layout(float64_array(_ZEROS), [(20, 6)], stamped=False)
 FLOAT64 = Layout(float64(0.0), [(4, 1)], stamped=False)
 
 
-def at_any_byte(data: NDArray[np.uint8], kind: np.dtype[Any]) -> NDArray[Any]:
-    """Return the entries of a type that begin at each of the bytes; they share its memory."""
-    many = max(data.size - kind.itemsize + 1, 0)
-    return np.ndarray((many,), kind, data.data, strides=(1,))
+def at_any_byte(data: NDArray[np.uint8], size: int) -> NDArray[np.void]:
+    """
+    Return the entries of a size that begin at each of the bytes; they share its memory.
+
+    They have no fields: numpy copies entries that have some field by field, far more slowly.
+    """
+    many = max(data.size - size + 1, 0)
+    return np.ndarray((many,), f'V{size}', data.data, strides=(1,))
 
 
 def finite(values: Sequence[float]) -> bool:

@@ -279,6 +279,8 @@ class Step:
             self._settings[_LIMITS + 6 * n:_LIMITS + 6 * n + 6] = self._limits.get(name, never)
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = cdr.JointState(parameters['joints'])
+        self._with_effort, self._without_effort = (
+            self._joint_state.layout(effort) for effort in (True, False))
 
     def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
         """
@@ -353,9 +355,9 @@ class Step:
         having, lacking = np.flatnonzero(solved), np.flatnonzero(~solved)
         stamps, rates, forces = outputs.stamps, outputs.rates, outputs.forces
         messages = [
-            ('leg_states', having, self._joint_state.layout(effort=True).write(
+            ('leg_states', having, self._with_effort.write(
                 stamps[having], positions[having], rates[having], forces[having])),
-            ('leg_states', lacking, self._joint_state.layout(effort=False).write(
+            ('leg_states', lacking, self._without_effort.write(
                 stamps[lacking], positions[lacking], rates[lacking])),
             ('leg_lengths', np.arange(len(stamps)), cdr.FLOAT64_ARRAY.write(
                 None, outputs.lengths)),

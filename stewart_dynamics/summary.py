@@ -16,8 +16,8 @@
 """
 What a motion asked of the legs, and how near a singularity it came.
 
-Samples come block after block and are not kept. What comes of them does not depend on where
-one block ends and the next begins; docs/summary.md says what each number means.
+Samples come block after block and are not kept. But for rounding, it does not matter where
+one block ends and the next begins. docs/summary.md says what each number means.
 """
 
 from __future__ import annotations

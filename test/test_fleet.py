@@ -44,6 +44,7 @@ import termios
 import time
 from typing import Any
 
+import dask
 from distributed import LocalCluster
 import messages
 import numpy as np
@@ -106,7 +107,7 @@ def bags(tmp_path: Path, long_bag: Path) -> Path:
 @pytest.fixture(scope='module')
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
     with LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None,
+            n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
             silence_logs=logging.CRITICAL,
             local_directory=f'{tmp_path_factory.mktemp("dask")}') as made:
         yield made
@@ -223,7 +224,7 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
                       ('none', 'no such file'), ('other', 'exists already')):
         line = ended[name].error
         assert line in told
-        assert line.startswith(f'{ended[name].bag}: ')
+        assert line.startswith(f'{ended[name].bag}')
         assert why in line
         row = rows(output)[f'{ended[name].bag}']
         assert row['error']
@@ -302,13 +303,36 @@ def test_a_bag_whose_processes_die_is_given_up(bags: Path, tmp_path: Path) -> No
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
     long = fleet.ended[0]
-    assert long.error == (f'{bags / "long"}: the process that replayed it died 2 times, the last '
-                          'time by signal SIGKILL (SIGKILL: was there too little memory?)')
+    assert long.error == (f'{bags / "long"}: the process that replayed it died 2 times; the last '
+                          'one was killed by SIGKILL (was there too little memory?)')
     assert not long.folder.exists()
     assert hidden(output) == []
     for bag, folder in pairs[1:]:
         check_whole(folder, bag)
     assert len(rows(output)) == len(pairs)
+
+
+def test_processes_that_cannot_begin_are_told_of_at_once(bags: Path, tmp_path: Path) -> None:
+    script = tmp_path / 'script.py'
+    script.write_text(
+        'from pathlib import Path\n'
+        'from stewart_dynamics import Parameters, StewartError\n'
+        'from stewart_dynamics.replay.bags import folders_of_results\n'
+        'from stewart_dynamics.replay.fleet import replay_fleet\n'
+        'from stewart_dynamics.replay.one import Options\n'
+        f'output = Path({str(tmp_path / "out")!r})\n'
+        f'pairs = folders_of_results([Path({str(bags)!r})], output)\n'
+        f'parameters = Parameters.from_yaml({str(PARAMS)!r})\n'
+        # what a process runs, too, that is started by this one
+        'try:\n'
+        '    replay_fleet(pairs, parameters, output, Options(), jobs=2)\n'
+        'except StewartError as exc:\n'
+        '    print(exc)\n', encoding='utf-8')
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60,
+                           check=False)
+    assert ended.stdout == ('a process that was to replay bags could not begin: ended with exit '
+                            'code 1\n')
+    assert "if __name__ == '__main__':" in ended.stderr
 
 
 def test_replaced_results_come_back_where_new_ones_were_never_whole(
@@ -399,6 +423,16 @@ def program(bags: Path, output: Path, *options: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
 
 
+@pytest.fixture
+def huge(bags: Path) -> Path:
+    """Return a folder of bags one of which takes many seconds: a recording in many files."""
+    shutil.copytree(bags / 'short', bags / 'more' / 'short')
+    (bags / 'more' / 'huge').mkdir()
+    for n in range(10):
+        os.link(bags / 'long' / 'long.mcap', bags / 'more' / 'huge' / f'huge_{n}.mcap')
+    return bags / 'more'
+
+
 def group_is_gone(leader: int) -> bool:
     try:
         os.killpg(leader, 0)
@@ -409,29 +443,29 @@ def group_is_gone(leader: int) -> bool:
 
 @pytest.mark.parametrize('where', ['here', 'processes', 'cluster'])
 def test_an_interrupt_leaves_nothing_half_done(
-        bags: Path, tmp_path: Path, where: str, cluster: LocalCluster) -> None:
+        huge: Path, tmp_path: Path, where: str, cluster: LocalCluster) -> None:
     output = tmp_path / 'out'
     options = {'here': (), 'processes': ('--jobs', '2'),
                'cluster': ('--scheduler', cluster.scheduler_address)}[where]
-    running = program(bags, output, *options)
-    until(lambda: process_in(output, 'long'), 'the middle of a bag')
+    running = program(huge, output, *options)
+    until(lambda: process_in(output, 'huge'), 'the middle of a bag')
     os.killpg(running.pid, signal.SIGINT)
     out, err = running.communicate(timeout=60)
     assert (running.returncode, out, err) == (130, '', '')
     assert hidden(output) == []
-    assert not (output / 'long').exists()
+    assert not (output / 'huge').exists()
     assert not (output / 'fleet.csv').exists()
     assert not (output / 'index.html').exists()
     until(lambda: group_is_gone(running.pid), 'the end of its processes')
     # those that were finished are whole
     for folder in (path.parent for path in output.rglob('summary.json')):
-        check_whole(folder, bags / folder.relative_to(output))
+        check_whole(folder, huge / folder.relative_to(output))
 
 
-def test_processes_end_with_the_one_that_started_them(bags: Path, tmp_path: Path) -> None:
+def test_processes_end_with_the_one_that_started_them(huge: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
-    running = program(bags, output, '--jobs', '2')
-    until(lambda: process_in(output, 'long'), 'the middle of a bag')
+    running = program(huge, output, '--jobs', '2')
+    until(lambda: process_in(output, 'huge'), 'the middle of a bag')
     running.kill()
     running.wait()
     until(lambda: group_is_gone(running.pid), 'the end of its processes')
@@ -485,29 +519,66 @@ def test_every_bag_is_done_once_though_a_worker_is_killed(
     check_each_once(fleet, pairs, output)
 
 
-def test_a_bag_that_kills_its_workers_is_given_up(
-        bags: Path, tmp_path: Path, cluster: LocalCluster) -> None:
+def test_a_bag_that_kills_its_workers_takes_no_other_along(
+        bags: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
-    killed: set[int] = set()
-
-    def another() -> int | None:
-        pid = process_in(output, 'long')
-        return pid if pid not in killed else None
-
-    with ThreadPoolExecutor() as apart:
+    # One death is enough for Dask to give up all bags that wait for the same worker.
+    with dask.config.set({'distributed.scheduler.allowed-failures': 0,
+                          'distributed.scheduler.worker-saturation': 3.0}), LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
+            silence_logs=logging.CRITICAL, local_directory=f'{tmp_path}') as cluster, \
+            ThreadPoolExecutor() as apart:
         running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
                                scheduler=cluster.scheduler_address)
-        for _ in range(4):
-            pid = until(another, 'another worker in the middle of it')
-            killed.add(pid)
-            os.kill(pid, signal.SIGKILL)
+        killed: set[int] = set()
+        while not running.done():
+            pid = process_in(output, 'long')
+            if pid is not None and pid not in killed:
+                killed.add(pid)
+                os.kill(pid, signal.SIGKILL)
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
-    assert 'all 4 workers that replayed it died' in fleet.ended[0].error
+    assert re.search(r'/long: the worker that replayed it died 2 times; the last one was at '
+                     r'tcp://\S+ \(was there too little memory\?\)$', fleet.ended[0].error)
+    assert len(killed) == 2
     assert hidden(output) == []
     for bag, folder in pairs[1:]:
         check_whole(folder, bag)
+
+
+def test_a_cluster_that_is_lost_is_said_of_each_bag(
+        huge: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    script = tmp_path / 'cluster.py'
+    script.write_text(
+        'import sys\n'
+        'from distributed import LocalCluster\n'
+        "if __name__ == '__main__':\n"
+        "    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address='127.0.0.1:0',"
+        f'\n                      local_directory={str(tmp_path)!r}) as cluster:\n'
+        '        print(cluster.scheduler_address, flush=True)\n'
+        '        sys.stdin.read()\n', encoding='utf-8')
+    output = tmp_path / 'out'
+    pairs = folders_of_results([huge], output)
+    lost = subprocess.Popen([sys.executable, script], stdin=subprocess.PIPE,
+                            stdout=subprocess.PIPE, text=True, start_new_session=True)
+    assert lost.stdout is not None
+    with ThreadPoolExecutor() as apart:
+        running = apart.submit(replay_fleet, pairs, PARAMETERS, output, PLAIN,
+                               scheduler=lost.stdout.readline().strip())
+        until(lambda: process_in(output, 'huge'), 'a worker in the middle of a bag')
+        os.killpg(lost.pid, signal.SIGKILL)
+        fleet = running.result()
+    lost.communicate()
+    failed = {each.bag: each.error for each in fleet.ended if each.code == BAD_INPUT}
+    assert huge / 'huge' in failed
+    assert all('connection' in error for error in failed.values())
+    for each in fleet.ended:
+        if each.bag not in failed:
+            check_whole(each.folder, each.bag)
+    assert set(rows(output)) == {f'{bag}' for bag, _ in pairs}
+    assert hidden(output) == []
+    assert 'Traceback' not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize('address', ['tcp://127.0.0.1:1', 'nonsense', 'foo://x', ''])

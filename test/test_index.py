@@ -138,7 +138,7 @@ class Page:
         page.on('dialog', lambda dialog: (self.complaints.append(dialog.message),
                                           dialog.dismiss()))
 
-    def open(self, folder: Path, rows: list[dict[str, Any]]) -> None:
+    def show(self, folder: Path, rows: list[dict[str, Any]]) -> None:
         write_fleet(folder, rows)
         self.page.goto((folder / 'index.html').as_uri())
 
@@ -193,7 +193,7 @@ def six() -> list[dict[str, Any]]:
 
 @in_browser
 def test_a_click_on_a_head_sorts(page: Page, tmp_path: Path) -> None:
-    page.open(tmp_path, six())
+    page.show(tmp_path, six())
     assert page.column('bag') == ['b', 'a10', 'a9', 'C', 'd', 'e']
     # by size, not as text; what has no value last
     assert page.sort('force_worst_n') == 'ascending'
@@ -218,7 +218,7 @@ def test_a_click_on_a_head_sorts(page: Page, tmp_path: Path) -> None:
 
 @in_browser
 def test_what_is_wrong_is_plain_to_see(page: Page, tmp_path: Path) -> None:
-    page.open(tmp_path, six())
+    page.show(tmp_path, six())
 
     def color(selector: str) -> list[int]:
         text = page.page.eval_on_selector(selector, 'it => getComputedStyle(it).color')
@@ -235,7 +235,7 @@ def test_what_is_wrong_is_plain_to_see(page: Page, tmp_path: Path) -> None:
 
 @in_browser
 def test_rows_are_chosen_by_result_and_by_text(page: Page, tmp_path: Path) -> None:
-    page.open(tmp_path, six())
+    page.show(tmp_path, six())
     buttons = page.page.locator('nav button')
     assert buttons.all_inner_texts() == ['all 6', 'done 2', 'limit met 2', 'partly read 1',
                                          'failed 1']
@@ -254,7 +254,7 @@ def test_rows_are_chosen_by_result_and_by_text(page: Page, tmp_path: Path) -> No
 
 @in_browser
 def test_hostile_names_are_text(page: Page, tmp_path: Path) -> None:
-    page.open(tmp_path, [
+    page.show(tmp_path, [
         *(row(name, 2, None, name) for name in HOSTILE),
         *(row(name, 0, summary([1.0]), results=name.replace('/', '_')) for name in HOSTILE)])
     shown = page.page.eval_on_selector_all(
@@ -273,7 +273,7 @@ def test_links_lead_to_reports(page: Page, tmp_path: Path) -> None:
     for name in names:
         (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / 'report.html').write_text(f'<title>{names.index(name)}</title>')
-    page.open(tmp_path, [row(name, 0, summary([1.0]), results=name) for name in names])
+    page.show(tmp_path, [row(name, 0, summary([1.0]), results=name) for name in names])
     links = page.page.eval_on_selector_all('tbody a', 'all => all.map((link) => link.href)')
     for n, link in enumerate(links):
         page.page.goto(link)
@@ -284,14 +284,14 @@ def test_links_lead_to_reports(page: Page, tmp_path: Path) -> None:
 @in_browser
 def test_a_bag_without_a_report_leads_to_its_folder(page: Page, tmp_path: Path) -> None:
     (tmp_path / 'x').mkdir()
-    page.open(tmp_path, [row('x', 0, summary([1.0]), results='x')])
+    page.show(tmp_path, [row('x', 0, summary([1.0]), results='x')])
     link = page.page.eval_on_selector('tbody a', 'link => link.href')
     assert link == (tmp_path / 'x').as_uri()
 
 
 @in_browser
 def test_thousands_of_bags(page: Page, tmp_path: Path) -> None:
-    page.open(tmp_path, [row(f'{n}', 0, summary([float(n % 997)])) for n in range(1500)])
+    page.show(tmp_path, [row(f'{n}', 0, summary([float(n % 997)])) for n in range(1500)])
     # a page that stays small, and a browser that is not asked for all rows at once
     assert (tmp_path / 'index.html').stat().st_size < 300_000
     assert 50 < len(page.column('bag')) < 500

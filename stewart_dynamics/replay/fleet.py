@@ -29,7 +29,9 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from importlib import import_module
 import json
+import logging
 import multiprocessing
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 import os
@@ -234,9 +236,10 @@ def _whole(task: _Task, code: int, summary: dict[str, Any], text: str = '') -> E
 
 
 def _failed(task: _Task, why: str) -> Ended:
-    why = ' '.join(why.split()).removeprefix(f'{task.bag}: ')
-    return Ended(task.bag, task.folder, BAD_INPUT, row_of(BAD_INPUT, None, why),
-                 error=f'{task.bag}: {why}')
+    why = ' '.join(why.split())
+    return Ended(task.bag, task.folder, BAD_INPUT,
+                 row_of(BAD_INPUT, None, why.removeprefix(f'{task.bag}: ')),
+                 error=why if why.startswith(f'{task.bag}') else f'{task.bag}: {why}')
 
 
 def _counted(number: int, tell: Callable[[int, int, int], None],
@@ -339,6 +342,8 @@ class _Worker(NamedTuple):
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
     """Keep Ctrl-C from a process that is started: it goes to all, and this one ends the others."""
+    # To start this one, which comes along with the first, would lift the block.
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -349,6 +354,7 @@ def _uninterrupted() -> Iterator[None]:
 def _work(pipe: Connection) -> None:
     """Replay the bags that come through a pipe until it is closed."""
     with suppress(EOFError, OSError):  # nobody is there any more
+        pipe.send(None)
         while True:
             task = pipe.recv()
             pipe.send(_replay_one(task, _counted(
@@ -360,6 +366,7 @@ def _in_processes(tasks: Sequence[_Task], jobs: int, bar: _Bar) -> _Results:
     waiting = deque(tasks)
     idle: list[_Worker] = []
     busy: dict[Any, tuple[_Worker, _Task]] = {}
+    began: set[Any] = set()
     deaths: Counter[int] = Counter()
     try:
         while waiting or busy:
@@ -376,14 +383,22 @@ def _in_processes(tasks: Sequence[_Task], jobs: int, bar: _Bar) -> _Results:
                     del busy[pipe]
                     worker.pipe.close()
                     worker.process.join()
+                    if pipe not in began and not _killed(worker.process):
+                        # no other would come any farther
+                        raise StewartError('a process that was to replay bags could not begin: '
+                                           f'{_death(worker.process)}') from None
                     deaths[task.number] += 1
                     bar.at(task.number, 0, 0)
                     if deaths[task.number] < _TRIES:
                         waiting.append(task)  # last, when there may be more memory
                         continue
-                    yield task.number, _finished(task) or _failed(task, _death(worker.process))
+                    yield task.number, _finished(task) or _failed(
+                        task, f'the process that replayed it died {_TRIES} times; the last one '
+                        f'{_death(worker.process)}')
                     continue
-                if isinstance(told, Ended):
+                if told is None:
+                    began.add(pipe)
+                elif isinstance(told, Ended):
                     del busy[pipe]
                     idle.append(worker)
                     yield task.number, told
@@ -398,12 +413,17 @@ def _in_processes(tasks: Sequence[_Task], jobs: int, bar: _Bar) -> _Results:
             worker.process.join()
 
 
+def _killed(process: BaseProcess) -> bool:
+    return (process.exitcode or 0) < 0
+
+
 def _death(process: BaseProcess) -> str:
     code = process.exitcode or 0
-    how = (f'with exit code {code}' if code >= 0
-           else f'by signal {signal.Signals(-code).name}')
-    hint = ' (SIGKILL: was there too little memory?)' if code == -signal.SIGKILL else ''
-    return f'the process that replayed it died {_TRIES} times, the last time {how}{hint}'
+    if not _killed(process):
+        return f'ended with exit code {code}'
+    name = next((each.name for each in signal.Signals if each == -code), f'signal {-code}')
+    return f'was killed by {name}' + (
+        ' (was there too little memory?)' if name == 'SIGKILL' else '')
 
 
 # On a cluster
@@ -421,33 +441,58 @@ def _on_cluster(tasks: Sequence[_Task], address: str, bar: _Bar) -> _Results:
     """Replay on a cluster; it begins a bag again whose worker died."""
     run = tasks[0].options.run if tasks else ''
     dask = _dask()
-    with _connected(dask, address) as client:
+    with _silent('distributed', 'distributed.client'), _connected(dask, address) as client:
         client.subscribe_topic(run, lambda event: bar.at(*event[1]))
         futures: dict[Any, _Task] = {}
+        suspects: list[_Task] = []
+
+        def submit(task: _Task, key: str) -> Any:
+            future = client.submit(
+                _on_worker, task._replace(bag=task.bag.absolute(), folder=task.folder.absolute()),
+                key=f'stewart_replay-{run}-{key}', pure=False)
+            futures[future] = task
+            return future
+
         try:
-            for task in tasks:
-                futures[client.submit(
-                    _on_worker, task._replace(
-                        bag=task.bag.absolute(), folder=task.folder.absolute()),
-                    key=f'stewart_replay-{run}-{task.number}', pure=False)] = task
-            for future in dask.as_completed(list(futures), loop=client.loop):
+            for future in dask.as_completed(
+                    [submit(task, f'{task.number}') for task in tasks], loop=client.loop):
                 # Let go of it here, or it would be done again when the worker that holds
                 # its result dies.
                 task = futures.pop(future)
                 try:
-                    ended = future.result()
+                    yield task.number, _result(dask, future, task)
+                except dask.KilledWorker:
+                    suspects.append(task)
+            # Bags that only waited for a worker that died count as if they had killed it: now
+            # each shows alone what it does.
+            for task in suspects:
+                future = submit(task, f'{task.number}-alone')
+                try:
+                    ended = _result(dask, future, task)
                 except dask.KilledWorker as exc:
-                    ended = _finished(task) or _failed(
-                        task, f'all {exc.allowed_failures + 1} workers that replayed it died, '
-                        f'the last one at {exc.last_worker.address}: was there too little memory?')
-                except Exception as exc:
-                    ended = _finished(task) or _failed(task, f'{type(exc).__name__}: {exc}')
+                    ended = _failed(
+                        task, 'the worker that replayed it died '
+                        f'{_TRIES * (exc.allowed_failures + 1)} times; the last one was at '
+                        f'{exc.last_worker.address} (was there too little memory?)')
+                del futures[future]
                 yield task.number, ended
         except BaseException:
             client.cancel(list(futures))
             with suppress(Exception):  # a worker that is gone has nothing to clear away
                 client.run(_stop, run)
             raise
+
+
+def _result(dask: Any, future: Any, task: _Task) -> Ended:
+    """Return what became of a bag; raises KilledWorker."""
+    try:
+        ended: Ended = future.result()
+    except Exception as exc:
+        finished = _finished(task)
+        if isinstance(exc, dask.KilledWorker) and finished is None:
+            raise
+        return finished or _failed(task, f'{type(exc).__name__}: {exc}')
+    return ended
 
 
 def _dask() -> Any:
@@ -457,6 +502,20 @@ def _dask() -> Any:
     except ImportError as exc:
         raise StewartError('a Dask scheduler was named, but Dask cannot be imported: pip install '
                            f"'stewart_dynamics[cluster]' ({exc})") from exc
+
+
+@contextmanager
+def _silent(*names: str) -> Iterator[None]:
+    """Keep loggers from saying, with a traceback, what is said of each bag in words."""
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 @contextmanager
@@ -483,14 +542,17 @@ def _on_worker(task: _Task) -> Ended:
     """Replay a bag in a thread of a worker."""
     worker, run = _dask().get_worker(), task.options.run
 
-    def tell(*how_far: int) -> None:
+    tell = _counted(
+        task.number, lambda *how_far: worker.log_event(run, how_far), _NOW_AND_THEN)
+
+    def progress(read: int, setpoints: int) -> None:
         if run in _cancelled:
             raise _Cancelled
-        worker.log_event(run, how_far)
+        tell(read, setpoints)
 
     _in_hand.add((run, task.number))
     try:
-        return _replay_one(task, _counted(task.number, tell, _NOW_AND_THEN))
+        return _replay_one(task, progress)
     finally:
         _in_hand.discard((run, task.number))
 

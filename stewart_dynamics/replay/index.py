@@ -197,7 +197,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
 def _shown(cell: Cell) -> Cell:
     """Return a number in the digits that a person reads."""
     if isinstance(cell, float):
-        return float(f'{cell:.6g}') if math.isfinite(cell) else None
+        return float(f'{cell:.9g}') if math.isfinite(cell) else None
     return cell
 
 

@@ -159,6 +159,8 @@ class _Run:
         self._parameters, self._options = parameters, options
         self._notices: list[str] = []
         self._notices_more = 0
+        if parameters['setpoint.source'] == 'pose' and options.cutoff is None:
+            self._notices.append('setpoint.source is pose: the forces are those at rest')
         self._setpoints = Setpoints(parameters, lambda refusal, details: None, self._notice)
         self._step = Step(parameters)
         self._state: Singularity | None = None

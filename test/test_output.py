@@ -1,0 +1,405 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a replay writes, as independent readers see it: the output bag and the tables."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable
+import csv
+import math
+from pathlib import Path
+import struct
+from typing import Any
+import zlib
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+from numpy.typing import NDArray
+import pyarrow.parquet
+import pytest
+from referees import ROOT
+from rosbags.highlevel import AnyReader
+from ruamel.yaml import YAML
+from scipy.spatial.transform import Rotation
+
+from stewart_dynamics import Parameters
+from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable
+from stewart_dynamics.replay.recording import Recording
+from stewart_dynamics.step import Batch, OUTPUT_TYPES, Outputs, STATE, Step
+
+PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
+    {'singularity.action': 'suppress_forces'})
+LEGS = tuple(PARAMETERS['joints'])
+STEP = Step(PARAMETERS)
+NODE = '/a_node'
+RECORDED = 1_700_000_000_000_000_000
+RESULTS = 27
+
+
+def turning(number: int, first: int = 0) -> Outputs:
+    """Return outputs of a platform that turns about the vertical through a singularity."""
+    n = np.arange(first, first + number)
+    motions = np.zeros((number, 24))
+    motions[:, 2] = 1.1
+    motions[:, 3:12] = Rotation.from_euler('z', 0.01 * n).as_matrix().reshape(-1, 9)
+    motions[:, 17] = 1.0
+    return STEP.many(Batch(1_000_000 * (n + 1), motions, np.zeros((number, 6)),
+                           np.zeros(number, dtype=bool), times_of(number, first)), None)
+
+
+def times_of(number: int, first: int = 0) -> NDArray[np.int64]:
+    return RECORDED + 1000 * np.arange(first, first + number, dtype=np.int64)
+
+
+def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:
+    bag = OutputBag(folder, NODE, STEP)
+    for times, outputs in blocks:
+        bag.write(times, outputs)
+    bag.close()
+    return folder
+
+
+@pytest.fixture(scope='module')
+def turned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outputs]:
+    """Return a bag of three chunks, and what is in it."""
+    outputs = turning(300)
+    assert 5 < np.isnan(outputs.forces[:, 0]).sum() < 50
+    parts = [Outputs(*(part[at:at + 100] for part in outputs)) for at in (0, 100, 200)]
+    return write_bag(tmp_path_factory.mktemp('turned') / 'a bag', [
+        (times_of(100, 100 * n), part) for n, part in enumerate(parts)]), outputs
+
+
+def file_of(bag: Path) -> Path:
+    return bag / f'{bag.name}.mcap'
+
+
+def check_message(topic: str, message: Any, outputs: Outputs, n: int) -> None:
+    """Check a message of the n-th output, as either reader gives it."""
+    stopped = bool(np.isnan(outputs.forces[n, 0]))
+    if topic == 'leg_states':
+        stamp = message.header.stamp
+        assert stamp.sec * 1_000_000_000 + stamp.nanosec == outputs.stamps[n]
+        assert tuple(message.name) == LEGS
+        assert np.array_equal(
+            message.position, outputs.lengths[n] - PARAMETERS['geometry.zero_length'])
+        assert np.array_equal(message.velocity, outputs.rates[n])
+        assert np.array_equal(message.effort, [] if stopped else outputs.forces[n])
+    elif topic == 'leg_lengths':
+        assert np.array_equal(message.data, outputs.lengths[n])
+    elif topic == 'leg_forces':
+        assert np.array_equal(message.data, outputs.forces[n])
+    elif topic == 'jacobian_determinant':
+        assert message.data == outputs.determinants[n]
+    else:
+        assert message.data == outputs.warnings[n]
+        assert outputs.changed[n]
+
+
+def expected_of(outputs: Outputs) -> dict[str, int]:
+    forces = int(np.isfinite(outputs.forces[:, 0]).sum())
+    many = len(outputs.stamps)
+    return {'leg_states': many, 'leg_lengths': many, 'leg_forces': forces,
+            'jacobian_determinant': many, 'singularity_warning': int(outputs.changed.sum())}
+
+
+def test_mcap_reads_the_numbers(turned: tuple[Path, Outputs]) -> None:
+    bag, outputs = turned
+    counts: Counter[str] = Counter()
+    with file_of(bag).open('rb') as file:
+        for _, channel, message, decoded in make_reader(
+                file, validate_crcs=True, decoder_factories=[DecoderFactory()],
+                ).iter_decoded_messages():
+            topic = channel.topic.removeprefix(f'{NODE}/')
+            counts[topic] += 1
+            assert message.publish_time == message.log_time
+            check_message(topic, decoded, outputs, (message.log_time - RECORDED) // 1000)
+    assert counts == expected_of(outputs)
+
+
+def test_rosbags_reads_the_numbers(turned: tuple[Path, Outputs]) -> None:
+    bag, outputs = turned
+    counts: Counter[str] = Counter()
+    with AnyReader([bag]) as reader:
+        for connection, time, data in reader.messages():
+            topic = connection.topic.removeprefix(f'{NODE}/')
+            counts[topic] += 1
+            check_message(topic, reader.deserialize(data, connection.msgtype), outputs,
+                          (time - RECORDED) // 1000)
+        assert {each.topic: each.msgcount for each in reader.connections} == {
+            f'{NODE}/{topic}': number for topic, number in counts.items()}
+        assert (reader.start_time, reader.end_time) == (RECORDED, RECORDED + 299_001)
+    assert counts == expected_of(outputs)
+
+
+def test_the_index_finds_every_message(turned: tuple[Path, Outputs]) -> None:
+    bag, _ = turned
+    every: list[tuple[str, int, bytes]] = []
+    channels = {}
+    with file_of(bag).open('rb') as file:
+        for record in StreamReader(file, validate_crcs=True).records:
+            if type(record).__name__ == 'Channel':
+                channels[record.id] = record.topic
+            elif type(record).__name__ == 'Message':
+                every.append((channels[record.channel_id], record.log_time, record.data))
+    assert [time for _, time, _ in every] == sorted(time for _, time, _ in every)
+    for topics in (None, [f'{NODE}/leg_forces'], [f'{NODE}/leg_states', f'{NODE}/leg_lengths']):
+        for start, end in ((None, None), (100_000, 200_000), (99_001, 99_002), (50_500, 260_001),
+                           (299_000, 999_000), (400_000, 500_000)):
+            begin = RECORDED + (start or 0)
+            until = RECORDED + (end or 1_000_000)
+            with file_of(bag).open('rb') as file:
+                found = [(channel.topic, message.log_time, message.data)
+                         for _, channel, message in make_reader(file, validate_crcs=True)
+                         .iter_messages(topics, starting_at=begin, ending_before=until)]
+            assert found == [each for each in every if begin <= each[1] < until
+                             and (topics is None or each[0] in topics)]
+
+
+def test_each_entry_of_the_index_points_at_its_message(turned: tuple[Path, Outputs]) -> None:
+    content = file_of(turned[0]).read_bytes()
+    with file_of(turned[0]).open('rb') as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    pointed = 0
+    for chunk in summary.chunk_indexes:
+        assert content[chunk.chunk_start_offset] == Opcode.CHUNK
+        behind = chunk.chunk_start_offset + chunk.chunk_length
+        # records of the index, one behind the other
+        assert min(chunk.message_index_offsets.values()) == behind
+        messages = behind - chunk.uncompressed_size
+        for channel, offset in chunk.message_index_offsets.items():
+            opcode, length = struct.unpack_from('<BQ', content, offset)
+            assert opcode == Opcode.MESSAGE_INDEX
+            assert offset + 9 + length <= behind + chunk.message_index_length
+            number, size = struct.unpack_from('<HI', content, offset + 9)
+            assert (number, size) == (channel, length - 6)
+            entries = list(struct.iter_unpack('<QQ', content[offset + 15:offset + 9 + length]))
+            assert [at for _, at in entries] == sorted(at for _, at in entries)
+            for time, at in entries:
+                code, _, of, _, logged = struct.unpack_from('<BQHIQ', content, messages + at)
+                assert (code, of, logged) == (Opcode.MESSAGE, channel, time)
+            assert chunk.message_start_time <= entries[0][0]
+            assert entries[-1][0] <= chunk.message_end_time
+            pointed += len(entries)
+    assert summary.statistics is not None
+    assert pointed == summary.statistics.message_count
+
+
+@pytest.mark.parametrize('number', [0, 1, 300])
+def test_statistics_checksum_and_metadata_agree(number: int, tmp_path: Path) -> None:
+    outputs = turning(number)
+    bag = write_bag(tmp_path / 'bag', [(times_of(number), outputs)])
+    expected = {f'{NODE}/{topic}': of for topic, of in expected_of(outputs).items()}
+    content = file_of(bag).read_bytes()
+    start, _, checksum = struct.unpack_from('<QQI', content, len(content) - 28)
+    assert zlib.crc32(content[start:-12]) == checksum
+    with file_of(bag).open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert reader.get_header().profile == 'ros2'
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == sum(expected.values())
+    assert {summary.channels[n].topic: of for n, of in
+            summary.statistics.channel_message_counts.items() if of} == {
+                topic: of for topic, of in expected.items() if of}
+    assert summary.statistics.chunk_count == len(summary.chunk_indexes) == bool(number)
+    assert summary.statistics.channel_count == len(summary.channels) == len(OUTPUT_TYPES)
+    assert summary.statistics.schema_count == len(summary.schemas)
+    begin, end = (RECORDED, RECORDED + 1000 * (number - 1)) if number else (0, 0)
+    assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (
+        begin, end)
+    document = YAML(typ='safe').load(bag / 'metadata.yaml')['rosbag2_bagfile_information']
+    assert document['message_count'] == sum(expected.values())
+    assert document['starting_time'] == {'nanoseconds_since_epoch': begin}
+    assert document['duration'] == {'nanoseconds': end - begin}
+    assert {each['topic_metadata']['name']: each['message_count']
+            for each in document['topics_with_message_count']} == expected
+    assert document['relative_file_paths'] == [file_of(bag).name]
+    with AnyReader([bag]) as reader2:
+        assert {each.topic: (each.msgtype, each.msgcount) for each in reader2.connections} == {
+            f'{NODE}/{topic}': (kind, expected[f'{NODE}/{topic}'])
+            for topic, kind in OUTPUT_TYPES.items()}
+    # it is a bag that this package reads
+    recording = Recording(bag)
+    assert recording.topics == {f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
+    many = sum(len(each.times) for each, _ in recording.messages(
+        {topic: topic for topic in recording.topics}))
+    recording.close()
+    assert many == sum(expected.values())
+    assert not recording.missing
+    assert not recording.notices
+
+
+def test_blocks_that_overlap_in_time_are_found_in_its_order(tmp_path: Path) -> None:
+    one, two = turning(50), turning(50, 50)
+    bag = write_bag(tmp_path / 'bag', [(times_of(50, 25), one), (times_of(50), two)])
+    with file_of(bag).open('rb') as file:
+        times = [message.log_time for _, channel, message in make_reader(file).iter_messages()
+                 if channel.topic.endswith('leg_states')]
+    assert times == sorted([*times_of(50, 25).tolist(), *times_of(50).tolist()])
+    document = YAML(typ='safe').load(bag / 'metadata.yaml')['rosbag2_bagfile_information']
+    assert document['starting_time'] == {'nanoseconds_since_epoch': RECORDED}
+    assert document['duration'] == {'nanoseconds': 74_000}
+
+
+def test_a_bag_in_many_blocks_has_the_messages_of_one(tmp_path: Path) -> None:
+    outputs = turning(60)
+    one = write_bag(tmp_path / 'one', [(times_of(60), outputs)])
+    many = write_bag(tmp_path / 'many', [
+        (times_of(1, n), Outputs(*(part[n:n + 1] for part in outputs))) for n in range(60)])
+    found = []
+    for bag in (one, many):
+        by_topic = defaultdict(list)
+        with file_of(bag).open('rb') as file:
+            for _, channel, message in make_reader(file).iter_messages():
+                by_topic[channel.topic].append((message.log_time, message.data))
+        found.append(by_topic)
+    assert found[0] == found[1]
+
+
+# The tables
+
+def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
+               stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
+    states = np.zeros((len(stamps), STATE))
+    states[:, 0] = warnings
+    flags = np.zeros(len(stamps), dtype=bool)
+    return Outputs(~flags, stamps, results, forces, states, flags, flags)
+
+
+def bits(values: Any) -> list[int]:
+    return [int(n) for n in np.asarray(values, dtype=float).view(np.uint64).ravel()]
+
+
+def read_csv(file: Path) -> tuple[list[str], list[list[str]]]:
+    with file.open(newline='', encoding='utf-8') as stream:
+        head, *rows = csv.reader(stream)
+    return head, rows
+
+
+def check_tables(folder: Path, blocks: list[Outputs]) -> None:
+    """Check that both tables give every number back to the bit."""
+    tables: list[Any] = [CsvTable(folder, LEGS), ParquetTable(folder, LEGS)]
+    for table in tables:
+        for outputs in blocks:
+            table.write(outputs)
+        table.close()
+    head, rows = read_csv(folder / 'legs.csv')
+    parquet = pyarrow.parquet.read_table(folder / 'legs.parquet')
+    assert parquet.column_names == head
+    columns = [parquet.column(n).to_pylist() for n in range(len(head))]
+    at = 0
+    for outputs in blocks:
+        for n in range(len(outputs.stamps)):
+            row, same = rows[at], [column[at] for column in columns]
+            expected = [*outputs.lengths[n], *outputs.rates[n], *outputs.forces[n],
+                        *outputs.demanded_forces[n], outputs.determinants[n],
+                        outputs.determinant_rates[n], outputs.conditions[n]]
+            assert int(row[0]) == same[0] == outputs.stamps[n]
+            assert len(row) == len(expected) + 2
+            for text, value, number in zip(row[1:-1], same[1:-1], expected, strict=True):
+                if math.isnan(number):
+                    assert (text, value) == ('', None)
+                else:
+                    assert bits(float(text)) == bits(value) == bits(number)
+            assert row[-1] == str(int(outputs.warnings[n]))
+            assert same[-1] is bool(outputs.warnings[n])
+            at += 1
+    assert at == len(rows) == parquet.num_rows
+
+
+def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
+    outputs = turning(300)
+    assert outputs.warnings.any()
+    assert np.isnan(outputs.forces).any()
+    check_tables(tmp_path, [outputs, turning(0), turning(1)])
+
+
+@given(st.data())
+@settings(deadline=None, max_examples=60)
+def test_the_tables_give_any_number_back(
+        tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    number = data.draw(st.integers(1, 4))
+    values = st.floats(allow_nan=False, allow_infinity=False)
+    some = data.draw(st.lists(values, min_size=8, max_size=40))
+    results = np.resize(some, (number, RESULTS))
+    forces = np.resize(some[3:], (number, 6))
+    if data.draw(st.booleans()):
+        forces[0] = np.nan
+        results[0, 12:18] = np.nan
+    stamps = data.draw(st.lists(st.integers(-(1 << 63), (1 << 63) - 1), min_size=number,
+                                max_size=number))
+    check_tables(tmp_path_factory.mktemp('table'), [outputs_of(
+        results, forces, np.array(stamps), np.arange(number) % 2 == 0)])
+
+
+def test_numbers_at_the_edges(tmp_path: Path) -> None:
+    edges = np.array([0.0, -0.0, 5e-324, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308,
+                      1e16, 1e17, 123456789012345680.0, 1e-5, 1e-7, 0.1, 1 / 3, 1e22, 1e23,
+                      9007199254740993.0])
+    rng = np.random.default_rng(1)
+    random = rng.integers(0, 1 << 64, 27_000, dtype=np.uint64).view(float)
+    random[~np.isfinite(random)] = 1.0
+    results = np.concatenate([np.resize(edges, (16, 27)), random.reshape(-1, 27)])
+    many = len(results)
+    check_tables(tmp_path, [outputs_of(
+        results, results[:, 5:11].copy(), np.arange(many), np.zeros(many, dtype=bool))])
+
+
+@pytest.mark.parametrize('table', [CsvTable, ParquetTable])
+def test_names_of_legs_come_back_whatever_they_are(table: Any, tmp_path: Path) -> None:
+    legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
+    writer = table(tmp_path, legs)
+    writer.write(turning(2))
+    writer.close()
+    if table is CsvTable:
+        head, rows = read_csv(tmp_path / 'legs.csv')
+        assert [len(row) for row in rows] == [len(head)] * 2
+    else:
+        head = pyarrow.parquet.read_table(tmp_path / 'legs.parquet').column_names
+    assert [name.removesuffix(' length (m)') for name in head[1:7]] == list(legs)
+    assert [name.removesuffix(' force (N)') for name in head[13:19]] == list(legs)
+
+
+@pytest.mark.parametrize('table', [CsvTable, ParquetTable])
+def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
+    writer = table(tmp_path, LEGS)
+    writer.write(turning(0))
+    writer.close()
+    file, = tmp_path.iterdir()
+    if table is CsvTable:
+        assert len(read_csv(file)[0]) == 29
+        assert not read_csv(file)[1]
+    else:
+        assert pyarrow.parquet.read_table(file).shape == (0, 29)
+
+
+def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
+    outputs = turning(1000)
+    table = ParquetTable(tmp_path, LEGS)
+    for _ in range(100):
+        table.write(outputs)
+    table.close()
+    file = pyarrow.parquet.ParquetFile(tmp_path / 'legs.parquet')
+    assert file.metadata.num_rows == 100_000
+    assert file.metadata.num_row_groups == 2

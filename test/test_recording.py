@@ -1,0 +1,870 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Bags as recorders, crashes and bad disks leave them: what is read of each, and what is said."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from io import BytesIO
+import math
+import os
+from pathlib import Path
+import random
+import sqlite3
+import tracemalloc
+from typing import Any, NamedTuple
+import zlib
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
+from mcap.writer import CompressionType, IndexType
+from mcap.writer import Writer as McapWriter
+import messages
+from messages import STORE
+import pytest
+from referees import ROOT
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+import zstandard
+
+from stewart_dynamics import BagError, Parameters
+from stewart_dynamics.replay.main import main
+from stewart_dynamics.replay.one import (
+    BAD_INPUT, DONE, NODE, Options, PARTLY_READ, replay)
+from stewart_dynamics.replay.recording import Recording
+from stewart_dynamics.setpoints import ACCEL, INPUT_TYPES, POSE, TWIST
+
+PARAMS = ROOT / 'config' / 'platform.yaml'
+PARAMETERS = Parameters.from_yaml(PARAMS)
+MS = 1_000_000
+RECORDED = 1_700_000_000_000 * MS
+MAGIC = b'\x89MCAP0\r\n'
+WITHOUT_INDEX: dict[str, Any] = {
+    'index_types': IndexType.NONE, 'repeat_channels': False, 'repeat_schemas': False,
+    'use_statistics': False, 'use_summary_offsets': False}
+# How mcap's writer writes the bags that are damaged here.
+KINDS: dict[str, dict[str, Any]] = {
+    'plain': {},
+    'lz4': {'compression': CompressionType.LZ4},
+    'zstd': {'compression': CompressionType.ZSTD},
+    'without an index': WITHOUT_INDEX,
+    'without a summary': {**WITHOUT_INDEX, 'index_types': IndexType.MESSAGE},
+}
+
+Recorded = tuple[str, int, bytes]
+
+
+class Read(NamedTuple):
+    messages: list[Recorded]
+    missing: list[str]
+    notices: list[str]
+
+
+def read(bag: Path, *topics: str) -> Read:
+    """Return a bag's messages in the order in which they are handed over."""
+    recording = Recording(bag)
+    try:
+        keys = {topic: topic for topic in topics or recording.topics}
+        found = [each for block, _ in recording.messages(keys) for each in block.each()]
+        return Read(found, recording.missing, recording.notices)
+    finally:
+        recording.close()
+
+
+def motion(number: int) -> list[Recorded]:
+    """Return setpoints 10 ms apart: a slow heave."""
+    found = []
+    for n in range(1, number + 1):
+        t, stamp, when = 0.01 * n, n * 10 * MS, RECORDED + n * 10 * MS
+        for k, (topic, data) in enumerate((
+                (POSE, messages.pose(stamp, (0.0, 0.0, 1.1 + 0.05 * math.sin(t)))),
+                (TWIST, messages.twist(stamp, (0.0, 0.0, 0.05 * math.cos(t), 0, 0, 0))),
+                (ACCEL, messages.accel(stamp, (0.0, 0.0, -0.05 * math.sin(t), 0, 0, 0))))):
+            found.append((f'{NODE}/{topic}', when + k, data))
+    return found
+
+
+TYPES = {f'{NODE}/{topic}': kind for topic, kind in INPUT_TYPES.items()}
+
+
+def mcap(of: Iterable[Recorded], **options: Any) -> bytes:
+    """Return a bag as mcap's own writer writes it, in small chunks unless told otherwise."""
+    stream = BytesIO()
+    writer = McapWriter(stream, **{
+        'chunk_size': 2000, 'compression': CompressionType.NONE, **options})
+    writer.start('ros2')
+    channels: dict[str, int] = {}
+    for topic, when, data in of:
+        if topic not in channels:
+            kind = TYPES.get(topic, 'std_msgs/msg/String')
+            definition, _ = STORE.generate_msgdef(kind, ros_version=2)
+            channels[topic] = writer.register_channel(
+                topic, 'cdr', writer.register_schema(kind, 'ros2msg', definition.encode()))
+        writer.add_message(channels[topic], when, data, when)
+    writer.finish()
+    return stream.getvalue()
+
+
+def record(of: Any) -> bytes:
+    builder = RecordBuilder()
+    of.write(builder)
+    return bytes(builder.end())
+
+
+def channel(number: int, topic: str, schema: int = 1, encoding: str = 'cdr') -> bytes:
+    return record(Channel(id=number, topic=topic, message_encoding=encoding, metadata={},
+                          schema_id=schema))
+
+
+def schema(number: int, name: str) -> bytes:
+    return record(Schema(id=number, data=b'', encoding='ros2msg', name=name))
+
+
+def message(number: int, when: int, data: bytes = b'\0\1\0\0') -> bytes:
+    return record(Message(channel_id=number, log_time=when, data=data, publish_time=when,
+                          sequence=0))
+
+
+def chunk(content: bytes, start: int = 0, size: int | None = None, checksum: int | None = None,
+          compression: str = '', packed: bytes | None = None) -> bytes:
+    return record(Chunk(
+        compression=compression, data=content if packed is None else packed,
+        message_end_time=0, message_start_time=start,
+        uncompressed_crc=zlib.crc32(content) if checksum is None else checksum,
+        uncompressed_size=len(content) if size is None else size))
+
+
+def file_of(*records: bytes, checksum: int | None = 0) -> bytes:
+    """Return a file of these records without a summary; checksum: None for the right one."""
+    begin = MAGIC + record(Header(profile='ros2', library='')) + b''.join(records)
+    return begin + record(DataEnd(data_section_crc=zlib.crc32(begin) if checksum is None else
+                                  checksum)) + record(
+        Footer(summary_start=0, summary_offset_start=0, summary_crc=0)) + MAGIC
+
+
+def records_of(content: bytes) -> Iterator[tuple[int, int]]:
+    """Yield where each record of a file begins, and how long it is."""
+    at = len(MAGIC)
+    while at < len(content) - len(MAGIC):
+        length = 9 + int.from_bytes(content[at + 1:at + 9], 'little')
+        yield at, length
+        at += length
+
+
+def is_part(part: Iterable[Any], whole: Iterable[Any]) -> bool:
+    """Return whether these are some of those, in the same order."""
+    rest = iter(whole)
+    return all(each in rest for each in part)
+
+
+def check(file: Path, whole: list[Recorded]) -> bool:
+    """Check what is read of a damaged file; return whether all of it was."""
+    try:
+        found = read(file)
+    except BagError as exc:
+        assert '\n' not in str(exc)
+        return False
+    assert is_part(found.messages, whole)
+    assert len(found.messages) == len(whole) or found.missing
+    assert all('\n' not in said for said in found.missing)
+    return len(found.messages) == len(whole)
+
+
+# Damage
+
+def cut(content: bytes, chance: random.Random) -> bytes:
+    return content[:chance.randrange(len(content))]
+
+
+def flipped(content: bytes, chance: random.Random) -> bytes:
+    spoiled = bytearray(content)
+    for _ in range(chance.choice((1, 1, 1, 2, 5, 20))):
+        spoiled[chance.randrange(len(spoiled))] ^= chance.randrange(1, 256)
+    return bytes(spoiled)
+
+
+def zeroed(content: bytes, chance: random.Random) -> bytes:
+    """Return what a file system may leave after a loss of power."""
+    at = chance.randrange(len(content))
+    size = min(chance.choice((16, 512, 4096)), len(content) - at)
+    return content[:at] + bytes(size) + content[at + size:]
+
+
+def shifted(content: bytes, chance: random.Random) -> bytes:
+    at = chance.randrange(len(content))
+    if chance.random() < 0.5:
+        return content[:at] + content[at + chance.choice((1, 9, 100, 4096)):]
+    return content[:at] + chance.randbytes(chance.choice((1, 9, 100))) + content[at:]
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('spoil', [cut, flipped, zeroed, shifted])
+def test_a_damaged_bag_gives_nothing_wrong_and_never_silently_less(
+        spoil: Callable[[bytes, random.Random], bytes], kind: str, tmp_path: Path) -> None:
+    given_ = motion(60)
+    content = mcap(given_, **KINDS[kind])
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(content)
+    assert read(file) == (given_, [], [])
+    chance = random.Random(f'{spoil.__name__} {kind}')
+    for _ in range(200):
+        file.write_bytes(spoil(content, chance))
+        check(file, given_)
+
+
+@pytest.mark.parametrize('spoil', [cut, flipped])
+def test_the_rows_of_a_damaged_bag_are_rows_of_the_whole_one(
+        spoil: Callable[[bytes, random.Random], bytes], tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    content = mcap(motion(60), compression=CompressionType.LZ4)
+    file = tmp_path / 'bag.mcap'
+
+    def run(content: bytes, out: Path) -> tuple[int, list[str], str]:
+        """Return the exit code, the rows and what is said to be wrong."""
+        file.write_bytes(content)
+        code = main([str(file), '--params', str(PARAMS), '--output', str(out), '--no-report'])
+        table = out / 'bag' / 'legs.csv'
+        rows = table.read_text().splitlines() if table.exists() else []
+        return code, rows, capsys.readouterr().err
+
+    code, whole, err = run(content, tmp_path / 'whole')
+    assert (code, len(whole), err) == (DONE, 61, '')
+    chance = random.Random(3)
+    ends: Counter[int] = Counter()
+    for n in range(200):
+        code, rows, err = run(spoil(content, chance), tmp_path / f'{n}')
+        ends[code] += 1
+        assert is_part(rows, whole)
+        assert code in (DONE, BAD_INPUT, PARTLY_READ)
+        if code == DONE:
+            assert (rows, err) == (whole, '')
+        else:
+            assert err.count('\n') == 1
+            assert bool(rows) is (code == PARTLY_READ)
+    assert ends[PARTLY_READ] > 100
+
+
+@pytest.mark.parametrize('kind', ['plain', 'without a summary'])
+def test_no_bit_of_the_chain_of_records_can_mislead(kind: str, tmp_path: Path) -> None:
+    given_ = motion(16)
+    content = mcap(given_, chunk_size=1000, **KINDS[kind])
+    file = tmp_path / 'bag.mcap'
+    whole = 0
+    for at, _ in records_of(content):
+        for bit in range(32):
+            spoiled = bytearray(content)
+            spoiled[at + bit // 8] ^= 1 << bit % 8
+            file.write_bytes(spoiled)
+            whole += check(file, given_)
+    assert whole > 300
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_bag_cut_by_twenty_bytes_is_read_to_its_end(kind: str, tmp_path: Path) -> None:
+    given_ = motion(60)
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(mcap(given_, **KINDS[kind])[:-20])
+    found = read(file)
+    assert found.messages == given_
+    assert found.missing
+    replayed = replay(file, PARAMETERS, tmp_path / 'out', Options(report=False))
+    assert replayed.code == PARTLY_READ
+    assert replayed.summary['setpoints']['answered'] == 60
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_damage_costs_no_more_than_its_chunk(kind: str, tmp_path: Path) -> None:
+    given_ = motion(60)
+    content = mcap(given_, **KINDS[kind])
+    file = tmp_path / 'bag.mcap'
+    chunks = [at for at, _ in records_of(content) if content[at] == Opcode.CHUNK]
+    assert len(chunks) > 3
+    # all topics are declared before it
+    for at in (chunks[2], chunks[2] + 4, chunks[2] + 45, chunks[2] + 90):
+        spoiled = bytearray(content)
+        spoiled[at:at + 20] = b'\xff' * 20
+        file.write_bytes(spoiled)
+        found = read(file)
+        assert is_part(found.messages, given_)
+        lost = [n for n, each in enumerate(given_) if each not in found.messages]
+        assert lost == list(range(lost[0], lost[-1] + 1))
+        assert len(lost) < 2 * len(given_) / len(chunks)
+        assert any(f'byte {chunks[2]}' in said for said in found.missing)
+
+
+def test_chunks_are_in_order_although_a_time_in_a_head_is_wrong(tmp_path: Path) -> None:
+    given_ = motion(60)
+    file = tmp_path / 'bag.mcap'
+    for kind in ('plain', 'without a summary'):
+        content = mcap(given_, **KINDS[kind])
+        at = [at for at, _ in records_of(content) if content[at] == Opcode.CHUNK][2] + 9
+        for time in (0, RECORDED + 300 * MS, RECORDED + 10_000 * MS, 1 << 63, (1 << 64) - 1):
+            file.write_bytes(content[:at] + time.to_bytes(8, 'little') + content[at + 8:])
+            found = read(file)
+            assert found.messages == given_ or (kind != 'plain' and found.missing)
+            assert is_part(found.messages, given_)
+
+
+def test_a_topic_that_two_records_declare_differently_is_not_used(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    content = chunk(message(2, 5) + message(3, 6), 5)
+    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'), channel(2, '/b'),
+                             channel(3, '/c'), content))
+    found = read(file)
+    assert [topic for topic, _, _ in found.messages] == ['/c']
+    assert found.missing == ['bag.mcap: /b: declared differently by two records']
+    # also within a chunk
+    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'), channel(3, '/c'),
+                             chunk(channel(2, '/b') + message(2, 5) + message(3, 6), 5)))
+    assert [topic for topic, _, _ in read(file).messages] == ['/c']
+
+
+def test_messages_of_a_topic_that_nothing_declares_are_missing(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'),
+                             chunk(message(2, 5) + message(3, 6), 5), chunk(message(3, 7), 7)))
+    found = read(file)
+    assert [(topic, when) for topic, when, _ in found.messages] == [('/a', 5)]
+    assert found.missing == ['bag.mcap: messages of a topic that no whole record declares']
+
+
+# Files as recorders write them
+
+def test_unchunked_bags_are_read_and_said_to_have_no_checksums(tmp_path: Path) -> None:
+    given_ = motion(30)
+    file = tmp_path / 'bag.mcap'
+    for options in ({}, WITHOUT_INDEX):  # the latter is rosbag2's preset fastwrite
+        content = mcap(given_, use_chunking=False, **options)
+        file.write_bytes(content)
+        found = read(file)
+        assert found[:2] == (given_, [])
+        assert len(found.notices) == 1
+        # what comes before a cut is read
+        file.write_bytes(content[:len(content) // 2])
+        found = read(file)
+        assert 30 < len(found.messages) < 60
+        assert found.messages == given_[:len(found.messages)]
+        assert found.missing
+        assert 'no checksums' in found.notices[0]
+
+
+def test_a_checksum_of_the_file_covers_messages_outside_of_chunks(tmp_path: Path) -> None:
+    given_ = motion(30)
+    file = tmp_path / 'bag.mcap'
+    content = mcap(given_, use_chunking=False, enable_data_crcs=True)
+    file.write_bytes(content)
+    assert read(file) == (given_, [], [])
+    chance = random.Random(5)
+    for _ in range(100):
+        at = chance.randrange(len(content))
+        file.write_bytes(content[:at] + bytes([content[at] ^ 0x10]) + content[at + 1:])
+        found = read(file)
+        # it cannot be checked where the end of the chain of records is not found
+        assert is_part(found.messages, given_) or (found.missing and found.notices)
+        assert found.messages == given_ or found.missing
+
+
+def test_messages_among_chunks_need_a_checksum(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    records = (schema(1, 'a/msg/A'), channel(2, '/a'), chunk(message(2, 5), 5), message(2, 3),
+               chunk(message(2, 1), 1))
+    file.write_bytes(file_of(*records, checksum=None))
+    assert [when for _, when, _ in read(file).messages] == [1, 3, 5]
+    for checksum, word in ((0, 'no checksum'), (1, 'is wrong')):
+        file.write_bytes(file_of(*records, checksum=checksum))
+        found = read(file)
+        assert [when for _, when, _ in found.messages] == [1, 5]
+        assert word in found.missing[0]
+
+
+def test_chunks_without_checksums_are_said_to_have_none(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'),
+                             chunk(message(2, 5), 5, checksum=0)))
+    found = read(file)
+    assert (len(found.messages), found.missing) == (1, [])
+    assert 'no checksums' in found.notices[0]
+
+
+def test_attachments_and_metadata_stand_between_without_harm(tmp_path: Path) -> None:
+    given_ = motion(20)
+    stream = BytesIO()
+    writer = McapWriter(stream, chunk_size=500, compression=CompressionType.NONE)
+    writer.start('ros2')
+    number = writer.register_schema('geometry_msgs/msg/PoseStamped', 'ros2msg', b'')
+    channels = {topic: writer.register_channel(topic, 'cdr', number)
+                for topic in dict.fromkeys(topic for topic, _, _ in given_)}
+    for n, (topic, when, data) in enumerate(given_):
+        writer.add_message(channels[topic], when, data, when)
+        if n % 5 == 0:
+            # among them one that looks like a chunk
+            writer.add_attachment(when, when, 'ü', 'text/plain', mcap(given_)[:3000 * n])
+            writer.add_metadata('rosbag2', {'a': 'b' * n, 'ü': ''})
+    writer.finish()
+    file = tmp_path / 'bag.mcap'
+    for content in (stream.getvalue(), stream.getvalue()[:-20]):
+        file.write_bytes(content)
+        assert read(file).messages == given_
+
+
+def test_bags_without_definitions_have_their_types_by_name(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(file_of(
+        channel(1, '/before', schema=7), schema(7, 'a/msg/A'), channel(2, '/without', schema=0),
+        channel(3, '/json', schema=7, encoding='json'), channel(4, '/two', schema=7),
+        channel(5, '/two', schema=7), channel(6, '/mixed', schema=7),
+        channel(7, '/mixed', schema=7, encoding='json')))
+    recording = Recording(file)
+    recording.close()
+    assert recording.topics == {
+        '/before': 'a/msg/A', '/without': 'message without a type',
+        '/json': 'a/msg/A encoded as json', '/two': 'a/msg/A',
+        '/mixed': 'a/msg/A and a/msg/A encoded as json'}
+
+
+def test_two_channels_of_a_topic_are_one(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(file_of(
+        schema(1, 'a/msg/A'), channel(65535, '/a'), channel(0, '/a'), channel(3, '/b'),
+        chunk(message(0, 2) + message(3, 1) + message(65535, 1), 1)))
+    assert [when for _, when, _ in read(file, '/a').messages] == [1, 2]
+    assert [when for _, when, _ in read(file).messages] == [1, 1, 2]
+
+
+def test_times_that_no_clock_shows(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    times = [0, (1 << 63) - 1, 1 << 63, (1 << 64) - 1]
+    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(1, '/a'), *(
+        chunk(message(1, time), time) for time in reversed(times))))
+    assert [when for _, when, _ in read(file).messages] == [0, *[(1 << 63) - 1] * 3]
+
+
+def test_empty_bags(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    for content in (mcap([]), file_of(), file_of(chunk(b''))):
+        file.write_bytes(content)
+        assert read(file) == ([], [], [])
+    for content in (b'', MAGIC[:4], b'\0' * 100, b'MCAP'):
+        file.write_bytes(content)
+        with pytest.raises(BagError, match='not a bag'):
+            Recording(file)
+    for content in (MAGIC, mcap([])[:30]):
+        file.write_bytes(content)
+        assert read(file).missing
+
+
+# Order
+
+@given(st.lists(st.tuples(st.sampled_from('abc'), st.integers(0, 12), st.integers(1, 300)),
+                min_size=1, max_size=60))
+@settings(deadline=None, max_examples=100)
+def test_messages_come_in_the_order_in_which_rosbags_has_them(
+        tmp_path_factory: pytest.TempPathFactory, of: list[tuple[str, int, int]]) -> None:
+    # chunks overlap in any way, and are not in order, nor are the messages in them
+    written = [(f'/{topic}', RECORDED + when, n.to_bytes(4, 'big') + bytes(size))
+               for n, (topic, when, size) in enumerate(of)]
+    file = tmp_path_factory.mktemp('order') / 'bag.mcap'
+    file.write_bytes(mcap(written, chunk_size=600))
+    with AnyReader([file]) as reader:
+        expected = [(each.topic, when, bytes(data)) for each, when, data in reader.messages()]
+    assert read(file) == (expected, [], [])
+    assert [when for _, when, _ in expected] == sorted(when for _, when, _ in written)
+    some = [each for each in expected if each[0] == '/a']
+    if some:
+        assert read(file, '/a').messages == some
+    # rosbags reads nothing of the like
+    file.write_bytes(mcap(written, use_chunking=False))
+    assert read(file).messages == sorted(written, key=lambda each: each[1])
+
+
+def test_topics_that_stand_one_behind_the_other_are_read_together(tmp_path: Path) -> None:
+    given_ = motion(3000)
+    file = tmp_path / 'bag.mcap'
+    by_topic = sorted(given_, key=lambda each: each[0])
+    for options in ({'chunk_size': 20_000}, {'use_chunking': False}):
+        file.write_bytes(mcap(by_topic, **options))
+        assert read(file).messages == given_
+
+
+# Memory
+
+def peak_of(file: Path, *topics: str) -> int:
+    read(file, *topics)  # what is compiled and loaded once does not count
+    tracemalloc.start()
+    try:
+        recording = Recording(file)
+        for _ in recording.messages({topic: topic for topic in topics or recording.topics}):
+            pass
+        recording.close()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_large_messages_between_do_not_stay_in_memory(tmp_path: Path) -> None:
+    given_ = [('/image', RECORDED + 10 * MS * n + 5, bytes(2_000_000)) for n in range(1, 31)]
+    file = tmp_path / 'bag.mcap'
+    ordered = sorted([*motion(30), *given_], key=lambda each: each[1])
+    for options in ({}, {'use_chunking': False}, {'compression': CompressionType.ZSTD}):
+        file.write_bytes(mcap(ordered, **options))
+        assert peak_of(file, *TYPES) < 12_000_000
+
+
+def test_long_bags_do_not_stay_in_memory(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    peaks = []
+    for number in (40_000, 160_000):
+        of = [(topic, n, bytes(92)) for topic in ('/a', '/b') for n in range(number)]
+        file.write_bytes(mcap(of, chunk_size=100_000, index_types=IndexType.CHUNK))
+        peaks.append(peak_of(file))
+    assert file.stat().st_size > 30_000_000
+    assert peaks[1] < 1.2 * peaks[0] < 8_000_000
+
+
+def test_attachments_are_not_read_into_memory(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    attachment = record(Attachment(create_time=0, log_time=0, name='film', media_type='video/mp4',
+                                   data=bytes(40_000_000)))
+    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(1, '/a'), chunk(message(1, 1), 1),
+                             attachment, chunk(message(1, 2), 2)))
+    assert read(file)[1:] == ([], [])
+    assert peak_of(file) < 6_000_000
+
+
+@pytest.mark.parametrize('compression', ['', 'lz4', 'zstd'])
+def test_what_a_chunk_says_of_its_size_is_not_believed(
+        compression: str, tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    frame = zstandard.ZstdCompressor().compress(bytes(50_000_000))
+    for size in (3, 1 << 20, 1 << 40, (1 << 64) - 1):
+        file.write_bytes(file_of(
+            schema(1, 'a/msg/A'), channel(1, '/a'), chunk(message(1, 1), 1),
+            chunk(b'', 2, size, 1, compression, packed=frame if compression == 'zstd' else
+                  b'\x04\x22\x4d\x18' + frame)))
+        found = read(file)
+        assert (len(found.messages), len(found.missing)) == (1, 1)
+        assert peak_of(file) < 10_000_000
+
+
+# Whatever bytes
+
+@given(st.binary(max_size=300), st.sampled_from([MAGIC, b'SQLite format 3\0', b'']),
+       st.sampled_from(['.mcap', '.db3', '.mcap.zstd']))
+@settings(deadline=None, max_examples=300)
+def test_no_bytes_make_it_crash(
+        tmp_path_factory: pytest.TempPathFactory, content: bytes, begin: bytes, suffix: str,
+        ) -> None:
+    file = tmp_path_factory.mktemp('bytes') / f'bag{suffix}'
+    file.write_bytes(begin + content)
+    try:
+        found = read(file)
+    except BagError as exc:
+        assert '\n' not in str(exc)
+    else:
+        assert not found.messages
+        assert found.missing
+
+
+RECORDS = st.one_of(
+    st.builds(lambda code, content: bytes([code]) + len(content).to_bytes(8, 'little') + content,
+              st.integers(0, 255), st.binary(max_size=60)),
+    st.builds(lambda code, length: bytes([code]) + length.to_bytes(8, 'little'),
+              st.integers(0, 16), st.integers(0, (1 << 64) - 1)),
+    st.builds(message, st.integers(0, 3), st.integers(0, 9)),
+    st.builds(channel, st.integers(0, 3), st.sampled_from(['/a', '/b']), st.integers(0, 2)),
+    st.builds(schema, st.integers(0, 2), st.sampled_from(['a/msg/A', 'b/msg/B'])))
+
+
+@given(st.lists(st.one_of(RECORDS, st.builds(
+    lambda of, start, name: chunk(b''.join(of), start, compression=name),
+    st.lists(RECORDS, max_size=6), st.integers(0, 9), st.sampled_from(['', '', '', 'lz4'])))))
+@settings(deadline=None, max_examples=300)
+def test_no_records_make_it_crash(
+        tmp_path_factory: pytest.TempPathFactory, of: list[bytes]) -> None:
+    file = tmp_path_factory.mktemp('records') / 'bag.mcap'
+    file.write_bytes(file_of(*of))
+    times = [when for _, when, _ in read(file).messages]
+    assert times == sorted(times)
+
+
+# sqlite3
+
+def write_bag(folder: Path, of: Iterable[Recorded], plugin: StoragePlugin = StoragePlugin.SQLITE3,
+              mode: CompressionMode = CompressionMode.NONE) -> Path:
+    """Write a rosbag2 by rosbags."""
+    writer = Writer(folder, version=9, storage_plugin=plugin)
+    if mode is not CompressionMode.NONE:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for topic, when, data in of:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, TYPES[topic], typestore=STORE)
+            writer.write(connections[topic], when, data)
+    return folder
+
+
+def storage(folder: Path) -> Path:
+    found, = (path for path in folder.iterdir() if path.name != 'metadata.yaml')
+    return found
+
+
+def test_sqlite3_is_read_in_the_order_of_time(tmp_path: Path) -> None:
+    given_ = motion(2000)
+    mixed = random.Random(1).sample(given_, len(given_))
+    bag = write_bag(tmp_path / 'bag', mixed).rename(tmp_path / 'a bag, 50% of it? #1')
+    for path in (bag, storage(bag)):
+        found = read(path)
+        assert found[:2] == (given_, [])
+        assert 'no checksums' in found.notices[0]
+    assert read(bag, f'{NODE}/{TWIST}').messages == [
+        each for each in given_ if each[0].endswith(TWIST)]
+    assert [path.name for path in tmp_path.iterdir()] == [bag.name]
+    assert len(list(bag.iterdir())) == 2
+
+
+def test_damaged_sqlite3_is_never_a_crash(tmp_path: Path) -> None:
+    given_ = motion(60)
+    file = storage(write_bag(tmp_path / 'bag', given_))
+    content = file.read_bytes()
+    chance = random.Random(2)
+    for n in range(200):
+        file.write_bytes((cut, flipped, zeroed, shifted)[n % 4](content, chance))
+        try:
+            found = read(file)
+        except BagError as exc:
+            assert '\n' not in str(exc)
+        else:
+            assert all('\n' not in said for said in found.missing)
+
+
+def test_sqlite3_that_has_lost_rows_says_so(tmp_path: Path) -> None:
+    given_ = motion(400)
+    file = storage(write_bag(tmp_path / 'bag', given_))
+    content = file.read_bytes()
+    chance = random.Random(6)
+    lost = 0
+    for _ in range(200):
+        # the head of a page: how many rows are in it, and where
+        at = 4096 * chance.randrange(1, len(content) // 4096) + chance.randrange(8)
+        file.write_bytes(content[:at] + bytes([content[at] ^ 1 << chance.randrange(8)])
+                         + content[at + 1:])
+        try:
+            found = read(file)
+        except BagError:
+            continue
+        assert found.messages == given_ or found.missing
+        lost += len(found.messages) < len(given_)
+    assert lost > 20
+
+
+def test_rows_that_are_no_messages_are_missing(tmp_path: Path) -> None:
+    given_ = motion(2)
+    file = storage(write_bag(tmp_path / 'bag', given_))
+    with sqlite3.connect(file) as database:
+        for wrong in ("timestamp = 'soon'", 'timestamp = 1.5', 'data = 1000000000000',
+                      "data = 'text'"):
+            database.execute('INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, '
+                             'timestamp, data FROM messages LIMIT 1')
+            database.execute(f'UPDATE messages SET {wrong} WHERE id = last_insert_rowid()')
+    database.close()
+    found = read(file)
+    assert found.messages == given_
+    assert found.missing == [f'{file.name}: 4 messages that are none']
+
+
+@pytest.mark.parametrize('suffix', ['-wal', '-journal'])
+def test_what_a_killed_recorder_left_beside_sqlite3_is_said(suffix: str, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(2))
+    journal = bag / f'{storage(bag).name}{suffix}'
+    journal.write_bytes(b'')
+    assert not read(bag).missing
+    journal.write_bytes(b'1')
+    found = read(bag)
+    assert len(found.messages) == 6
+    assert len(found.missing) == 1
+    assert journal.name in found.missing[0]
+
+
+# Folders
+
+def split_bag(folder: Path, parts: int, names: Callable[[int], str]) -> list[Recorded]:
+    """Write a bag of several files with the metadata of rosbag2; its messages."""
+    given_ = motion(4 * parts)
+    folder.mkdir()
+    for n in range(parts):
+        (folder / names(n)).write_bytes(mcap(given_[12 * n:12 * n + 12]))
+    listed(folder, [names(n) for n in range(parts)])
+    return given_
+
+
+def listed(folder: Path, names: Iterable[str]) -> None:
+    (folder / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  relative_file_paths:\n'
+        + ''.join(f'  - "{name}"\n' for name in names))
+
+
+def test_a_bag_of_several_files_is_read_in_their_order(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 12, lambda n: f'bag_{n}.mcap')
+    assert read(bag) == (given_, [], [])
+    # also by name, where bag_10 comes after bag_9
+    (bag / 'metadata.yaml').unlink()
+    found = read(bag)
+    assert found[:2] == (given_, [])
+    assert found.notices == ['its metadata.yaml is missing or damaged: read by its files']
+
+
+def test_old_recorders_put_the_name_of_the_folder_before(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 2, lambda n: f'bag_{n}.mcap')
+    listed(bag, ['bag/bag_0.mcap', '/home/robot/bag/bag_1.mcap', 'bag_1.mcap'])
+    assert read(bag) == (given_, [], [])
+
+
+def test_a_file_that_is_listed_and_is_not_there_is_missing(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 3, lambda n: f'bag_{n}.mcap')
+    (bag / 'bag_1.mcap').unlink()
+    found = read(bag)
+    assert found == (given_[:12] + given_[24:], ['bag_1.mcap: no such file'], [])
+    (bag / 'bag_0.mcap').write_bytes(b'')
+    found = read(bag)
+    assert found.messages == given_[24:]
+    assert len(found.missing) == 2
+
+
+@pytest.mark.parametrize('text', [
+    '', '\0', 'a: b', '- 1', 'rosbag2_bagfile_information: 1', '\xff', '*a', '[' * 300,
+    'rosbag2_bagfile_information: {relative_file_paths: }',
+    'rosbag2_bagfile_information: {relative_file_paths: []}',
+    'rosbag2_bagfile_information: {relative_file_paths: [1]}',
+    'rosbag2_bagfile_information: {relative_file_paths: text}',
+    'rosbag2_bagfile_information: {relative_file_paths: {a: b}}',
+    'rosbag2_bagfile_information: {relative_file_paths: [elsewhere.mcap]}',
+    'rosbag2_bagfile_information: {relative_file_paths: ["\\0"]}'])
+def test_a_bag_with_damaged_metadata_is_read_by_its_files(text: str, tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 2, lambda n: f'bag_{n}.mcap')
+    (bag / 'metadata.yaml').write_bytes(text.encode('latin-1'))
+    assert read(bag)[:2] == (given_, [])
+    for file in bag.glob('*.mcap'):
+        file.unlink()
+    with pytest.raises(BagError, match='not a bag that can be read: .*metadata.yaml') as caught:
+        Recording(bag)
+    assert '\n' not in str(caught.value)
+
+
+def test_no_file_outside_of_the_folder_is_read(tmp_path: Path) -> None:
+    bag, outside = tmp_path / 'bag', tmp_path / 'outside.mcap'
+    given_ = split_bag(bag, 2, lambda n: f'bag_{n}.mcap')
+    outside.write_bytes(mcap(motion(1)))
+    (bag / 'link.mcap').symlink_to(outside)
+    (bag / 'circle.mcap').symlink_to(bag / 'circle.mcap')
+    (bag / 'sub').mkdir()
+    (bag / 'sub' / 'bag.mcap').write_bytes(outside.read_bytes())
+    os.mkfifo(bag / 'pipe.mcap')
+    for name in ('../outside.mcap', str(outside), 'link.mcap', 'sub/bag.mcap', 'sub', '.',
+                 'pipe.mcap'):
+        listed(bag, ['bag_0.mcap', name])
+        with pytest.raises(BagError, match='metadata.yaml lists .*, which is not a file in'):
+            Recording(bag)
+    for name in ('circle.mcap', 'x' * 300, 'x/' * 3000):
+        listed(bag, ['bag_0.mcap', name])
+        try:
+            assert read(bag).missing
+        except BagError as exc:
+            assert '\n' not in str(exc)
+    (bag / 'metadata.yaml').unlink()
+    assert read(bag)[:2] == (given_, [])
+    # but a bag may be a link
+    (tmp_path / 'named').symlink_to(bag)
+    assert read(tmp_path / 'named').messages == given_
+
+
+def test_what_is_no_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'pipe.mcap')
+    (tmp_path / 'circle').symlink_to(tmp_path / 'circle')
+    for path in (tmp_path / 'pipe.mcap', tmp_path / 'circle', tmp_path / 'none', tmp_path,
+                 tmp_path / ('x' * 300), tmp_path / '\0'):
+        with pytest.raises(BagError, match='not a bag that can be read'):
+            Recording(path)
+
+
+# Compression by rosbag2
+
+@pytest.mark.parametrize('plugin', list(StoragePlugin))
+def test_bags_compressed_message_by_message(plugin: StoragePlugin, tmp_path: Path) -> None:
+    given_ = motion(50)
+    bag = write_bag(tmp_path / 'bag', given_, plugin, CompressionMode.MESSAGE)
+    with AnyReader([bag]) as reader:
+        assert [(of.topic, when, bytes(data)) for of, when, data in reader.messages()] == given_
+    for path in (bag, storage(bag)):
+        assert read(path)[:2] == (given_, [])
+
+
+def test_several_files_compressed_message_by_message_are_each_read_once(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 3, lambda n: f'bag_{n}.mcap')
+    packed = zstandard.ZstdCompressor()
+    for n in range(3):
+        (bag / f'bag_{n}.mcap').write_bytes(mcap(
+            (topic, when, packed.compress(data)) for topic, when, data in
+            given_[12 * n:12 * n + 12]))
+    with (bag / 'metadata.yaml').open('a') as file:
+        file.write('  compression_mode: MESSAGE\n  compression_format: zstd\n')
+    assert read(bag) == (given_, [], [])
+
+
+def test_a_damaged_compressed_message_stays_as_it_is(tmp_path: Path) -> None:
+    frame = zstandard.ZstdCompressor().compress(bytes(100))
+    large = zstandard.ZstdCompressor().compress(bytes(1 << 25))
+    of = [('/a', n, data) for n, data in enumerate(
+        (frame, frame[:-3], b'', b'\x28', frame[:4], large, b'\0\1\0\0'))]
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(mcap(of))
+    assert read(file).messages == [('/a', 0, bytes(100)), *of[1:]]
+
+
+def test_bags_compressed_file_by_file(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    given_ = split_bag(bag, 3, lambda n: f'bag_{n}.mcap.zstd')
+    for n in range(3):
+        file = bag / f'bag_{n}.mcap.zstd'
+        content = file.read_bytes()
+        # of two frames, as some compressors write
+        file.write_bytes(b''.join(zstandard.ZstdCompressor().compress(part)
+                                  for part in (content[:1000], content[1000:])))
+    assert read(bag) == (given_, [], [])
+    assert read(bag / 'bag_0.mcap.zstd').messages == given_[:12]
+    (bag / 'metadata.yaml').unlink()
+    assert read(bag)[:2] == (given_, [])
+    content = (bag / 'bag_1.mcap.zstd').read_bytes()
+    chance = random.Random(4)
+    for spoil in (cut, flipped) * 20:
+        (bag / 'bag_1.mcap.zstd').write_bytes(spoil(content, chance))
+        check(bag, given_)
+    sqlite = write_bag(tmp_path / 'sqlite', given_)
+    database = storage(sqlite)
+    packed = database.with_name(f'{database.name}.zstd')
+    packed.write_bytes(zstandard.ZstdCompressor().compress(database.read_bytes()))
+    database.unlink()
+    assert read(sqlite)[:2] == (given_, [])
+    assert read(packed)[:2] == (given_, [])
