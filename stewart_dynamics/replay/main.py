@@ -21,6 +21,7 @@ import argparse
 from collections.abc import Sequence
 import math
 from pathlib import Path
+import signal
 import sys
 
 from tqdm import tqdm
@@ -42,6 +43,8 @@ _FEW = 10
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
+    # As Ctrl-C: what is half written is taken away.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return _run(given, _options(given))
     except (StewartError, OSError) as exc:
@@ -49,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except KeyboardInterrupt:
         return _INTERRUPTED
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _arguments() -> argparse.ArgumentParser:
