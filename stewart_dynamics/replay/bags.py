@@ -28,9 +28,10 @@ from stewart_dynamics.errors import BagError
 FLEET_TABLE, FLEET_PAGE = 'fleet.csv', 'index.html'
 
 _METADATA = 'metadata.yaml'
-_STORAGES = ('.mcap', '.db3')
+# Files of a bag; those that are compressed as a whole too.
+STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 # rosbag2 numbers the files of a recording: <name of the bag>_0.mcap, ...
-_NUMBERED = re.compile(r'(.*)_\d+(\.\w+)')
+_NUMBERED = re.compile(r'(.*)_\d+(\.\w+(?:\.zstd)?)')
 
 
 def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
@@ -57,7 +58,7 @@ def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
     bags = sorted(_below(path, leave_out.resolve() if leave_out else None))
     if not bags:
         raise BagError(f'{path}: holds no bag: neither {_METADATA} nor files '
-                       f'{" or ".join("*" + suffix for suffix in _STORAGES)}, in no folder below '
+                       f'{" or ".join("*" + suffix for suffix in STORAGES)}, in no folder below '
                        'it either (links and hidden folders are not followed)')
     return bags
 
@@ -71,7 +72,7 @@ def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
     if folder / _METADATA in files:
         yield folder
         return
-    storages = [file for file in files if file.suffix in _STORAGES]
+    storages = [file for file in files if file.name.endswith(STORAGES)]
     below = [bag for each in folders if each.resolve() != leave_out and not _holds_results(each)
              for bag in _below(each, leave_out)]
     yield from [folder] if storages and not below and _one_recording(storages) else storages

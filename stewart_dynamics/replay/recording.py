@@ -31,6 +31,7 @@ import zstandard
 
 from stewart_dynamics.errors import BagError, ParameterError
 from stewart_dynamics.parameters import read_document
+from stewart_dynamics.replay.bags import STORAGES
 from stewart_dynamics.replay.mcap_file import Block, compact, joined, MAGIC, McapFile
 from stewart_dynamics.setpoints import Messages
 
@@ -41,7 +42,6 @@ _FEWEST, _MOST = 4096, 16384
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'
 _ZSTD = b'\x28\xb5\x2f\xfd'
-_SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 # No setpoint is as large.
 _LARGEST_MESSAGE = 1 << 24
 
@@ -131,7 +131,7 @@ class Recording:
             if not path.is_file():
                 raise BagError(f'{path}: not a bag that can be read: no such file or folder')
             return [path]
-        found = sorted((file for file in path.iterdir() if file.name.endswith(_SUFFIXES)
+        found = sorted((file for file in path.iterdir() if file.name.endswith(STORAGES)
                         and self._is_inside(file)), key=_by_number)
         try:
             document = read_document(path / 'metadata.yaml')
