@@ -47,7 +47,8 @@ def results(output: Path, *paths: Path) -> dict[str, Path]:
     ['metadata.yaml', 'x_0.mcap', 'x_1.mcap', 'other.mcap', 'deeper/metadata.yaml'],
     ['metadata.yaml'],
     # killed before it wrote metadata.yaml
-    ['x.mcap'], ['x.db3'], ['x_0.mcap.zstd', 'x_1.mcap.zstd'], ['x_0.mcap', 'x_1.mcap', 'x_2.mcap', 'x_10.mcap']])
+    ['x.mcap'], ['x.db3'], ['x_0.mcap.zstd', 'x_1.mcap.zstd'],
+    ['x_0.mcap', 'x_1.mcap', 'x_2.mcap', 'x_10.mcap']])
 def test_a_bag_is_itself(tmp_path: Path, names: list[str]) -> None:
     folder = make(tmp_path / 'bag', *names)
     assert find_bags(folder) == [folder]
