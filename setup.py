@@ -44,6 +44,7 @@ extras_require = {
     ],
     'test': [
         'colcon-common-extensions',
+        'dask',
         'distributed',
         'flake8',
         'flake8-blind-except',

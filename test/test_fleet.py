@@ -451,7 +451,9 @@ def test_an_interrupt_leaves_nothing_half_done(
     until(lambda: process_in(output, 'huge'), 'the middle of a bag')
     os.killpg(running.pid, signal.SIGINT)
     out, err = running.communicate(timeout=60)
-    assert (running.returncode, out, err) == (130, '', '')
+    # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
+    assert running.returncode in (130, -signal.SIGINT)
+    assert (out, err) == ('', '')
     assert hidden(output) == []
     assert not (output / 'huge').exists()
     assert not (output / 'fleet.csv').exists()

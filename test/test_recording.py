@@ -45,7 +45,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 import zstandard
 
 from stewart_dynamics import BagError, Parameters
-from stewart_dynamics.replay.main import main
+from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, NODE, Options, PARTLY_READ, replay)
 from stewart_dynamics.replay.recording import Recording

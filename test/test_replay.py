@@ -845,7 +845,8 @@ def test_an_interrupted_replay_leaves_nothing(
     with begun(long_bag, tmp_path / 'out') as process:
         process.send_signal(sent)
         _, said = process.communicate(timeout=30)
-        assert process.returncode == 130
+        # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
+        assert process.returncode in (130, -signal.SIGINT)
     assert 'Traceback' not in said
     assert not list((tmp_path / 'out').iterdir())
 

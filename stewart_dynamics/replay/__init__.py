@@ -24,7 +24,7 @@ import sys
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_replay; say in one line which library it lacks."""
     try:
-        from stewart_dynamics.replay.main import main as program
+        from stewart_dynamics.replay.command_line import main as program
     except ModuleNotFoundError as exc:
         print(f'stewart_replay: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
         return 2

@@ -307,8 +307,10 @@ class Comparison:
 
 def _wrench(parameters: Parameters, position: Array, rotation: Array, forces: Array) -> Array:
     """Return J_inv^T forces (N, 6), without J_inv: sums of s_i f_i and of a_i x s_i f_i."""
-    # axis, leg, sample
-    arms = parameters['geometry.platform_joints'] @ np.moveaxis(rotation, 0, -1)
+    # axis, leg, sample; no matrix product, whose rounding depends on how many samples there are
+    x_axis, y_axis, z_axis = np.moveaxis(rotation, 0, -1).swapaxes(0, 1)[:, :, None, :]
+    px, py, pz = parameters['geometry.platform_joints'].T[:, :, None]
+    arms = x_axis * px + y_axis * py + z_axis * pz
     legs = arms + position.T[:, None, :] - parameters['geometry.base_joints'].T[:, :, None]
     pushes = legs * (forces.T / np.sqrt(np.sum(legs ** 2, axis=0)))
     (ax, ay, az), (x, y, z) = arms, pushes
