@@ -214,10 +214,10 @@ class Setpoints:
             waiting.clear()
         self._give_up_unstamped()
 
-    def refuse(self, topic: str, reason: str, details: str) -> None:
+    def refuse(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count, and tell of, what is not used."""
         refusal = Refusal(topic, reason)
-        self.counts[refusal] += 1
+        self.counts[refusal] += number
         self._refused(refusal, details)
 
     def _sound(self, topic: str, data: bytes) -> cdr.Stamped | None:
@@ -364,9 +364,9 @@ class Setpoints:
             waiting = np.fromiter(self._waiting[topic], dtype=np.int64)
             of_topic_all = np.concatenate([waiting, fresh])
             after = self._last.get(topic)
-            if len(fresh) and (
-                    fresh[0] <= 0 or np.any(np.diff(of_topic_all) <= 0)
-                    or (after is not None and of_topic_all[0] <= after)):
+            # What waits need not have come in the order of its stamps.
+            if np.any(np.diff(of_topic_all) <= 0) or (len(fresh) and (
+                    fresh[0] <= 0 or (after is not None and of_topic_all[0] <= after))):
                 return None
             stamps[topic] = of_topic_all
             places[topic] = np.concatenate([np.full(len(waiting), -1), places_of])

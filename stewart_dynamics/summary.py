@@ -298,7 +298,7 @@ class Summary:
             self._has_causes = True
             for n, peaks in enumerate(self._cause_peaks):
                 peaks.add(seconds, causes[:, n])
-            with np.errstate(over='ignore'):
+            with np.errstate(over='ignore', invalid='ignore'):
                 self._cause_squares.add(steps, causes.reshape(len(seconds), -1) ** 2)
 
     def _steps(self, seconds: Array, setpoints: Batch) -> Array:

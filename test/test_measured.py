@@ -164,6 +164,25 @@ def test_a_load_that_the_model_knows_leaves_no_residual() -> None:
     assert comparison.values()['touches']['count'] == 0
 
 
+def test_a_touch_may_last_for_nearly_half_of_the_bag() -> None:
+    case = case_of(many=1000)
+    comparison = Comparison(case.parameters)
+    load = np.where(((case.seconds >= 3.0) & (case.seconds < 7.0))[:, None],
+                    [0.0, 0.0, -200.0, 0.0, 0.0, 0.0], 0.0)
+    forces = case.forces(load)
+    scale = np.sqrt(np.mean(forces ** 2))
+    compared(comparison, case, (case.setpoints.stamps,
+                                forces + 1e-4 * scale * rng().normal(size=forces.shape)))
+    values = comparison.values()
+    touches = values['touches']
+    assert touches['count'] == 1
+    assert touches['strongest'][0]['from_s'] == pytest.approx(3.0, abs=0.02)
+    assert touches['strongest'][0]['to_s'] == pytest.approx(7.0, abs=0.02)
+    assert touches['strongest'][0]['force_n'][2] == pytest.approx(-200.0, rel=0.2)
+    # and no friction is made of it
+    assert all(leg['viscous_friction_n_s_m'] is None for leg in values['legs'].values())
+
+
 def test_the_friction_that_is_missing_is_found() -> None:
     case = case_of()
     given = case.parameters

@@ -501,7 +501,8 @@ def test_nothing_that_can_be_answered_is_said(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cut = [(topic, when, data[:-1]) for topic, when, data in motion(3)]
     bag = write_bag(tmp_path / 'bag', cut)
-    assert run(bag, tmp_path / 'out', '--strict') == DONE
+    # nothing was checked: that must not pass for good
+    assert run(bag, tmp_path / 'out') == PARTLY_READ
     printed = capsys.readouterr().out
     assert 'no setpoint could be answered' in printed
     for topic in TOPICS:
@@ -1053,6 +1054,57 @@ def test_force_keeps_old_results_where_new_ones_fail(tmp_path: Path) -> None:
     broken.write_bytes(b'no bag')
     assert run(broken, tmp_path / 'out', '--force') == BAD_INPUT
     assert (tmp_path / 'out' / 'bag' / 'legs.csv').read_bytes() == before
+
+
+def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
+    of = []
+    for n in range(1, 21):
+        # two writers, of simulated and of real time
+        stamp = n * 10 * MS + (n % 2) * 1_700_000_000 * SECOND
+        of += [(topic, RECORDED + n, write(stamp)) for topic, write in (
+            (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))]
+    bag = write_bag(tmp_path / 'bag', of)
+    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['setpoints']
+    assert found['answered'] == 20
+    assert found['duration_s'] == pytest.approx(9 * 1_700_000_000.0, rel=1e-6)
+
+
+def test_an_interrupt_while_results_are_replaced_keeps_some(tmp_path: Path) -> None:
+    # the second of the two renames is where it comes
+    program = (
+        'import pathlib, sys\nfrom stewart_dynamics.replay import main\n'
+        'rename, done = pathlib.Path.rename, []\n'
+        'def interrupted(self, to):\n'
+        '    done.append(to)\n'
+        '    if len(done) == 2: raise KeyboardInterrupt\n'
+        '    return rename(self, to)\n'
+        'main(sys.argv[1:])\npathlib.Path.rename = interrupted\n'
+        "sys.exit(main([*sys.argv[1:], '--force']))")
+    done = subprocess.run(
+        [sys.executable, '-c', program, str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS),
+         '--output', str(tmp_path), '--no-report'], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 130
+    assert len(rows_of(tmp_path / 'clear')) == 1001
+    assert [path.name for path in tmp_path.iterdir()] == ['clear']
+
+
+def test_a_terminal_without_the_letters_of_a_name(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'ü', motion(3))
+    done = run_apart(bag, '--params', PARAMS, '--output', tmp_path / 'out', '--no-report',
+                     env={**os.environ, 'PYTHONIOENCODING': 'ascii'})
+    assert (done.returncode, done.stderr) == (DONE, '')
+    assert '3 setpoints' in done.stdout
+
+
+def test_options_that_would_not_be_used_are_refused(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert '--combined: is not read' in refused(
+        capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path,
+        '--differentiate', '--combined', '/all')
+    for words in (['--cutoff', '5'], ['--differentiate', '--cutoff', '1e300']):
+        with pytest.raises(SystemExit):
+            main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), *words])
 
 
 # Bags that have only poses

@@ -224,13 +224,13 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
     plain = trajectory('clear')
     paths = tmp_path / 'hostile.html', tmp_path / 'plain.html'
     bag = '/a/</script><script>window.hacked=1</script>\udcff/<!--=plotly-->'
-    refused = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2}]
+    refused = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2]}]
     given.write(paths[0], bag=bag, notices=[HOSTILE[1]], complete=False, missing=[HOSTILE[0]],
                 refused=refused, run='<i>', inputs={
                     'node': '/n', 'topics': {'setpoint/pose': HOSTILE[0]},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
     plain.write(paths[1], bag='/a/b/c', notices=['n'], complete=False, missing=['m'],
-                refused=[{'topic': 't', 'reason': 'r', 'count': 2}], run='r', inputs={
+                refused=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': ''}], run='r', inputs={
                     'node': '/n', 'topics': {'setpoint/pose': '/p'},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
     hostile, harmless = (_Elements(path.read_text(encoding='utf-8')) for path in paths)
@@ -248,7 +248,8 @@ def test_what_is_wrong_with_a_bag_is_told(tmp_path: Path) -> None:
     trajectory('singular').write(
         tmp_path / 'report.html', complete=False, missing=['chunk 3: its CRC is wrong'],
         notices=['the bag has no checksums'],
-        refused=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234}])
+        refused=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234,
+                  'first': 'nan'}])
     text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
     for told in ('Only a part could be read', 'chunk 3: its CRC is wrong', 'not finite', '1,234',
                  'Limits are broken', 'limits.force_max', 'A singularity is met',

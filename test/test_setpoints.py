@@ -750,6 +750,14 @@ def test_many_of_one_topic_may_come_before_the_others() -> None:
                        if topic == of], ()) == WAITING
 
 
+def test_what_waits_may_be_out_of_order() -> None:
+    given = [(TWIST, messages.twist(2 * MS, (2.0,) * 6)), (TWIST, messages.twist(MS, (1.0,) * 6)),
+             (POSE, messages.pose(MS)), (POSE, messages.pose(2 * MS)),
+             (ACCEL, messages.accel(MS)), (ACCEL, messages.accel(2 * MS))]
+    for cut in range(1, 6):
+        assert check_many(given, (cut,)) == 2
+
+
 def test_many_combined_are_what_they_are_one_by_one() -> None:
     random = rng()
     given = [(COMBINED, messages.combined(

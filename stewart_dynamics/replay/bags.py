@@ -64,9 +64,13 @@ def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
 
 
 def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
-    with os.scandir(folder) as entries:
-        seen = [entry for entry in entries
-                if not entry.name.startswith('.') and not entry.is_symlink()]
+    try:
+        with os.scandir(folder) as entries:
+            seen = [entry for entry in entries
+                    if not entry.name.startswith('.') and not entry.is_symlink()]
+    except PermissionError:
+        yield folder  # its reader says why it cannot be read
+        return
     folders = [folder / entry.name for entry in seen if entry.is_dir()]
     files = [folder / entry.name for entry in seen if entry.is_file()]
     if folder / _METADATA in files:
@@ -86,7 +90,10 @@ def _one_recording(files: Sequence[Path]) -> bool:
 
 
 def _holds_results(folder: Path) -> bool:
-    return (folder / 'summary.json').is_file() and (folder / 'bag' / _METADATA).is_file()
+    try:
+        return (folder / 'summary.json').is_file() and (folder / 'bag' / _METADATA).is_file()
+    except PermissionError:
+        return False
 
 
 def folders_of_results(paths: Sequence[Path], output: Path) -> list[tuple[Path, Path]]:
@@ -102,7 +109,12 @@ def folders_of_results(paths: Sequence[Path], output: Path) -> list[tuple[Path, 
     """
     pairs: list[tuple[Path, Path]] = []
     for path in paths:
-        bags = find_bags(path, output)
+        try:
+            bags = find_bags(path, output)
+        except BagError:
+            if len(paths) == 1:
+                raise
+            bags = [path]  # to be told of among the others
         if bags == [path]:
             whole = Path(os.path.abspath(path))  # '.' has no name
             pairs.append((path, output / (whole.name if path.is_dir() else whole.stem)))
@@ -138,3 +150,12 @@ def _check_apart(pairs: Sequence[tuple[Path, Path]], output: Path) -> None:
                 raise BagError(f'{taken[parent]}, {bag}: the results of one, {folder}, would be '
                                f'inside those of the other, {parent}: replay one of them into '
                                'another --output')
+
+
+def bytes_of(bag: Path) -> int:
+    """Return how many bytes a bag has; never none, so that each counts for something."""
+    try:
+        files = [file for file in bag.iterdir() if file.is_file()] if bag.is_dir() else [bag]
+        return sum(file.stat().st_size for file in files) or 1
+    except OSError:  # whatever it is, it is said when the bag is replayed
+        return 1

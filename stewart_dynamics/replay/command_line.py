@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import math
+import io
 from pathlib import Path
 import signal
 import sys
@@ -29,7 +29,7 @@ from tqdm import tqdm
 from stewart_dynamics import compiled
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.bags import folders_of_results
+from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, folders_of_results
 from stewart_dynamics.replay.fleet import replay_fleet
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, LIMIT_MET, NODE, Options, replay)
@@ -42,9 +42,14 @@ _FEW = 10
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
-    given = _arguments().parse_args(arguments)
-    # As Ctrl-C: what is half written is taken away.
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    parser = _arguments()
+    given = parser.parse_args(arguments)
+    if given.cutoff and not given.differentiate:
+        parser.error('--cutoff: needs --differentiate')
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a name may be none in the terminal's encoding
+            stream.reconfigure(errors='backslashreplace')
+    before = {each: signal.signal(each, _interrupted) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
         return _run(given, _options(given))
     except (StewartError, OSError) as exc:
@@ -53,7 +58,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _INTERRUPTED
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+def _interrupted(number: int, frame: object) -> None:
+    """End once; what is half written is taken away meanwhile, whatever else comes."""
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _arguments() -> argparse.ArgumentParser:
@@ -89,8 +102,9 @@ def _arguments() -> argparse.ArgumentParser:
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',
                        help='make twist and acceleration of the poses, by smoothing splines')
-    poses.add_argument('--cutoff', type=_frequency, default=_CUTOFF, metavar='HZ',
-                       help=f'cut-off frequency of the splines (default: {_CUTOFF:g})')
+    poses.add_argument('--cutoff', type=_frequency, metavar='HZ',
+                       help=f'cut-off frequency of the splines (default: {_CUTOFF:g}); as low as '
+                            'the motion allows, noise grows with its power of 2.5')
     output = parser.add_argument_group('what is written')
     output.add_argument('--no-report', action='store_true', help='write no report.html')
     output.add_argument('--parquet', action='store_true',
@@ -109,7 +123,8 @@ def _options(given: argparse.Namespace) -> Options:
     return Options(
         node='/' + given.node.strip('/'),
         topics={name: getattr(given, name) for name in names if getattr(given, name)},
-        cutoff=given.cutoff if given.differentiate else None, measured=given.measured,
+        cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
+        measured=given.measured or None,
         parquet=given.parquet, report=not given.no_report, force=given.force)
 
 
@@ -128,12 +143,12 @@ def _run(given: argparse.Namespace, options: Options) -> int:
         if ended.error:
             _complain(ended.error)
     print(fleet.text().partition('\n')[0])
+    print(f'results: {given.output / FLEET_PAGE}')
     return fleet.code(given.strict)
 
 
 def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, strict: bool) -> int:
-    size = sum(file.stat().st_size for file in bag.iterdir()) if bag.is_dir() else None
-    with tqdm(total=size, unit='B', unit_scale=True, disable=None, leave=False,
+    with tqdm(total=bytes_of(bag), unit='B', unit_scale=True, disable=None, leave=False,
               dynamic_ncols=True) as bar:
         done = 0
 
@@ -157,8 +172,8 @@ def _complain(what: object) -> None:
 
 def _frequency(text: str) -> float:
     value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f'{text}: must be more than 0')
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least 1e-6, at most 1e6')
     return value
 
 

@@ -70,6 +70,9 @@ FEWEST = 5
 TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration follows from them'
 TOO_FAST = 'turns faster than the cut-off frequency can follow'
 
+# Poses nearer to each other than this begin another stretch: nothing can be solved there [ns].
+_NEAREST = 100
+
 # Of the reach of the spline, in times of 1 / cut-off and in poses, where these are sparse: an
 # interpolating spline forgets by a factor of 0.27 a pose.
 _REACH = 5.0
@@ -265,7 +268,7 @@ class Differentiator:
         stamps = held.stamps
         steps = np.diff(stamps)
         begins = [0, *(np.flatnonzero(
-            held.restarts[1:] | (steps <= 0) | (steps > self._gap)) + 1).tolist()]
+            held.restarts[1:] | (steps < _NEAREST) | (steps > self._gap)) + 1).tolist()]
         ends = [*begins[1:], len(stamps)]
         done: list[Batch] = []
         for begin, end in zip(begins, ends, strict=True):
@@ -288,6 +291,7 @@ class Differentiator:
             return []
         if not self._given:
             self._begun = int(stamps[0])
+        self._check_rate((stamps[:self._window] - stamps[0]) * 1e-9)
         done = []
         while self._given < len(stamps):
             end = min(self._given + self._window, len(stamps))

@@ -40,6 +40,8 @@ WITHOUT_EFFORT = 'without effort'
 UNEVEN = 'not as many efforts as names'
 
 _SECOND = 1_000_000_000
+# No force is as large [N]; its square would be no number.
+_NO_FORCE = 1e100
 _ORDERS = {0: '>', 1: '<'}
 _AFTER_STAMP = 12
 # Layouts that are known at once; messages of others are read one by one.
@@ -178,7 +180,8 @@ class _Read(NamedTuple):
                 continue
             sound, stamps = layout.stamps(messages)
             values = layout.values(messages)
-            finite = np.isfinite(values).all(axis=1)
+            with np.errstate(invalid='ignore'):
+                finite = (np.abs(values) < _NO_FORCE).all(axis=1)
             self.refused[MALFORMED] += int(np.count_nonzero(~sound))
             self.refused[NOT_FINITE] += int(np.count_nonzero(sound & ~finite))
             self.stamps[part], self.efforts[part], self.taken[part] = (

@@ -48,10 +48,10 @@ from tqdm import tqdm
 
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
+from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.index import Cell, RESULTS, row_of, write_fleet
 from stewart_dynamics.replay.one import (
-    BAD_INPUT, DONE, LIMIT_MET, Options, PARTLY_READ, replay)
+    BAD_INPUT, DONE, LIMIT_MET, Options, partial_name, PARTLY_READ, replay)
 
 _GRAVITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
 _TRIES = 2
@@ -141,7 +141,7 @@ def replay_fleet(
     options = options._replace(run=options.run or uuid.uuid4().hex)
     tasks = [_Task(number, bag, folder, parameters, options)
              for number, (bag, folder) in enumerate(bags)]
-    sizes = [_size(task.bag) for task in tasks]
+    sizes = [bytes_of(task.bag) for task in tasks]
     # The largest first: else it may be the last, and all others wait for it alone.
     order = sorted(tasks, key=lambda task: -sizes[task.number])
     ended: dict[int, Ended] = {}
@@ -167,20 +167,11 @@ def _row(ended: Ended, output: Path) -> dict[str, Cell]:
     return {**ended.row, 'bag': str(ended.bag), 'results': results}
 
 
-def _size(bag: Path) -> int:
-    """Return how many bytes a bag has; never none, so that each counts for something."""
-    try:
-        files = [file for file in bag.iterdir() if file.is_file()] if bag.is_dir() else [bag]
-        return sum(file.stat().st_size for file in files) or 1
-    except OSError:  # whatever it is, it is said when the bag is replayed
-        return 1
-
-
 def _clear_away(tasks: Sequence[_Task], run: str) -> None:
     """Remove what processes that died, or were ended, have left behind."""
     begun: dict[Path, dict[str, Path]] = {}
     for task in tasks:
-        begun.setdefault(task.folder.parent, {})[f'.{task.folder.name}.{run}.'] = task.folder
+        begun.setdefault(task.folder.parent, {})[partial_name(task.folder, run)] = task.folder
     for parent, beginnings in begun.items():
         try:
             left = [path for path in parent.iterdir() if f'.{run}.' in path.name]
@@ -232,7 +223,7 @@ def _finished(task: _Task) -> Ended | None:
 def _whole(task: _Task, code: int, summary: dict[str, Any], text: str = '') -> Ended:
     missing = '; '.join(' '.join(what.split()) for what in summary['missing'])
     return Ended(task.bag, task.folder, code, row_of(code, summary, missing), text,
-                 f'{task.bag}: could not be read: {missing}' if missing else '')
+                 f'{task.bag}: part of it could not be read: {missing}' if missing else '')
 
 
 def _failed(task: _Task, why: str) -> Ended:
@@ -443,6 +434,11 @@ def _on_cluster(tasks: Sequence[_Task], address: str, bar: _Bar) -> _Results:
     dask = _dask()
     with _silent('distributed', 'distributed.client'), _connected(dask, address) as client:
         client.subscribe_topic(run, lambda event: bar.at(*event[1]))
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        except (TimeoutError, asyncio.TimeoutError) as exc:
+            raise StewartError(
+                f'{address}: no worker has come to this scheduler in {_PATIENCE:g} s') from exc
         futures: dict[Any, _Task] = {}
         suspects: list[_Task] = []
 

@@ -48,17 +48,20 @@ legs
     ``measured_rms_n``, ``computed_rms_n``; ``correlation`` of measured and computed. And the
     friction that fits the residual best by least squares, to be added to the parameters:
     ``coulomb_friction_n``, ``viscous_friction_n_s_m``, beside ``offset_n``; ``friction_share`` is
-    the part of the residual's variance that all this explains, 0 to 1.
+    the part of the residual's variance that all this explains, 0 to 1. Null where that is less
+    than 0.5, or one would be negative: it is no friction then.
 wrench
     The residual wrench: ``force_x`` .. ``moment_z``, each ``rms_n``, ``mean_n``, ``peak_n``,
     ``peak_at_s`` (of moments ``rms_n_m`` ...).
 mass
     ``unmodelled_kg``, the mass at the platform's origin whose weight and inertia fit the residual
-    force best; ``share``, the part of the residual force's mean square that it explains.
+    force best, null where it explains less than half; ``share``, the part of the residual force's
+    mean square that it explains.
 touches
     Intervals in which a component of the residual wrench is farther from its median than
     ``threshold``: 6 robust standard deviations (1.4826 times the median distance from the
-    median), at least 2.5 times its RMS about the median, at least 0.001 of the leg forces' RMS.
+    median), at least 0.001 of the leg forces' RMS. What lasts for more than half of the bag is
+    the median: a payload that is not in the parameters, and no touch.
     ``count``, and of the strongest 100, in order of time: ``from_s``, ``to_s``; ``axis``, the
     component farthest beyond its threshold; ``force_n`` and ``moment_n_m``, what touched the
     platform, at the most, beyond its median: the NEGATIVE of the residual wrench. ``resolution_s``
@@ -83,6 +86,9 @@ Flags = NDArray[np.bool_]
 # What waits for the other side at most, setpoints and measured samples.
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
+
+# A fit that explains a smaller part than this is not told.
+_CONVINCING = 0.5
 
 AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
 _UNITS = ('n',) * 3 + ('n_m',) * 3
@@ -273,14 +279,21 @@ class Comparison:
         best = np.linalg.solve(fit / np.outer(scale, scale), fitted / scale) / scale
         mean_part = fitted[0] ** 2 / fit[0, 0]
         variance = float(self._legs.squares[leg] - mean_part)
-        share = (float(np.clip((best @ fitted - mean_part) / variance, 0.0, 1.0))
-                 if variance > 1e-12 * float(self._legs.squares[leg]) else None)
+        if variance <= 1e-12 * float(self._legs.squares[leg]):
+            return dict.fromkeys(names)
+        share = float(np.clip((best @ fitted - mean_part) / variance, 0.0, 1.0))
+        number = self._legs.count
+        noise = 0.05 * np.sqrt(variance / number)
+        if share < _CONVINCING or min(best[1], best[2] * np.sqrt(fit[2, 2] / number)) < -noise:
+            # Something else is at work, and these numbers are no parameters.
+            return {**dict.fromkeys(names), 'friction_share': share}
         return dict(zip(names, [*best.tolist(), share], strict=True))
 
     def _unmodelled_mass(self) -> dict[str, float | None]:
         drives, products, forces = self._mass.tolist()
-        return {'unmodelled_kg': products / drives if drives else None,
-                'share': products ** 2 / (drives * forces) if drives and forces else None}
+        share = products ** 2 / (drives * forces) if drives and forces else None
+        return {'unmodelled_kg': (products / drives if share and share >= _CONVINCING else None),
+                'share': share}
 
     def _touches(self) -> dict[str, Any]:
         number = max(self._legs.count, 1)
@@ -288,10 +301,7 @@ class Comparison:
         length = self._parameters['singularity.characteristic_length']
         smallest = 1e-3 * force * np.array([1.0, 1.0, 1.0, length, length, length])
         middle, deviation = self._bins.middle()
-        mean = self._wrench.sums / number
-        rms = np.sqrt(np.maximum(
-            self._wrench.squares / number - 2.0 * mean * middle + middle ** 2, 0.0))
-        threshold = np.maximum.reduce([6.0 * deviation, 2.5 * rms, smallest])
+        threshold = np.maximum(6.0 * deviation, smallest)
         found = self._bins.beyond(middle, threshold, self._gap * 1e-9)
         strongest = sorted(sorted(found, key=lambda each: -each.excess)[:100])
         return {

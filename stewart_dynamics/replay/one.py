@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 One recorded bag in; the node's outputs, a summary and a report out; needs no ROS.
 
@@ -25,8 +24,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager, ExitStack
+import hashlib
 from importlib import metadata
 import json
+import os
 from pathlib import Path
 import shutil
 import tempfile
@@ -38,7 +39,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.causes import ForceCauses
-from stewart_dynamics.errors import BagError
+from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.efforts import Efforts
@@ -46,7 +47,7 @@ from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Table
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
-from stewart_dynamics.setpoints import Messages, Setpoints
+from stewart_dynamics.setpoints import Messages, Refusal, Setpoints
 from stewart_dynamics.singularity import Singularity
 from stewart_dynamics.step import Batch, Stamps, Step
 from stewart_dynamics.summary import Summary
@@ -60,6 +61,8 @@ MEASURED = 'measured'
 _MEASURED_TYPE = 'sensor_msgs/msg/JointState'
 # So many of what could not be read, and of what the node would say, are told one by one.
 _TOLD = 20
+_SECOND = 1_000_000_000
+_TOUCHES_TOLD = 5
 
 Progress = Callable[[int, int], None]
 
@@ -134,8 +137,10 @@ def replay(
         parameters = parameters.replaced({'setpoint.source': source})
     with closing(Recording(bag)) as recording:
         topics = _topics(recording, parameters, options)
+        notices = _come_by(recording, topics, options)
         with _whole_folder(folder, options) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
+            run.notices += notices
             for messages, size in recording.messages({name: key for key, name in topics.items()}):
                 answered = run.take(messages)
                 if progress is not None:
@@ -157,16 +162,17 @@ class _Run:
                  options: Options, folder: Path, stack: ExitStack) -> None:
         self._recording, self._topics = recording, topics
         self._parameters, self._options = parameters, options
-        self._notices: list[str] = []
-        self._notices_more = 0
+        self.notices: list[str] = []
+        self._more = 0
         if parameters['setpoint.source'] == 'pose' and options.cutoff is None:
-            self._notices.append('setpoint.source is pose: the forces are those at rest')
-        self._setpoints = Setpoints(parameters, lambda refusal, details: None, self._notice)
+            self.notices.append('setpoint.source is pose: the forces are those at rest')
+        self._firsts: dict[Refusal, str] = {}
+        self._setpoints = Setpoints(parameters, self._refused, self._notice)
         self._step = Step(parameters)
         self._state: Singularity | None = None
         self._restarting = False
         self._stamp: int | None = None
-        self._elapsed = 0
+        self._elapsed = 0, 0  # [s], [ns]
         self._summary = Summary(parameters)
         # Poses farther apart than a period of the cut-off frequency say nothing of it.
         self._differentiator = None if options.cutoff is None else Differentiator(
@@ -202,8 +208,7 @@ class _Run:
         if self._differentiator is not None:
             self._answer(self._differentiator.finish())
             for reason, number in self._differentiator.left_out.items():
-                for _ in range(number):
-                    self._setpoints.refuse(inputs.POSE, reason, '')
+                self._setpoints.refuse(inputs.POSE, reason, '', number)
             for notice in self._differentiator.notices():
                 self._notice(notice)
         if self._comparison is not None:
@@ -214,11 +219,17 @@ class _Run:
 
     def summary(self) -> dict[str, Any]:
         """Return what summary.json holds."""
-        missing = self._recording.missing
-        notices = [*self._recording.notices, *self._notices]
-        if self._notices_more:
-            notices.append(f'and {self._notices_more} more like these')
+        missing = list(self._recording.missing)
         values = self._summary.values()
+        if not values['setpoints']['answered']:
+            missing.append('no setpoint could be answered')
+        measured = None if self._comparison is None else self._comparison.values()
+        if measured and not measured['setpoints_compared']:
+            missing.append(f'nothing could be compared with {self._options.measured}: no '
+                           f'setpoint has sound samples around its stamp')
+        notices = [*self._recording.notices, *self.notices]
+        if self._more:
+            notices.append(f'and {self._more} more like these')
         return {
             'version': VERSION,
             'software': _software(),
@@ -231,11 +242,11 @@ class _Run:
                 'node': self._options.node, 'topics': self._topics,
                 'differentiated_cutoff_hz': self._options.cutoff,
                 'measured': self._options.measured},
-            'refused': [{'topic': refusal.topic, 'reason': refusal.reason, 'count': number}
+            'refused': [{'topic': refusal.topic, 'reason': refusal.reason, 'count': number,
+                         'first': self._firsts[refusal]}
                         for refusal, number in sorted(self._setpoints.counts.items())],
             **values,
-            'measured': None if self._comparison is None else self._comparison.values(),
-            'limit_met': bool(values['limits'] or values['singularity']['warnings']),
+            'measured': measured,
             'parameters': {name: _plain(value)
                            for name, value in self._parameters.items()},
         }
@@ -245,14 +256,20 @@ class _Run:
         lines = [f'{self._recording.path}:', self._summary.table()]
         lines += summary['notices']
         lines += [f'refused, {each["topic"]}: {each["count"]} {each["reason"]}'
+                  + (f' (first: {each["first"]})' if each['first'] else '')
                   for each in summary['refused']]
+        if summary['measured']:
+            lines += _compared_lines(summary['measured'])
         return '\n'.join(lines)
 
+    def _refused(self, refusal: Refusal, details: str) -> None:
+        self._firsts.setdefault(refusal, details)
+
     def _notice(self, text: str) -> None:
-        if len(self._notices) < _TOLD:
-            self._notices.append(text)
+        if len(self.notices) < _TOLD:
+            self.notices.append(text)
         else:
-            self._notices_more += 1
+            self._more += 1
 
     def _answer(self, setpoints: Batch) -> int:
         """Take the step for setpoints, and write and gather what they give."""
@@ -265,8 +282,7 @@ class _Run:
         restarts_answered = restarts[outputs.answered]
         refused = len(setpoints.stamps) - len(outputs.stamps)
         if refused:
-            for _ in range(refused):
-                self._setpoints.refuse('setpoint', inputs.OUT_OF_RANGE, '')
+            self._setpoints.refuse('setpoint', inputs.OUT_OF_RANGE, '', refused)
             # A restart holds for the next that is answered.
             setpoints = setpoints.chosen(outputs.answered)._replace(
                 restarts=np.diff(restarts_answered, prepend=0) > 0)
@@ -289,9 +305,12 @@ class _Run:
     def _seconds(self, stamps: Stamps) -> NDArray[np.float64]:
         """Return the time of the motion since the first setpoint; it never goes back."""
         steps = np.diff(stamps, prepend=stamps[0] if self._stamp is None else self._stamp)
-        elapsed = self._elapsed + np.cumsum(np.maximum(steps, 0))
-        self._stamp, self._elapsed = int(stamps[-1]), int(elapsed[-1])
-        seconds: NDArray[np.float64] = elapsed * 1e-9
+        # Seconds apart from nanoseconds: clocks that differ by years sum up to more than 2^63 ns.
+        whole, rest = np.divmod(np.maximum(steps, 0), _SECOND)
+        whole, rest = self._elapsed[0] + np.cumsum(whole), self._elapsed[1] + np.cumsum(rest)
+        self._stamp = int(stamps[-1])
+        self._elapsed = int(whole[-1] + rest[-1] // _SECOND), int(rest[-1] % _SECOND)
+        seconds: NDArray[np.float64] = (whole + rest // _SECOND) + (rest % _SECOND) * 1e-9
         return seconds
 
     def _take_measured(self, messages: Messages, which: NDArray[np.bool_]) -> None:
@@ -299,8 +318,7 @@ class _Run:
         stamps, efforts, refused = self._efforts.read(
             messages.data, messages.starts[which], messages.sizes[which])
         for reason, number in refused.items():
-            for _ in range(number):
-                self._setpoints.refuse(MEASURED, reason, '')
+            self._setpoints.refuse(MEASURED, reason, '', number)
         self._compared(self._comparison.add_measured(stamps, efforts))
 
     def _compared(self, compared: Any) -> None:
@@ -317,6 +335,10 @@ def _chosen(messages: Messages, which: NDArray[np.bool_]) -> Messages:
 def _topics(recording: Recording, parameters: Parameters, options: Options) -> dict[str, str]:
     """Return of each topic that is read its name in the bag."""
     wanted = inputs.SOURCES[parameters['setpoint.source']]
+    for name in options.topics:
+        if name != 'wrench' and f'setpoint/{name}' not in wanted:
+            raise StewartError(f'--{name}: is not read where setpoint.source is '
+                               f'{parameters["setpoint.source"]}')
     found = {key: _topic(recording, key, options) for key in wanted}
     wrench = options.topics.get('wrench')
     # One found by its type could be anything: a load cell, an estimate.
@@ -330,6 +352,19 @@ def _topics(recording: Recording, parameters: Parameters, options: Options) -> d
             raise BagError(f'{recording.path}: {name}: stands for '
                            f'{" and ".join(key for key in found if found[key] == name)}')
     return found
+
+
+def _come_by(recording: Recording, topics: Mapping[str, str], options: Options) -> list[str]:
+    """Return what a user should know of the choice of topics."""
+    notices = [f'{key} is taken from {name}, the only topic that it can be'
+               for key, name in topics.items()
+               if key in inputs.INPUT_TYPES and name != f'{options.node}/{key}'
+               and name not in options.topics.values()]
+    loads = sorted(name for name, kind in recording.topics.items()
+                   if kind == inputs.INPUT_TYPES[inputs.WRENCH] and name not in topics.values())
+    if loads and inputs.WRENCH not in topics:
+        notices.append(f'{", ".join(loads)}: loads that are not used; --wrench names one to use')
+    return notices
 
 
 def _topic(recording: Recording, key: str, options: Options) -> str:
@@ -371,8 +406,24 @@ def _of_type(recording: Recording, name: str, kind: str) -> str:
 
 
 def _held(recording: Recording) -> str:
-    return ', '.join(f'{name} ({kind})' for name, kind in sorted(
+    held = ', '.join(f'{name} ({kind})' for name, kind in sorted(
         recording.topics.items())) or 'nothing'
+    damage = _told(recording.damage)
+    return held + (f'; of it could not be read: {"; ".join(damage)}' if damage else '')
+
+
+def _compared_lines(measured: Mapping[str, Any]) -> list[str]:
+    rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
+                    measured['legs'].items() if found['residual_rms_n'] is not None)
+    touches = measured['touches']
+    lines = [f'compared {measured["setpoints_compared"]} setpoints; measured less computed '
+             f'force, RMS [N]: {rms or "none"}']
+    lines += [f'touched from t = {each["from_s"]:.2f} to {each["to_s"]:.2f} s by '
+              f'({", ".join(f"{part:.1f}" for part in each["force_n"])}) N'
+              for each in touches['strongest'][:_TOUCHES_TOLD]]
+    if touches['count'] > _TOUCHES_TOLD:
+        lines.append(f'and {touches["count"] - _TOUCHES_TOLD} more touches')
+    return lines
 
 
 @contextmanager
@@ -380,7 +431,7 @@ def _whole_folder(final: Path, options: Options) -> Iterator[Path]:
     """Give a folder that takes its final name only when all in it is written."""
     final.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(tempfile.mkdtemp(
-        prefix=f'.{final.name}.{options.run or "one"}.partial.', dir=final.parent))
+        prefix=f'{partial_name(final, options.run)}partial.', dir=final.parent))
     replaced = partial.with_name(f'{partial.name}.replaced')
     try:
         yield partial
@@ -391,8 +442,20 @@ def _whole_folder(final: Path, options: Options) -> Iterator[Path]:
             final.rename(replaced)
         partial.rename(final)
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
-        shutil.rmtree(replaced, ignore_errors=True)
+        if os.path.lexists(replaced) and not os.path.lexists(final):
+            replaced.rename(final)  # what was to replace it was never whole
+        for left in (partial, replaced):
+            if left.is_symlink():
+                left.unlink()
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def partial_name(final: Path, run: str) -> str:
+    """Return how the names of what is half written begin, of a folder in a run."""
+    # A long name would leave no room for what comes behind it.
+    short = (final.name if len(os.fsencode(final.name)) < 120
+             else hashlib.sha256(os.fsencode(final.name)).hexdigest())
+    return f'.{short}.{run or "one"}.'
 
 
 def _check_free(folder: Path, options: Options) -> None:

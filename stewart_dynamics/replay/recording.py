@@ -60,8 +60,6 @@ class Recording:
         What could not be read so far, in words.
     notices : list of str
         What a user should know of how it was read.
-    size : int
-        Bytes that there are to read.
 
     """
 
@@ -74,7 +72,6 @@ class Recording:
         faults = []
         try:
             files = self._files()
-            self.size = sum(file.stat().st_size for file in files)
             for file in files:
                 try:
                     self._sources.append((file, self._opened(file)))
@@ -116,6 +113,12 @@ class Recording:
             if source.unchecked:
                 self.notices.append(f'{file.name}: has no checksums: damaged bytes in it '
                                     'would not be noticed')
+
+    @property
+    def damage(self) -> list[str]:
+        """What is known by now to be unreadable, in words."""
+        return self.missing + [f'{file.name}: {what}' for file, source in self._sources
+                               for what in source.missing]
 
     def close(self) -> None:
         """Close the files."""

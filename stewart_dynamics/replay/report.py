@@ -151,7 +151,8 @@ class Report:
         rows[_LENGTHS:_LENGTHS + 6] = outputs.lengths.T
         rows[_RATES:_RATES + 6] = outputs.rates.T
         rows[_FORCES:_FORCES + 6] = forces.T
-        rows[_POWERS:_POWERS + 6] = (forces * outputs.rates).T
+        with np.errstate(over='ignore'):
+            rows[_POWERS:_POWERS + 6] = (forces * outputs.rates).T
         rows[_DETERMINANT] = outputs.determinants
         rows[_CONDITION] = outputs.conditions
         rows[_CAUSES:] = causes.reshape(len(seconds), -1).T

@@ -246,7 +246,10 @@ class Tables:
                 _number(leg['power_peak_w'], 1), _number(leg['energy_driving_j'], 1),
                 _number(leg['energy_braking_j'], 1)])),
             'Of the demanded forces, over the whole motion, gaps left out. Power is mechanical, '
-            'at the leg.')
+            'at the leg.' + (
+                ' <b>The motion comes too near a singularity: these numbers depend on how near a '
+                'sample happens to be, and size nothing.</b>'
+                if self._summary['singularity']['warnings'] else ''))
 
     def _causes(self) -> str:
         split = self._summary['causes']
@@ -300,7 +303,7 @@ class Tables:
         if mass['unmodelled_kg'] is not None:
             wrench += (f'<p>A mass of <b>{_digits(mass["unmodelled_kg"])} kg</b> more on the '
                        f'platform would explain {_number(mass["share"], 3)} of the force.</p>')
-        below = f'<div>{wrench}</div>{_touches(m["touches"])}'
+        below = f'<div>{wrench}</div>{_touches(m["touches"], m["setpoints_compared"])}'
         return _section('comparison', 'Measured against computed',
                         f'{legs}<div class="row">{below}</div>', note)
 
@@ -336,10 +339,10 @@ class Tables:
 
     def _refused(self) -> str:
         refused = self._summary['refused']
-        table = _table(['Topic', 'reason', 'messages'], [
+        table = _table(['Topic', 'reason', 'messages', 'first'], [
             [f'<code>{escape(str(each["topic"]))}</code>', escape(str(each['reason'])),
-             f'{each["count"]:,}'] for each in refused], 'wide') if refused else (
-                 '<p>No message was refused.</p>')
+             f'{each["count"]:,}', escape(str(each['first']))]
+            for each in refused], 'wide') if refused else '<p>No message was refused.</p>'
         return _section('refused', 'Refused messages', table)
 
 
@@ -387,8 +390,10 @@ def _section(key: str, title: str, content: str, note: str = '') -> str:
     return f'<section id="{key}"><h2>{title}</h2>{note}{content}</section>'
 
 
-def _touches(touches: Mapping[str, Any]) -> str:
+def _touches(touches: Mapping[str, Any], compared: int) -> str:
     """Return when something touched the platform, and with what load."""
+    if not compared:
+        return '<p>Nothing could be compared.</p>'
     if not touches['count']:
         return '<p>Nothing touched the platform that stands out of the residual.</p>'
     shown = touches['strongest'][:_SHOWN_TIMES]
