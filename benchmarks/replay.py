@@ -43,6 +43,7 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Channel, Chunk, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
 import numpy as np
+from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.rotation import to_quaternion
@@ -58,6 +59,7 @@ STEP = 1_000_000  # between setpoints [ns]: 1 kHz
 # As the recorder of ROS 2 does by default.
 CHUNK_BYTES = 768 * 1024
 MEGA = 1e6
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 
 # Name of the topic, its type, how many numbers it has.
 TOPICS = (('pose', 'geometry_msgs/msg/PoseStamped', 7),
@@ -148,6 +150,8 @@ class Turn(NamedTuple):
     """Memory [MB]."""
     report: float
     """Size of report.html [MB]."""
+    opened: float
+    """Until a browser has opened it and drawn the first plot [s]."""
 
 
 class Round(NamedTuple):
@@ -275,8 +279,24 @@ def take_turn(one: Contestant, bag: Path, setpoints: int) -> Turn:
         raise SystemExit(f'{one.name}: found {found} messages, must be {3 * setpoints}')
     report = next(iter(results.glob('*/report.html')), None)
     size = 0.0 if report is None else report.stat().st_size / MEGA
+    opening = 0.0 if report is None or setpoints == 1 else opened(report)
     shutil.rmtree(results, ignore_errors=True)
-    return Turn(seconds, processor, peak * 1024 / MEGA, size)
+    return Turn(seconds, processor, peak * 1024 / MEGA, size, opening)
+
+
+def opened(report: Path) -> float:
+    """Return how long a browser takes to open a report and draw its first plot; 0 without one."""
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        return 0.0
+    with sync_playwright() as playwright:
+        page = playwright.chromium.launch(executable_path=browser, args=[
+            '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']).new_page()
+        start = time.perf_counter()
+        page.goto(report.as_uri())
+        page.locator('#plots').scroll_into_view_if_needed()
+        page.locator('#plots .main-svg').first.wait_for()
+        return time.perf_counter() - start
 
 
 def processor_time() -> float:
@@ -321,11 +341,12 @@ def speed_table(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
 
 def memory_table(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
     """Return how time, memory and report grow with the bag."""
-    cells = [('', 'setpoints', 's', 'peak memory (MB)', 'report.html (MB)')]
+    cells = [('', 'setpoints', 's', 'peak memory (MB)', 'report.html (MB)', 'opened in (s)')]
     for one in CONTESTANTS:
         cells += [
             (one.name, f'{setpoints:,}', f'{turn.seconds:.1f}', f'{turn.peak:.0f}',
-             f'{turn.report:.1f}' if turn.report else '')
+             f'{turn.report:.1f}' if turn.report else '',
+             f'{turn.opened:.1f}' if turn.opened else '')
             for setpoints, turns in by_setpoints.items()
             for turn in [turns.get(one.name)] if turn is not None]
     return table(cells)
