@@ -385,11 +385,11 @@ def processor_name() -> str:
         'cpu family' in facts and 'model' in facts) else name
 
 
-def write(lines: list[str]) -> None:
+def write(lines: list[str], begin: str = BEGIN, end: str = END) -> None:
     """Put the lines between the README's markers."""
-    before, rest = README.read_text(encoding='utf-8').split(BEGIN)
-    _, after = rest.split(END)
-    text = '\n'.join([before + BEGIN, *lines, END + after])
+    before, rest = README.read_text(encoding='utf-8').split(begin)
+    _, after = rest.split(end)
+    text = '\n'.join([before + begin, *lines, end + after])
     README.write_text(text, encoding='utf-8')
 
 

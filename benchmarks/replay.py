@@ -37,7 +37,7 @@ import time
 from typing import NamedTuple
 import zlib
 
-from inverse_dynamics import Array, HERE, processor_name, README
+from inverse_dynamics import Array, HERE, processor_name, write
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -373,14 +373,6 @@ def measured_on(size: float, rounds: int) -> str:
             f'{rounds} rounds; the longer bag once.')
 
 
-def write(lines: list[str]) -> None:
-    """Put the lines between the README's markers."""
-    before, rest = README.read_text(encoding='utf-8').split(BEGIN)
-    _, after = rest.split(END)
-    text = '\n'.join([before + BEGIN, *lines, END + after])
-    README.write_text(text, encoding='utf-8')
-
-
 def main() -> None:
     """Make the bags, measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
@@ -418,7 +410,7 @@ def main() -> None:
     if options.json:
         options.json.write_text(json.dumps(rounds, indent=1) + '\n', encoding='utf-8')
     if options.write:
-        write(lines)
+        write(lines, BEGIN, END)
 
 
 if __name__ == '__main__':

@@ -44,7 +44,8 @@ from tqdm import tqdm
 
 from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.step import Batch, Outputs, STATE
+from stewart_dynamics.singularity import CAUSE, STATE
+from stewart_dynamics.step import Batch, Outputs
 from stewart_dynamics.summary import Summary
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -138,10 +139,9 @@ def report(demo: Demo, parameters: Parameters) -> str:
     results[:, runtime.RATES:runtime.RATES + 6] = [list(s.velocity) for s in demo.states]
     results[:, runtime.FORCES:runtime.FORCES + 6] = forces
     results[:, runtime.DETERMINANT] = demo.determinants[:many]
-    # a state begins with what the warning is for, 0 for none
     states = np.full((many, STATE), np.nan)
     changes = np.searchsorted([stamp for stamp, _ in demo.warnings], stamps, side='right')
-    states[:, 0] = [changed > 0 and demo.warnings[changed - 1][1] for changed in changes]
+    states[:, CAUSE] = [changed > 0 and demo.warnings[changed - 1][1] for changed in changes]
     every, none = np.ones(many, dtype=bool), np.zeros(many, dtype=bool)
     summary = Summary(parameters)
     summary.add(

@@ -261,7 +261,6 @@ class Layout:
         self.dtype = np.dtype({
             'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
             'offsets': [at for _, at in fields.values()], 'itemsize': self.size})
-        self._stamped = stamped
 
     @classmethod
     def of(cls, topic_reader: Callable[[bytes], Stamped], message: bytes) -> Layout | None:

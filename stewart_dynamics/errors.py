@@ -15,6 +15,11 @@
 """What goes wrong by the user's hand; every text says what, where, which value, which rule."""
 
 
+def one_line(exc: object) -> str:
+    """Return what an error says in one line, or its kind where it says nothing."""
+    return ' '.join(f'{exc}'.split()) or type(exc).__name__
+
+
 class StewartError(Exception):
     """The root of all errors that this package raises for its user to read."""
 

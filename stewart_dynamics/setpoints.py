@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,11 @@ class Messages(NamedTuple):
     """(M,): where each begins in them."""
     sizes: NDArray[np.int64]
     """(M,): how long each is."""
+
+    def chosen(self, which: Any) -> Messages:
+        """Return some of them: a slice, or an index or a mask (M,)."""
+        return self._replace(of_topic=self.of_topic[which], times=self.times[which],
+                             starts=self.starts[which], sizes=self.sizes[which])
 
     def each(self) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time and bytes of one after the other."""

@@ -61,36 +61,45 @@ class Cause(Enum):
 WARNING_CAUSES = tuple(Cause)
 
 
+# A state as a row of numbers: the cause's place in WARNING_CAUSES, whether it is inside
+# stop_condition, the last det(J) that was not zero, time to crossing, changes of sign so far.
+CAUSE, STOPPED, LAST, TIME, CROSSINGS, STATE = range(6)
+
+_NONE, _CONDITION, _FORETOLD, _CROSSED = range(4)
+
+
 @inlined
-def state_after(
-        thresholds: Array, warned: bool, stopped: bool, last: float, determinant: float,
-        determinant_rate: float, condition: float) -> tuple[int, bool, float]:
+def advance(state: Array, thresholds: Array, determinant: float, determinant_rate: float,
+            condition: float) -> None:
     """
-    Return cause of the warning (its place in Cause), inside stop_condition, time to crossing.
+    Bring a state on by one more sample.
 
     Parameters
     ----------
+    state : (STATE,)
+        Written.
     thresholds : (3,)
         warn_condition, stop_condition, warn_time.
-    warned, stopped : bool
-        Of the sample before.
-    last : float
-        det(J) of the last sample that had not zero; 0 where there was none.
     determinant, determinant_rate, condition : float
         Of the sample.
 
     """
+    leaving = LEAVING if state[CAUSE] > 0.0 else 1.0
     time = -determinant / determinant_rate if determinant_rate != 0.0 else np.inf
     if not time >= 0.0:
         time = np.inf
-    cause = 0
-    if determinant * last < 0.0:
-        cause = 3
-    elif condition >= thresholds[0] * (LEAVING if warned else 1.0):
-        cause = 1
-    elif time < thresholds[2] / (LEAVING if warned else 1.0):
-        cause = 2
-    return cause, condition >= thresholds[1] * (LEAVING if stopped else 1.0), time
+    cause = _NONE
+    if determinant * state[LAST] < 0.0:
+        cause = _CROSSED
+        state[CROSSINGS] += 1.0
+    elif condition >= thresholds[0] * leaving:
+        cause = _CONDITION
+    elif time < thresholds[2] / leaving:
+        cause = _FORETOLD
+    stop = thresholds[1] * (LEAVING if state[STOPPED] > 0.0 else 1.0)
+    state[CAUSE], state[STOPPED], state[TIME] = cause, condition >= stop, time
+    if determinant != 0.0:
+        state[LAST] = determinant
 
 
 class Singularity(NamedTuple):
@@ -106,15 +115,27 @@ class Singularity(NamedTuple):
     crossings: int = 0
     """Changes of sign of det(J) so far."""
 
+    @classmethod
+    def of(cls, state: Array) -> Singularity:
+        """Return the state that is in a row."""
+        cause, stopped, determinant, time, crossings = state.tolist()
+        return cls(cause > 0.0, stopped > 0.0, WARNING_CAUSES[int(cause)], determinant, time,
+                   int(crossings))
+
+    @property
+    def row(self) -> Array:
+        """The state in numbers, (STATE,)."""
+        # A warning may have been taken over without its cause.
+        cause = WARNING_CAUSES.index(self.cause) or self.warning
+        return np.array((cause, self.stopped, self.determinant, self.time_to_crossing,
+                         self.crossings), dtype=float)
+
     def after(self, parameters: Parameters, determinant: float, determinant_rate: float,
               condition: float) -> Singularity:
         """Return the state after one more sample."""
-        cause, stopped, time = state_after(
-            thresholds(parameters), self.warning, self.stopped, self.determinant, determinant,
-            determinant_rate, condition)
-        return Singularity(
-            cause > 0, stopped, WARNING_CAUSES[cause], determinant or self.determinant, time,
-            self.crossings + (WARNING_CAUSES[cause] is Cause.CROSSED))
+        state = self.row
+        advance(state, thresholds(parameters), determinant, determinant_rate, condition)
+        return Singularity.of(state)
 
 
 def thresholds(parameters: Parameters) -> Array:

@@ -34,7 +34,7 @@ from stewart_dynamics.compiled import entry_point, source_digest
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.singularity import (
-    Cause, Singularity, state_after, thresholds, UNSOLVABLE_CONDITION, WARNING_CAUSES)
+    advance, CAUSE, LAST, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -129,7 +129,7 @@ class Outputs(NamedTuple):
     forces: Array
     """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
     states: Array
-    """(N, STATE)"""
+    """Rows of Singularity (N, STATE)."""
     changed: Flags
     """(N,): the singularity warning is another than before."""
     exceeding: Flags
@@ -173,27 +173,23 @@ class Outputs(NamedTuple):
     @property
     def times_to_crossing(self) -> Array:
         """(N,) [s]; inf where det(J) does not go toward zero."""
-        return self.states[:, _TIME]
+        return self.states[:, TIME]
 
     @property
     def warnings(self) -> Flags:
         """(N,): the singularity warning is on."""
-        return self.states[:, _CAUSE] > 0.0
+        return self.states[:, CAUSE] > 0.0
 
     @property
     def stopped(self) -> Flags:
         """(N,): inside stop_condition."""
-        return self.states[:, _STOPPED] > 0.0
+        return self.states[:, STOPPED] > 0.0
 
     def singularity(self, n: int = -1) -> Singularity:
         """Return the state after one of them."""
-        cause, stopped, determinant, time, crossings = self.states[n].tolist()
-        return Singularity(cause > 0.0, stopped > 0.0, WARNING_CAUSES[int(cause)], determinant,
-                           time, int(crossings))
+        return Singularity.of(self.states[n])
 
 
-# A row of states.
-_CAUSE, _STOPPED, _LAST, _TIME, _CROSSINGS, STATE = range(6)
 # The numbers of the settings: thresholds, whether to suppress, and four limits of six legs.
 _SUPPRESS = 3
 _LIMITS = 4
@@ -222,19 +218,13 @@ def _entry_point(source: str) -> Callable[..., None]:
                 continue
             if restart:
                 restart = False
-                state[_CAUSE], state[_STOPPED], state[_LAST] = 0.0, 0.0, 0.0
-            determinant = results[n, runtime.DETERMINANT]
+                state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
             condition = results[n, runtime.CONDITION]
-            cause, stopped, time = state_after(
-                settings, state[_CAUSE] > 0.0, state[_STOPPED] > 0.0, state[_LAST], determinant,
-                results[n, runtime.DETERMINANT_RATE], condition)
-            state[_CAUSE], state[_STOPPED], state[_TIME] = cause, stopped, time
-            state[_CROSSINGS] += cause == _CROSSED
-            if determinant != 0.0:
-                state[_LAST] = determinant
+            advance(state, settings, results[n, runtime.DETERMINANT],
+                    results[n, runtime.DETERMINANT_RATE], condition)
             states[n] = state
             solved = condition < UNSOLVABLE_CONDITION
-            published = solved and not (stopped and settings[_SUPPRESS] > 0.0)
+            published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS] > 0.0)
             for leg in range(6):
                 length = results[n, runtime.LENGTHS + leg]
                 rate = results[n, runtime.RATES + leg]
@@ -251,7 +241,6 @@ def _entry_point(source: str) -> Callable[..., None]:
     return watch
 
 
-_CROSSED = WARNING_CAUSES.index(Cause.CROSSED)
 _watch = _entry_point(source_digest('compiled', 'cdr', 'inverse_dynamics', 'singularity', 'step'))
 
 
@@ -304,11 +293,7 @@ class Step:
         """Return what setpoints give one after the other; see the call for one."""
         results = self._platform.solve(setpoints.motions, setpoints.wrenches)
         many = len(results)
-        past = before or Singularity()
-        # A warning may have been taken over without its cause.
-        cause = WARNING_CAUSES.index(past.cause) or past.warning
-        state = np.array((cause, past.stopped, past.determinant, past.time_to_crossing,
-                          past.crossings), dtype=float)
+        state = (before or Singularity()).row
         forces, states = np.empty((many, 6)), np.empty((many, STATE))
         answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
         _watch(self._settings, setpoints.stamps, setpoints.restarts, state, results, forces,
@@ -317,7 +302,7 @@ class Step:
         if not answered.all():
             stamps, results, forces = stamps[answered], results[answered], forces[answered]
             states, exceeding = states[answered], exceeding[answered]
-        warnings = states[:, _CAUSE] > 0.0
+        warnings = states[:, CAUSE] > 0.0
         changed = np.empty(len(states), dtype=bool)
         changed[:1] = before is None or warnings[:1] != before.warning
         changed[1:] = warnings[1:] != warnings[:-1]

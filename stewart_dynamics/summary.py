@@ -42,10 +42,17 @@ TOLD = 100
 # A step longer than so many usual ones (and than setpoint.timeout) is a gap; the usual one is
 # the median of the steps between the first setpoints, so many.
 _GAP = 10.0
-_FIRST = 1000
+FIRST = 1000
 
 _TOLD_IN_TABLE = 5
 _WIDTH = 100
+
+
+def longest_step(first: Array, timeout: float) -> float:
+    """Return the longest step that is no gap [s], by those between the first FIRST setpoints."""
+    forward = first[first > 0.0]
+    usual = float(np.median(forward)) if len(forward) else 0.0
+    return float(max(timeout, _GAP * usual))
 
 
 class _Block(NamedTuple):
@@ -251,17 +258,15 @@ class Summary:
             self._add(block)
             return
         self._held.append(block)
-        if sum(len(block.seconds) for block in self._held) >= _FIRST:
+        if sum(len(block.seconds) for block in self._held) >= FIRST:
             self._release()
 
     def _release(self) -> None:
         """Take in what was held back until a gap can be told from a usual step."""
         if not self._held:
             return
-        steps = np.diff(np.concatenate([block.seconds for block in self._held])[:_FIRST])
-        forward = steps[steps > 0.0]
-        usual = float(np.median(forward)) if len(forward) else 0.0
-        self._gap = max(self._timeout, _GAP * usual)
+        steps = np.diff(np.concatenate([block.seconds for block in self._held])[:FIRST])
+        self._gap = longest_step(steps, self._timeout)
         held, self._held = self._held, []
         for block in held:
             self._add(block)

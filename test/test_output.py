@@ -44,7 +44,8 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.step import Batch, OUTPUT_TYPES, Outputs, STATE, Step
+from stewart_dynamics.singularity import CAUSE, STATE
+from stewart_dynamics.step import Batch, OUTPUT_TYPES, Outputs, Step
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
     {'singularity.action': 'suppress_forces'})
@@ -282,7 +283,7 @@ def test_a_bag_in_many_blocks_has_the_messages_of_one(tmp_path: Path) -> None:
 def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
                stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
     states = np.zeros((len(stamps), STATE))
-    states[:, 0] = warnings
+    states[:, CAUSE] = warnings
     flags = np.zeros(len(stamps), dtype=bool)
     return Outputs(~flags, stamps, results, forces, states, flags, flags)
 

@@ -688,9 +688,7 @@ def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **option
     edges = [0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]
     whole = together(given)
     for first, end in zip(edges[:-1], edges[1:], strict=True):
-        batch = many.setpoints.take_many(whole._replace(
-            of_topic=whole.of_topic[first:end], times=whole.times[first:end],
-            starts=whole.starts[first:end], sizes=whole.sizes[first:end]))
+        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
         assert batch.motions.shape == (len(batch.stamps), 24)
         assert batch.wrenches.shape == (len(batch.stamps), 6)
         found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart)

@@ -36,7 +36,8 @@ from referees import (
 from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics import Parameters
 from stewart_dynamics.causes import CAUSES, ForceCauses
-from stewart_dynamics.step import Batch, Outputs, STATE, Step
+from stewart_dynamics.singularity import CAUSE, STATE, TIME
+from stewart_dynamics.step import Batch, Outputs, Step
 from stewart_dynamics.summary import Summary, TOLD
 
 Array = NDArray[np.float64]
@@ -99,7 +100,7 @@ class Samples:
             np.zeros((many, 1)), self.condition[:, None]], axis=1)
         assert results.shape == (many, runtime.RESULT)
         states = np.zeros((many, STATE))
-        states[:, 0], states[:, 3] = self.warnings, self.time_to_crossing
+        states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         flags = np.zeros(many, dtype=bool)
         outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)

@@ -27,16 +27,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from stewart_dynamics.summary import FIRST, longest_step
+
 Array = NDArray[np.float64]
 
 # More buckets than a plot has pixels across gain nothing. Even, since neighbours are merged.
 BUCKETS = 1024
 
-# A step in time longer than this many usual ones breaks the line, as it is a gap in the summary;
-# usual is the median of the steps between so many first samples. Of more breaks than can be told
-# apart in a plot the longest are kept.
-_LONG = 10.0
-_FIRST_STEPS = 999
+# A gap in the summary breaks the line. Of more than can be told apart in a plot the longest do.
 _MOST_BREAKS = 1000
 
 # Frames are told apart from here on [s]; a power of two, so that halves of halves meet exactly.
@@ -134,9 +132,7 @@ class Curves:
 
     def breaks(self) -> Array:
         """Return (B, 2) [s]: between which samples so much time passed that no line joins them."""
-        forward = self._first_steps[self._first_steps > 0.0]
-        usual = float(np.median(forward)) if len(forward) else 0.0
-        longest = max(self._timeout, _LONG * usual)
+        longest = longest_step(self._first_steps, self._timeout)
         return self._breaks[self._breaks[:, 1] - self._breaks[:, 0] > longest]
 
     def _with_ends(self, channel: int, times: Array, values: Array) -> tuple[Array, Array]:
@@ -190,7 +186,7 @@ class Curves:
         if self.samples:
             seconds = np.concatenate([[self._end_times[1]], seconds])
         steps = np.diff(seconds)
-        wanted = _FIRST_STEPS - len(self._first_steps)
+        wanted = FIRST - 1 - len(self._first_steps)
         if wanted:
             self._first_steps = np.concatenate([self._first_steps, steps[:wanted]])
         at = np.flatnonzero(steps > self._timeout)

@@ -46,12 +46,12 @@ import uuid
 
 from tqdm import tqdm
 
-from stewart_dynamics.errors import BagError, StewartError
+from stewart_dynamics.errors import BagError, one_line, StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.index import Cell, RESULTS, row_of, write_fleet
 from stewart_dynamics.replay.one import (
-    BAD_INPUT, DONE, LIMIT_MET, Options, partial_name, PARTLY_READ, replay)
+    BAD_INPUT, code_of, DONE, LIMIT_MET, Options, partial_name, PARTLY_READ, replay)
 
 _GRAVITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
 _TRIES = 2
@@ -215,9 +215,7 @@ def _finished(task: _Task) -> Ended | None:
             return None
     except (OSError, ValueError, TypeError, KeyError):  # none, or not one of ours
         return None
-    code = (PARTLY_READ if not summary['complete']
-            else LIMIT_MET if summary['limit_met'] else DONE)
-    return _whole(task, code, summary)
+    return _whole(task, code_of(summary), summary)
 
 
 def _whole(task: _Task, code: int, summary: dict[str, Any], text: str = '') -> Ended:
@@ -521,7 +519,7 @@ def _connected(dask: Any, address: str) -> Iterator[Any]:
         asyncio.run(_answer(dask, address))
         client = dask.Client(address, timeout=_PATIENCE, set_as_default=False)
     except Exception as exc:
-        why = ' '.join(f'{exc}'.split()) or type(exc).__name__
+        why = one_line(exc)
         raise StewartError(f'{address}: no Dask scheduler answers there: {why}') from exc
     with client:
         yield client

@@ -45,7 +45,7 @@ from numpy.typing import NDArray
 import zstandard
 
 from stewart_dynamics.compiled import entry_point
-from stewart_dynamics.errors import BagError
+from stewart_dynamics.errors import BagError, one_line
 
 Integers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
@@ -428,8 +428,7 @@ class McapFile:
                     raise ValueError(fault)
         except Exception as exc:  # damaged bytes: whatever the decompressors make of them
             if say:
-                what = ' '.join(f'{exc}'.split()) or type(exc).__name__
-                self.missing.append(f'the chunk at byte {piece.offset}: {what}')
+                self.missing.append(f'the chunk at byte {piece.offset}: {one_line(exc)}')
             return None
         found = found[found[:, _CHANNEL] >= 0]
         if say and not np.isin(found[:, _CHANNEL], list(self._channels)).all():

@@ -150,9 +150,13 @@ def replay(
             _write_json(partial / 'summary.json', summary)
             if run.report is not None:
                 run.report.write(partial / 'report.html', summary)
-    code = (PARTLY_READ if not summary['complete'] else LIMIT_MET if summary['limit_met']
+    return Replayed(bag, folder, summary, run.text(summary), code_of(summary))
+
+
+def code_of(summary: Mapping[str, Any]) -> int:
+    """Return the code of a bag that was replayed."""
+    return (PARTLY_READ if not summary['complete'] else LIMIT_MET if summary['limit_met']
             else DONE)
-    return Replayed(bag, folder, summary, run.text(summary), code)
 
 
 class _Run:
@@ -196,7 +200,7 @@ class _Run:
             measured = messages.of_topic == messages.topics.index(MEASURED)
             if measured.any():
                 self._take_measured(messages, measured)
-                messages = _chosen(messages, ~measured)
+                messages = messages.chosen(~measured)
         setpoints = self._setpoints.take_many(messages)
         if self._differentiator is not None:
             setpoints = self._differentiator.add(setpoints)
@@ -324,12 +328,6 @@ class _Run:
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):
             self.report.add_measured(*compared)
-
-
-def _chosen(messages: Messages, which: NDArray[np.bool_]) -> Messages:
-    return messages._replace(
-        of_topic=messages.of_topic[which], times=messages.times[which],
-        starts=messages.starts[which], sizes=messages.sizes[which])
 
 
 def _topics(recording: Recording, parameters: Parameters, options: Options) -> dict[str, str]:

@@ -84,7 +84,7 @@ class OutputBag:
                     'offered_qos_profiles': '', 'topic_type_hash': self._hashes[kind]})
             for n, (topic, kind) in enumerate(OUTPUT_TYPES.items(), start=1)}
         self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
-        self._declare()
+        self._file.write(self._declarations())
 
     def write(self, times: Stamps, outputs: Outputs) -> None:
         """Write a chunk: what each setpoint gave, recorded at these times (N,) [ns]."""
@@ -120,21 +120,16 @@ class OutputBag:
             self._file.write(_bytes(DataEnd(data_section_crc=0)))
             start = self._file.tell()
             begin, end = self._times or (0, 0)
-            self._declare()
-            self._file.write(_bytes(Statistics(
+            statistics = Statistics(
                 message_count=self._counts.total(), schema_count=len(self._schemas),
                 channel_count=len(self._channels), attachment_count=0, metadata_count=0,
                 chunk_count=len(self._chunks), message_start_time=begin, message_end_time=end,
-                channel_message_counts=dict(self._counts))))
-            for chunk in self._chunks:
-                self._file.write(_bytes(chunk))
-            self._file.flush()
-            with (self._folder / f'{self._folder.name}.mcap').open('rb') as written:
-                written.seek(start)
-                summary = written.read()
-            footer = _bytes(Footer(summary_start=start, summary_offset_start=0, summary_crc=0))
-            self._file.write(footer[:-4])
-            self._file.write(zlib.crc32(summary + footer[:-4]).to_bytes(4, 'little') + MAGIC)
+                channel_message_counts=dict(self._counts))
+            footer = Footer(summary_start=start, summary_offset_start=0, summary_crc=0)
+            # The checksum covers all but itself.
+            index = (self._declarations() + _bytes(statistics)
+                     + b''.join(map(_bytes, self._chunks)) + _bytes(footer)[:-4])
+            self._file.write(index + zlib.crc32(index).to_bytes(4, 'little') + MAGIC)
         with (self._folder / 'metadata.yaml').open('w', encoding='utf-8') as file:
             yaml = YAML(typ='safe')
             yaml.default_flow_style = False
@@ -144,9 +139,8 @@ class OutputBag:
         """Close what is not to be kept."""
         self._file.close()
 
-    def _declare(self) -> None:
-        for record in (*self._schemas, *self._channels.values()):
-            self._file.write(_bytes(record))
+    def _declarations(self) -> bytes:
+        return b''.join(map(_bytes, (*self._schemas, *self._channels.values())))
 
     def _write_chunk(self, content: NDArray[np.uint8], begin: int, end: int,
                      indexes: dict[int, list[tuple[Stamps, Stamps]]]) -> None:

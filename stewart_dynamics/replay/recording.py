@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 import zstandard
 
-from stewart_dynamics.errors import BagError, ParameterError
+from stewart_dynamics.errors import BagError, one_line, ParameterError
 from stewart_dynamics.parameters import read_document
 from stewart_dynamics.replay.bags import STORAGES
 from stewart_dynamics.replay.mcap_file import Block, compact, joined, MAGIC, McapFile
@@ -83,7 +83,7 @@ class Recording:
             self.close()
             # A name that no file can have, links in a circle, a folder that cannot be listed.
             if isinstance(exc, (OSError, RuntimeError, ValueError)):
-                raise BagError(f'{path}: not a bag that can be read: {_one_line(exc)}') from exc
+                raise BagError(f'{path}: not a bag that can be read: {one_line(exc)}') from exc
             raise
         self.missing += faults
         kinds: dict[str, set[str]] = {}
@@ -181,7 +181,7 @@ class Recording:
         except BagError:
             raise
         except (OSError, sqlite3.Error) as exc:
-            raise BagError(f'{file}: not a bag that can be read: {_one_line(exc)}') from exc
+            raise BagError(f'{file}: not a bag that can be read: {one_line(exc)}') from exc
         # Where the recorder was killed, it holds what is not in the file, or what is undone.
         for suffix in ('-wal', '-journal'):
             journal = file.with_name(f'{file.name}{suffix}')
@@ -199,7 +199,7 @@ class Recording:
                 shutil.copyfileobj(zstandard.ZstdDecompressor().stream_reader(
                     packed, read_across_frames=True), stream)
             except zstandard.ZstdError as exc:
-                self.missing.append(f'{file.name}: {_one_line(exc)}')
+                self.missing.append(f'{file.name}: {one_line(exc)}')
         return unpacked
 
 
@@ -249,7 +249,7 @@ class _SqliteFile:
                 at_end = not rows
             except sqlite3.Error as exc:
                 self.missing.append(f'what came after {count + len(rows)} messages: '
-                                    f'{_one_line(exc)}')
+                                    f'{one_line(exc)}')
                 at_end = True
             sound = [row for row in rows if isinstance(row[1], int) and isinstance(row[2], bytes)]
             if len(sound) < len(rows):
@@ -272,7 +272,7 @@ class _SqliteFile:
         except sqlite3.Error as exc:
             found = exc
         if found != 'ok':
-            self.missing.append(f'damaged, what is missing is not known: {_one_line(found)}')
+            self.missing.append(f'damaged, what is missing is not known: {one_line(found)}')
 
     def close(self) -> None:
         """Close the file."""
@@ -338,7 +338,3 @@ def _by_number(file: Path) -> list[tuple[int, str]]:
     """Return what sorts names in the order of the numbers in them: rosbag2 counts its files."""
     return [(int(part), '') if part.isdecimal() else (-1, part)
             for part in re.split(r'(\d+)', file.name)]
-
-
-def _one_line(exc: object) -> str:
-    return ' '.join(f'{exc}'.split()) or type(exc).__name__
