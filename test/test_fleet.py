@@ -123,8 +123,10 @@ def until(condition: Callable[[], Any], what: str) -> Any:
 
 
 def process_in(folder: Path, bag: str) -> int | None:
-    """Return the process that is writing the results of a bag."""
+    """Return the other process that is writing the results of a bag."""
     for process in Path('/proc').glob('[0-9]*'):
+        if process.name == f'{os.getpid()}':
+            continue  # it clears away what others left, and has that folder open meanwhile
         try:
             held = [os.readlink(file) for file in (process / 'fd').iterdir()]
         except OSError:  # has ended, or is not ours
