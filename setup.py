@@ -29,6 +29,7 @@ install_requires = [
     'numpy>=1.26',
     'orjson>=3.9',
     'plotly>=6',  # plotly.js in the report
+    'pyyaml>=6',
     'rosbags>=0.11',
     'ruamel.yaml>=0.18',
     'tqdm>=4.64',
@@ -90,6 +91,7 @@ setup(
         (f'{share}/config', sorted(glob('config/*.yaml'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
+        (f'{share}/security', sorted(glob('security/*'))),
     ],
     python_requires='>=3.10,<3.14',
     install_requires=install_requires,

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The parameters: one table of them, and the YAML that is read by it.
+The parameters: one table of them, and the files and values that are checked by it.
 
 The check, the node's declaration and the README's table all come from PARAMETERS.
 """
@@ -29,11 +29,9 @@ from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 
 import numpy as np
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-from ruamel.yaml.tokens import AliasToken
 
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.ros_yaml import no_space, read_document, read_value, value_of
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -98,7 +96,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('geometry.platform_joints', 'double',
               'x y z of the six platform joints, in the same order, platform frame', 'm',
               required=True, sizes=(18,)),
-    _legs('geometry.zero_length', 'length at which the published position is zero', 'm'),
+    _legs('geometry.zero_length', 'length at which the published position is zero', 'm',
+          minimum=0.0),
     Parameter('platform.mass', 'double', 'mass of the platform with all that it carries', 'kg',
               required=True, minimum=0.0, above=True, while_active=True),
     Parameter('platform.center_of_mass', 'double', 'its center of mass, platform axes', 'm',
@@ -161,14 +160,15 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
 )})
 
-_DEEPEST = 8
-_LARGEST = 1_000_000  # [bytes]
+# A machine's file has 4 kB, that of a whole robot seldom more than 50. ROS's own reader takes
+# 2 s at worst for a file of this size, but a minute for a list of 500 kB, of any node.
+_LARGEST = 100_000  # [bytes]
 
 # What ROS itself declares in every node.
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 _OF_ROS_PREFIX = 'qos_overrides.'
 
-_PYTHON_TYPES = {'string': str, 'double': float, 'bool': bool}
+_PYTHON_TYPES: Mapping[str, Any] = {'string': str, 'double': float, 'bool': bool}
 
 
 def is_of_ros(name: str) -> bool:
@@ -196,8 +196,8 @@ class ParameterSet(Mapping[str, Any]):
     node: ClassVar[str]
 
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters') -> None:
-        for name in values:
-            self._declared(name, source)
+        for name, value in values.items():
+            self.declared(name, value, source)
         self._given = {name: _plain(value) for name, value in values.items()
                        if value is not None}
         self._values = {
@@ -262,16 +262,29 @@ class ParameterSet(Mapping[str, Any]):
     @classmethod
     def check_file(cls, path: str | Path) -> None:
         """Raise ParameterError if what a file gives a node breaks a rule; it need not be all."""
-        for name, value in _sections(path, cls.node):
-            _checked(cls._declared(name, str(path)), value, str(path))
+        for name, value in list(_of_node(_document(path), cls.node, str(path))):
+            _checked(cls.declared(name, value, str(path)), value, str(path))
 
     @classmethod
-    def _declared(cls, name: str, source: str) -> Parameter:
-        if name not in cls.table:
-            near = difflib.get_close_matches(str(name), cls.table, n=1)
-            raise ParameterError(f'{source}: {name}: unknown parameter'
-                                 + (f'; do you mean {near[0]}?' if near else ''))
-        return cls.table[name]
+    def check_value(cls, name: str, text: str, source: str) -> None:
+        """Raise ParameterError if the text of a value, as a command line has it, breaks a rule."""
+        given = {name: read_value(text, f'{source}: {_name(name)}')}
+        for _, value in _flat(given, '', source):
+            _check_given(name, value, source)
+            if not is_of_ros(name):
+                _checked(cls.declared(name, value, source), value, source)
+
+    @classmethod
+    def declared(cls, name: str, value: Any = None, source: str = 'parameters') -> Parameter:
+        """Return what is known of a parameter; else ParameterError names the nearest one."""
+        if name in cls.table:
+            return cls.table[name]
+        shown = _name(name)
+        near = difflib.get_close_matches(shown, cls.table, n=1)
+        hint = f'; do you mean {near[0]}?' if near else ''
+        if isinstance(value, str) and (missing := no_space(value)):
+            hint = f'; {missing}'
+        raise ParameterError(f'{source}: {shown}: unknown parameter{hint}')
 
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""
@@ -305,14 +318,14 @@ class Parameters(ParameterSet):
             raise ParameterError(
                 f'{source}: singularity.stop_condition: {stop}: must be at least '
                 f'singularity.warn_condition, {warn}')
+        platform_joints = self['geometry.platform_joints']
+        size = float(np.mean(np.linalg.norm(
+            platform_joints - platform_joints.mean(axis=0), axis=1)))
+        if size == 0.0:
+            raise ParameterError(
+                f'{source}: geometry.platform_joints: all six are one point: they must '
+                'span the platform')
         if self['singularity.characteristic_length'] is None:
-            platform_joints = self['geometry.platform_joints']
-            size = float(np.mean(np.linalg.norm(
-                platform_joints - platform_joints.mean(axis=0), axis=1)))
-            if size == 0.0:
-                raise ParameterError(
-                    f'{source}: geometry.platform_joints: all six are one point: they must '
-                    'span the platform')
             self._values['singularity.characteristic_length'] = size
 
 
@@ -328,67 +341,115 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
 
     Sections apply in the file's order, a later one over an earlier one, as in ROS.
     """
-    values = dict(_sections(path, node))
+    document = _document(path)
+    values = dict(_of_node(document, node, str(path)))
     if not values:
+        held = ', '.join(map(_name, list(document)[:9])) + (', ...' if len(document) > 9 else '')
         raise ParameterError(
-            f"{path}: holds {', '.join(map(str, read_document(path)))}, but no parameters under "
-            f"'/**:' or '{node}:'")
+            f"{path}: holds {held}, but no parameters under '/**:' or '{node}:'")
     return values
 
 
-def _sections(path: str | Path, node: str) -> Iterator[tuple[str, Any]]:
-    """Return the names and values that a file holds for a node, in the file's order."""
-    for section, content in read_document(path).items():
-        if not _is_meant(str(section), node):
-            continue
-        if not isinstance(content, dict) or 'ros__parameters' not in content:
-            raise ParameterError(f"{path}: {section}: must hold 'ros__parameters:'")
-        for name, value in _flat(content['ros__parameters'] or {}, '', str(path)):
-            if value is None:
-                raise ParameterError(f'{path}: {name}: has no value')
-            if not is_of_ros(name):
-                yield name, value
+def _document(path: str | Path) -> dict[str, Any]:
+    return read_document(path, _LARGEST)
+
+
+def _of_node(document: dict[str, Any], node: str, source: str) -> Iterator[tuple[str, Any]]:
+    """
+    Yield the names and values that a document holds for a node, in their order.
+
+    What ROS's reader takes otherwise than it is meant is refused in the sections of other
+    nodes as well: it reads all of them.
+    """
+    for name, content in document.items():
+        sections = list(_sections(name, content))
+        if not sections and _is_meant(name, node):
+            raise ParameterError(f"{source}: {_name(name)}: must hold 'ros__parameters:'")
+        for section, parameters in sections:
+            is_meant = _is_meant(section, node)
+            seen = set()
+            for parameter, value in _flat(parameters, '', source):
+                if parameter in seen:
+                    raise ParameterError(
+                        f'{source}: {_name(parameter)}: given twice under {_name(section)}')
+                seen.add(parameter)
+                if not is_meant:
+                    continue
+                _check_given(parameter, value, source)
+                if not is_of_ros(parameter):
+                    yield parameter, value
+
+
+def _sections(name: str, content: Any) -> Iterator[tuple[str, Any]]:
+    """Yield nodes' names, their namespaces before them, and what ros__parameters holds."""
+    if not isinstance(content, dict):
+        return
+    for key, value in content.items():
+        if key == 'ros__parameters':
+            yield name, {} if value is None else value
+        else:
+            yield from _sections(f'{name}/{key}', value)
 
 
 def _is_meant(section: str, node: str) -> bool:
-    """Return whether a section is for a node: by its name, * for one part of it, ** for any."""
-    pattern = re.escape(section.strip('/')).replace(r'\*\*', '.*').replace(r'\*', '[^/]*')
-    return re.fullmatch(pattern, node.strip('/')) is not None
-
-
-def read_document(path: str | Path) -> dict[Any, Any]:
-    """Return what a YAML file holds, a mapping; ParameterError says why it cannot be read."""
-    try:
-        if Path(path).stat().st_size > _LARGEST:
-            raise ParameterError(f'{path}: larger than {_LARGEST} bytes')
-        text = Path(path).read_text(encoding='utf-8')
-        # ROS's own reader refuses aliases.
-        if any(isinstance(token, AliasToken) for token in YAML(typ='safe', pure=True).scan(text)):
-            raise ParameterError(f'{path}: has a YAML alias (*): write the value out')
-        document = YAML(typ='safe', pure=True).load(text)
-    except (OSError, UnicodeDecodeError) as exc:
-        reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
-        raise ParameterError(f'{path}: cannot be read: {reason}') from exc
-    except (YAMLError, ValueError, LookupError, RecursionError) as exc:
-        # ruamel.yaml lets bare errors through for a tag whose text does not fit it.
-        raise ParameterError(f'{path}: not YAML: {" ".join(str(exc).split())}') from exc
-    if not isinstance(document, dict):
-        raise ParameterError(f"{path}: must begin with '/**:' or a node's name")
-    return document
+    """Return whether a section is for a node: /* is one part of its name, /** are any."""
+    pattern = re.escape(f'/{section.removeprefix("/")}')
+    pattern = re.sub(r'(/\\\*\\\*)+', r'(/\\w+)*', pattern).replace(r'/\*', r'/\w+')
+    return re.fullmatch(pattern, f'/{node.strip("/")}') is not None
 
 
 def _flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
-    if prefix.count('.') > _DEEPEST:
-        raise ParameterError(f'{source}: {prefix[:40]}...: names nest deeper than {_DEEPEST}')
     if not isinstance(tree, dict):
-        raise ParameterError(f'{source}: {prefix or "ros__parameters"}: {tree!r}: must hold '
-                             'names and values')
+        raise ParameterError(f'{source}: {_name(prefix or "ros__parameters")}: {_cut(tree)}: '
+                             'must hold names and values')
     for key, value in tree.items():
         name = f'{prefix}{key}'
         if isinstance(value, dict):
             yield from _flat(value, f'{name}.', source)
-        else:
-            yield name, value
+            continue
+        if isinstance(value, list) and any(isinstance(each, list | dict) for each in value):
+            raise ParameterError(
+                f'{source}: {_name(name)}: {_cut(value)}: has a list or a group in the list: '
+                'write the numbers one after the other, [x1, y1, z1, x2, y2, z2]')
+        yield name, value
+
+
+def _name(name: Any) -> str:
+    """Return a name as an error shows it, whatever was given as one."""
+    text = str(name)
+    if not text.isprintable():
+        text = repr(text)
+    return text if len(text) < 80 else f'{text:.77}...'
+
+
+def _cut(value: Any) -> str:
+    """Return a value as an error shows it."""
+    value = list(value) if isinstance(value, tuple) else value
+    try:
+        # No more of a long list than is shown.
+        shown = repr(value[:40] if isinstance(value, list | str | bytes) else value)
+    except ValueError:  # an integer of more digits than Python writes
+        shown = f'an integer of {value.bit_length()} bits'
+    return shown if len(shown) < 80 else f'{shown:.77}...'
+
+
+def _check_given(name: str, value: Any, source: str) -> None:
+    """Raise ParameterError for a value that ROS goes on without, and say what may be meant."""
+    if value == []:
+        raise ParameterError(f'{source}: {_name(name)}: []: ROS takes no empty list: leave the '
+                             'name out')
+    if value is not None:
+        # ROS goes on without it: a node that was to take simulated time does not.
+        if name in _OF_ROS and not isinstance(value, bool):
+            raise ParameterError(f'{source}: {name}: {_cut(value)}: must be a bool')
+        return
+    key = name.rpartition('.')[2]
+    hint = ''
+    if missing := no_space(name):  # {mass:0.5}
+        hint = f'; {missing}'
+    elif key.isdecimal():  # {mass: 0,5}
+        hint = '; a decimal comma? write 0.5, not 0,5'
+    raise ParameterError(f'{source}: {_name(name)}: has no value{hint}')
 
 
 def _plain(value: Any) -> Any:
@@ -415,8 +476,11 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
     if not entries and parameter.default == ():
         return None
     if is_array and len(entries) not in parameter.sizes:
-        raise _broken(parameter, value, source, 'must have {} entries, has {}'.format(
-            ' or '.join(map(str, parameter.sizes)), len(entries)))
+        has = f'must have {" or ".join(map(str, parameter.sizes))} entries, has {len(entries)}'
+        if parameter.kind == 'double' and len(entries) > min(parameter.sizes) and any(
+                type(entry) is int for entry in entries):  # [0,5, 1,5]
+            has += '; decimal commas? write 0.5, not 0,5'
+        raise _broken(parameter, value, source, has)
     for entry in entries:
         _check_entry(parameter, entry, source)
     if parameter.kind != 'double':
@@ -429,16 +493,9 @@ def _checked(parameter: Parameter, value: Any, source: str) -> Any:
     return array
 
 
-def _is_a(entry: Any, kind: str) -> bool:
-    return isinstance(entry, _PYTHON_TYPES[kind])
-
-
 def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
-    if not _is_a(entry, parameter.kind):
-        if parameter.kind == 'double' and isinstance(entry, int) and not isinstance(entry, bool):
-            written = f': write {entry}.0' if abs(entry) < 1e15 else ''
-            raise _broken(parameter, entry, source, f'is an integer, must be a double{written}')
-        raise _broken(parameter, entry, source, f'must be a {parameter.kind}')
+    if not isinstance(entry, _PYTHON_TYPES[parameter.kind]):
+        raise _broken(parameter, entry, source, _wrong_type(parameter.kind, entry))
     if parameter.kind == 'string' and not entry.isprintable():
         raise _broken(parameter, entry, source, 'must be printable text')
     if parameter.choices and entry not in parameter.choices:
@@ -451,12 +508,26 @@ def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
             raise _broken(parameter, entry, source, f'must be {parameter.rule}')
 
 
+def _wrong_type(kind: str, entry: Any) -> str:
+    """Return in words that a value is of another type, and what is probably meant."""
+    if kind == 'double' and type(entry) is int:
+        written = f': write {entry}.0' if abs(entry) < 1e15 else ''
+        return f'is an integer, must be a double{written}'
+    if kind == 'string':
+        return 'must be a string' + (
+            ': put it in quotes' if isinstance(entry, bool | int | float) else '')
+    if kind == 'double' and isinstance(entry, str) and len(entry) < 80:
+        if re.fullmatch(r'[+-]?[0-9]+,[0-9]+', entry, re.ASCII):
+            return f'must be a double; a decimal comma? write {entry.replace(",", ".")}'
+        if isinstance(value_of(entry), int | float):
+            return 'must be a double, not a text: write it without quotes'
+        if re.fullmatch(r'[+-]?[0-9][0-9_ ]*[0-9](\.[0-9_]*)?', entry, re.ASCII):
+            return 'must be a double: write its digits without anything between them'
+        if re.fullmatch(r'[+-]?[0-9]*\.?[0-9]*([eE][+-]?[0-9]+)?', entry, re.ASCII):
+            return 'must be a double: it is out of range'
+    return f'must be a {kind}'
+
+
 def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> ParameterError:
     unit = f' {parameter.unit}' if parameter.unit and isinstance(value, float) else ''
-    value = list(value) if isinstance(value, tuple) else value
-    try:
-        shown = f'{value!r}'
-    except ValueError:  # an integer of more digits than Python writes
-        shown = f'an integer of {value.bit_length()} bits'
-    shown = shown if len(shown) < 80 else f'{shown:.77}...'
-    return ParameterError(f'{source}: {parameter.name}: {shown}{unit}: {rule}')
+    return ParameterError(f'{source}: {parameter.name}: {_cut(value)}{unit}: {rule}')

@@ -58,7 +58,8 @@ class TrajectoryNode(Node):
 
     def __init__(self, done: Future) -> None:
         super().__init__(
-            'stewart_trajectory', automatically_declare_parameters_from_overrides=True)
+            'stewart_trajectory', automatically_declare_parameters_from_overrides=True,
+            allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, TrajectoryParameters)
         self._done = done
         self._loop = self._settings['loop']

@@ -775,9 +775,10 @@ def test_parameters_are_described_with_text_and_unit(node: DynamicsNode) -> None
         'describe_parameters', DescribeParameters.Request(names=names)).descriptors
     assert mass.name == 'platform.mass'
     assert mass.description == 'mass of the platform with all that it carries [kg]'
-    assert mass.additional_constraints == 'more than 0'
+    assert mass.additional_constraints == 'more than 0; set also while active'
     assert force.description.endswith('[N]')
-    assert action.additional_constraints == 'one of warn, suppress_forces'
+    assert action.additional_constraints == (
+        'one of warn, suppress_forces; set also while active')
     assert warn_time.description.endswith('[s]')
 
 

@@ -29,6 +29,7 @@ from tqdm import tqdm
 from stewart_dynamics import compiled
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, folders_of_results
 from stewart_dynamics.replay.fleet import replay_fleet
 from stewart_dynamics.replay.one import (
@@ -133,6 +134,8 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     bags = folders_of_results(given.bags, given.output)
     if compiled.HINT:
         print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
+    for doubt in doubts(parameters):
+        print(f'stewart_replay: {doubt}', file=sys.stderr)
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(

@@ -1,0 +1,277 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The doubts about a machine's parameters: none of good machines, one for each slip."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from referees import random_parameters, ROOT, symmetric_parameters
+
+from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.plausibility import doubts
+from stewart_dynamics.rotation import from_euler
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+
+
+def ring(radius: float, spread: float, turn: float = 0.0, height: float = 0.0) -> Array:
+    """Return six joints in pairs, each pair's so many degrees either way of 0, 120 and 240."""
+    angles = np.deg2rad(turn + np.repeat([0.0, 120.0, 240.0], 2)
+                        + np.tile([-spread, spread], 3))
+    return np.column_stack([radius * np.cos(angles), radius * np.sin(angles),
+                            np.full(6, height)])
+
+
+def machine(base: Array, platform: Array, mass: float, inertia: float,
+            **others: Any) -> dict[str, Any]:
+    """Return the parameters of a machine, with one principal moment for all axes."""
+    return {'geometry.base_joints': base.ravel(), 'geometry.platform_joints': platform.ravel(),
+            'platform.mass': mass, 'platform.inertia': [inertia, 0.0, 0.0, inertia, 0.0, inertia],
+            **{name.replace('__', '.'): value for name, value in others.items()}}
+
+
+# Machines of every size that is built.
+MACHINES = {
+    # MathWorks' example of a Stewart platform (Smith and Wendlandt, 2002)
+    'textbook': machine(
+        ring(3.0, 2.5), np.roll(ring(1.0, 10.0, 60.0), 1, axis=0), 1200.0, 300.0,
+        geometry__zero_length=2.8),
+    # joints on 1.65 and 1.6 m, actuators of 1.25 m stroke
+    'flight simulator': machine(
+        ring(1.65, 10.5), np.roll(ring(1.6, 3.6, 60.0), 1, axis=0), 4000.0, 9000.0,
+        platform__center_of_mass=[0.1, 0.0, 1.2], limits__length_min=2.08,
+        limits__length_max=3.33, limits__velocity_max=1.0, geometry__zero_length=2.08,
+        legs__cylinder__mass=120.0, legs__cylinder__center_of_mass=0.8,
+        legs__cylinder__inertia=40.0, legs__piston__mass=40.0,
+        legs__piston__center_of_mass=0.6, legs__piston__inertia=10.0),
+    # the same with both frames' z down, as in aerospace
+    'flight simulator, z down': machine(
+        ring(1.65, 10.5), np.roll(ring(1.6, 3.6, 60.0), 1, axis=0), 4000.0, 9000.0,
+        gravity=[0.0, 0.0, 9.80665], platform__center_of_mass=[0.1, 0.0, -1.2],
+        limits__length_min=2.08, limits__length_max=3.33),
+    # on a desk, under a mirror
+    'micro hexapod': machine(
+        ring(0.12, 12.0), np.roll(ring(0.08, 10.0, 60.0), 1, axis=0), 0.5, 6e-4,
+        limits__length_min=0.13, limits__length_max=0.155, geometry__zero_length=0.13,
+        legs__cylinder__mass=0.15, legs__cylinder__center_of_mass=-0.02,
+        legs__cylinder__inertia=3e-5),
+    # under a fiber's end, on piezos of a tenth of a millimeter
+    'finger-sized hexapod': machine(
+        ring(0.02, 15.0), np.roll(ring(0.015, 15.0, 60.0), 1, axis=0), 0.01, 5e-7,
+        limits__length_min=0.0199, limits__length_max=0.02),
+    # the secondary mirror of a large telescope, hanging; its reference is the mirror's vertex
+    'telescope': machine(
+        ring(0.9, 8.0, height=0.4), np.roll(ring(0.7, 8.0, 60.0, height=2.5), 1, axis=0), 2500.0,
+        2800.0, platform__center_of_mass=[0.0, 0.0, 1.9], gravity=[0.0, 5.0, 8.4]),
+    # a cabin on six cables from towers on a circle of 300 m, which meet it in pairs
+    'cable robot': machine(
+        ring(300.0, 30.0), np.roll(ring(6.5, 2.0, 60.0), 1, axis=0), 30000.0, 3e5,
+        gravity=[0.0, 0.0, -9.8], limits__velocity_max=0.6),
+    # its axis along x
+    'horizontal': machine(
+        ring(1.0, 10.0)[:, [2, 0, 1]], np.roll(ring(0.7, 10.0, 60.0), 1, axis=0)[:, [2, 0, 1]],
+        100.0, 20.0, limits__length_min=0.8, limits__length_max=1.6),
+    # in orbit, with a heavy load on a thin mast
+    'weightless': machine(
+        ring(0.5, 20.0), np.roll(ring(0.4, 20.0, 60.0), 1, axis=0), 800.0, 2000.0,
+        gravity=[0.0, 0.0, 0.0], platform__center_of_mass=[0.0, 0.0, 3.0]),
+    # the platform's own mass left out
+    'without mass': machine(
+        ring(0.5, 20.0), np.roll(ring(0.4, 20.0, 60.0), 1, axis=0), 1e-3, 1e-4),
+}
+
+
+@pytest.mark.parametrize('name', MACHINES)
+def test_good_machines_give_no_doubts(name: str) -> None:
+    assert doubts(Parameters(MACHINES[name])) == ()
+
+
+def test_the_machine_of_the_package_gives_none() -> None:
+    assert doubts(PLATFORM) == ()
+    assert doubts(symmetric_parameters()) == ()
+
+
+def test_random_machines_give_none() -> None:
+    for seed in range(100):
+        assert doubts(random_parameters(np.random.default_rng(seed))) == ()
+
+
+# Slips: what is changed in the package's machine, and what of it is said, word for word
+
+BASE, TOP = PLATFORM['geometry.base_joints'], PLATFORM['geometry.platform_joints']
+INERTIA = PLATFORM['platform.inertia']
+NO_LIMITS: dict[str, Any] = {'limits.length_min': (), 'limits.length_max': ()}
+QUARTER = from_euler([0.0, 0.0, np.pi / 2.0])
+SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
+    'all joints in mm': (
+        {'geometry.base_joints': 1e3 * BASE, 'geometry.platform_joints': 1e3 * TOP}, [
+            'geometry.platform_joints: 600 m from their center, and platform.mass only 150 kg: '
+            'in mm?']),
+    'all joints in mm of a machine as long as a street': (
+        {'geometry.base_joints': 3e3 * BASE, 'geometry.platform_joints': 3e3 * TOP}, [
+            'geometry.base_joints: 2.7e+03 m from their center: larger than any machine: in mm?',
+            'limits.length_min: [0.95] m and limits.length_max: [1.65] m: no level pose has all '
+            'legs within; the base joints are 2.7e+03 m from their center, the platform joints '
+            '1.8e+03 m: different units?']),
+    'the base joints in mm': (
+        {'geometry.base_joints': 1e3 * BASE}, [
+            'geometry.platform_joints: 0.6 m from their center, the base joints 900 m: one of '
+            'them in mm?']),
+    'the platform joints in cm and limits': (
+        {'geometry.platform_joints': 1e2 * TOP}, ['no level pose has all legs within']),
+    'limits in mm': (
+        {'limits.length_min': 950.0, 'limits.length_max': 1650.0}, [
+            'limits.length_min: 950 m, but the joints are 0.9 m from their center: in mm?',
+            'limits.length_max: 1.65e+03 m, but']),
+    'limits of another machine': (
+        {'limits.length_min': 0.05, 'limits.length_max': 0.1}, [
+            'no level pose has all legs within; the base joints are 0.9 m']),
+    'a longest leg in dm': ({'limits.length_min': (), 'limits.length_max': 0.165}, [
+        'limits.length_max: [0.165] m: no level pose has all legs within']),
+    'the zero length in mm': ({'geometry.zero_length': 950.0}, [
+        'geometry.zero_length: 950 m, but the joints are 0.9 m from their center: in mm?']),
+    'the zero length in mm, no limits': ({'geometry.zero_length': 950.0, **NO_LIMITS}, [
+        'geometry.zero_length: 950 m, but']),
+    'the characteristic length in mm': ({'singularity.characteristic_length': 600.0}, [
+        'singularity.characteristic_length: 600 m, but']),
+    'inertia in g mm^2': ({'platform.inertia': 1e9 * INERTIA}, [
+        'platform.inertia: 2.2e+10 kg m^2 at most, a radius of gyration of 1.21e+04 m, but the '
+        'platform joints are 0.6 m from their center: in g mm^2 or kg mm^2?']),
+    'inertia in kg mm^2': ({'platform.inertia': 1e6 * INERTIA}, ['in g mm^2 or kg mm^2?']),
+    'inertia in kg cm^2': ({'platform.inertia': 1e4 * INERTIA}, ['in g mm^2 or kg mm^2?']),
+    'inertia scaled twice': ({'platform.inertia': 1e-9 * INERTIA}, ['scaled twice']),
+    'inertia of no body': ({'platform.inertia': [13.0, 0.0, 0.0, 14.0, 0.0, 40.0]}, [
+        'platform.inertia: principal moments [13, 14, 40] kg m^2: no body has one larger than '
+        'the sum of the other two']),
+    'a center of mass in mm': ({'platform.center_of_mass': [20.0, -10.0, 120.0]}, [
+        'platform.center_of_mass: [20, -10, 120] m is 122 m from the middle of the platform '
+        'joints']),
+    'a center of mass from the floor, in mm': (
+        {'platform.center_of_mass': [0.0, 0.0, 1100.0]}, ['platform.center_of_mass: [0, 0, 1.1']),
+    'a cylinder in mm': ({'legs.cylinder.center_of_mass': 350.0}, [
+        'legs.cylinder.center_of_mass: 350 m from the base joint, but no leg is over 1.65 m']),
+    'a piston beyond the base': (
+        {'legs.piston.center_of_mass': [0.4, 0.4, 0.4, 0.4, 1.7, 0.4]}, [
+            'legs.piston.center_of_mass: 1.7 m from the platform joint, but no leg is over 1.65']),
+    'a piston with the other sign': ({'legs.piston.center_of_mass': -0.9}, [
+        'legs.piston.center_of_mass: -0.9 m from the platform joint']),
+    'a piston in kg mm^2': ({'legs.piston.inertia': 0.32e6}, [
+        'legs.piston.inertia: 3.2e+05 kg m^2, a radius of gyration of 231 m, but no leg is over '
+        '1.65 m: in g mm^2 or kg mm^2?']),
+    'gravity in mm/s^2': ({'gravity': [0.0, 0.0, -9806.65]}, [
+        'gravity: 9806.65 m/s^2: four times that of Jupiter: in mm/s^2?']),
+    'gravity in g': ({'gravity': [0.0, 0.0, -1.0]}, ['gravity: 1 m/s^2: in g?']),
+    'a rate in mm/s': ({'limits.velocity_max': 500.0}, ['limits.velocity_max: 500 m/s: in mm/s?']),
+    'similar hexagons': ({'geometry.platform_joints': 0.65 * BASE}, [
+        'geometry: singular at every pose of 150 tried: the condition number is at least ']),
+    'similar hexagons, rounded': ({'geometry.platform_joints': np.round(0.65 * BASE, 3)}, [
+        'geometry: nearly singular at every pose of 150 tried: the condition number is at least']),
+    'two legs the same': (
+        {'geometry.base_joints': BASE[[0, 0, 2, 3, 4, 5]],
+         'geometry.platform_joints': TOP[[0, 0, 2, 3, 4, 5]], **NO_LIMITS}, [
+            'geometry: singular at every pose of 150 tried']),
+    'a quarter turn': ({'geometry.platform_joints': TOP @ QUARTER.T}, [
+        'geometry: singular at home (the axes parallel, a mean leg of 1.3 m): the condition '
+        'number is ']),
+    'a quarter turn, no limits': ({'geometry.platform_joints': TOP @ QUARTER.T, **NO_LIMITS}, [
+        'geometry: singular at home (the axes parallel, at any height): the condition number']),
+    'a quarter turn, no lengths at all': (
+        {'geometry.platform_joints': TOP @ QUARTER.T, 'geometry.zero_length': 0.0, **NO_LIMITS}, [
+            'geometry: singular at home (the axes parallel, at any height)']),
+}
+
+
+@pytest.mark.parametrize('name', SLIPS)
+def test_a_slip_is_said(name: str) -> None:
+    changes, texts = SLIPS[name]
+    found = doubts(PLATFORM.replaced({
+        name: np.ravel(value) if np.ndim(value) else value for name, value in changes.items()}))
+    for text in texts:
+        assert any(text in doubt for doubt in found), found
+    assert all(doubt.isprintable() for doubt in found)
+
+
+def test_one_slip_is_said_once() -> None:
+    several = {'all joints in mm', 'all joints in mm of a machine as long as a street',
+               'the base joints in mm', 'the platform joints in cm and limits', 'limits in mm'}
+    for name in set(SLIPS) - several:
+        changes = {key: np.ravel(value) if np.ndim(value) else value
+                   for key, value in SLIPS[name][0].items()}
+        assert len(doubts(PLATFORM.replaced(changes))) == 1, name
+
+
+def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:
+    turned = PLATFORM.replaced({
+        'geometry.platform_joints': (TOP @ from_euler([0.0, 0.0, 1.45]).T).ravel(),
+        'singularity.warn_condition': 10.0, 'singularity.stop_condition': 12.0,
+        'geometry.zero_length': 1.3,
+        'limits.length_min': (), 'limits.length_max': ()})
+    (doubt,) = doubts(turned)
+    assert doubt.startswith(
+        'geometry: nearly singular at home (the axes parallel, a mean leg of 1.3 m)')
+    figure = float(doubt.split('condition number is ')[1].split(',')[0])
+    # At home the mean leg has the zero length: found again by the lengths themselves.
+    platform = StewartPlatform(turned)
+    heights = np.linspace(0.1, 2.0, 19001)
+    position = np.zeros((len(heights), 3))
+    position[:, 2] = heights
+    result = platform.inverse_dynamics(Motion(position, np.eye(3)))
+    home = int(np.argmin(np.abs(result.lengths.mean(axis=-1) - 1.3)))
+    assert figure == pytest.approx(result.condition_number[home], rel=1e-2)
+
+
+def test_a_home_that_is_turned_is_found_by_the_limits() -> None:
+    # A machine whose platform frame is turned against the base: the axes parallel, no leg fits.
+    there = ring(0.6, 12.0, 60.0)
+    platform = np.roll(there, 1, axis=0) @ from_euler([0.0, 0.0, -np.pi / 2.0]).T
+    good = machine(ring(0.9, 12.0), platform, 150.0, 20.0, limits__length_min=1.15,
+                   limits__length_max=1.25)
+    assert doubts(Parameters(good)) == ()
+    (doubt,) = doubts(Parameters({**good, 'limits.length_min': (), 'limits.length_max': ()}))
+    assert 'singular at home (the axes parallel, at any height)' in doubt
+
+
+NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(st.lists(NUMBERS, min_size=18, max_size=18), st.lists(NUMBERS, min_size=18, max_size=18),
+       st.dictionaries(st.sampled_from([
+           'geometry.zero_length', 'limits.length_min', 'limits.length_max', 'platform.mass',
+           'legs.piston.inertia', 'legs.piston.center_of_mass', 'legs.piston.mass',
+           'singularity.characteristic_length', 'singularity.stop_condition']), NUMBERS,
+           max_size=4), st.floats(1e-300, 1e300))
+@np.errstate(all='ignore')
+def test_of_whatever_passes_the_rules_there_are_words(
+        base: list[float], platform: list[float], changes: dict[str, float],
+        moment: float) -> None:
+    try:
+        parameters = Parameters({
+            'geometry.base_joints': base, 'geometry.platform_joints': platform,
+            'platform.mass': 1.0, 'platform.inertia': [moment, 0.0, 0.0, moment, 0.0, moment],
+            **changes})
+    except ParameterError:
+        assume(False)
+    for doubt in doubts(parameters):
+        assert doubt.isprintable()
+        assert len(doubt) < 500
