@@ -23,8 +23,9 @@ node and replay have in common: the same bytes in, the same bytes out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import math
+from operator import itemgetter
 from struct import error as StructError
 from struct import Struct
 from typing import Any, NamedTuple
@@ -122,35 +123,38 @@ def combined(data: bytes) -> Stamped:
     return Stamped(_nanoseconds(data, sec, nanosec), _text(data, 16, size), values)
 
 
-def _combined_numbers(data: bytes) -> list[int]:
-    """Return where transform, velocity and acceleration begin."""
+def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]:
+    """Return where transform, velocity and acceleration begin; note what only aligns."""
+    gaps = [] if gaps is None else gaps
     order = data[1]
     count = _COUNT[order]
     size = count.unpack_from(data, 12)[0]
-    names, at = _sequence(data, 16 + size, count)
+    names, at = _sequence(data, 16 + size, count, gaps)
     for _ in range(names):
-        length, at = _sequence(data, at, count)
+        length, at = _sequence(data, at, count, gaps)
         at += length
-    points, at = _sequence(data, at, count)
+    points, at = _sequence(data, at, count, gaps)
     if points != 1:
         raise MalformedError(f'{points} points: a setpoint has one')
     found = []
     for name, layout in (('transforms', _SEVEN), ('velocities', _SIX), ('accelerations', _SIX)):
-        number, at = _sequence(data, at, count)
+        number, at = _sequence(data, at, count, gaps)
         if number != 1:
             raise MalformedError(f'{number} {name}: a setpoint has one')
         found.append(_aligned8(at))
+        gaps.append(slice(at, found[-1]))
         at = found[-1] + layout[order].size
     return found
 
 
-def _sequence(data: bytes, at: int, count: Struct) -> tuple[int, int]:
+def _sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[int, int]:
     """Return a sequence's length, and where its first entry begins."""
-    at = at + 3 & ~3
-    number = count.unpack_from(data, at)[0]
+    begin = at + 3 & ~3
+    gaps.append(slice(at, begin))
+    number = count.unpack_from(data, begin)[0]
     if number > len(data):
         raise MalformedError(f'a sequence of {number} in {len(data)} bytes')
-    return number, at + 4
+    return number, begin + 4
 
 
 _FLOAT64 = Struct('<4sd')
@@ -173,6 +177,44 @@ def boolean(value: bool) -> bytes:
 def float64_array(values: Sequence[float]) -> bytes:
     """Write six numbers as a std_msgs/Float64MultiArray without a layout."""
     return _FLOAT64_ARRAY.pack(LITTLE_ENDIAN, 0, 0, 6, *values)
+
+
+def diagnostics(
+        stamp: int,
+        statuses: Sequence[tuple[int, tuple[str, str, str], Sequence[tuple[str, str]]]],
+) -> bytes:
+    """
+    Write a diagnostic_msgs/DiagnosticArray; frame_id is empty.
+
+    Parameters
+    ----------
+    stamp : int
+        [ns]
+    statuses : sequence of (level, (name, message, hardware_id), keys and values)
+        In their order.
+
+    """
+    body = bytearray(_TIME_AND_LENGTH[1].pack(*divmod(stamp, 1_000_000_000), 1) + b'\x00')
+    _put_count(body, len(statuses))
+    for level, texts, values in statuses:
+        body.append(level)
+        for text in texts:
+            _put_text(body, text)
+        _put_count(body, len(values))
+        for key, value in values:
+            _put_text(body, key)
+            _put_text(body, value)
+    return LITTLE_ENDIAN + bytes(body)
+
+
+def _put_count(body: bytearray, number: int) -> None:
+    body += bytes(-len(body) % 4) + _COUNT[1].pack(number)
+
+
+def _put_text(body: bytearray, text: str) -> None:
+    encoded = text.encode() + b'\x00'
+    _put_count(body, len(encoded))
+    body += encoded
 
 
 class JointState:
@@ -206,7 +248,7 @@ class JointState:
         self._without_effort = Struct(f'{head}{first}{doubles}I4x6dI')
         self._constant = tuple(constant)
 
-    def write(self, stamp: int, position: Sequence[float], velocity: Sequence[float],
+    def write(self, stamp: int, position: Iterable[float], velocity: Sequence[float],
               effort: Sequence[float] | None) -> bytes:
         """Return the message; its effort is empty where there is none."""
         sec, nanosec = divmod(stamp, 1_000_000_000)
@@ -224,7 +266,7 @@ class JointState:
 
 class Layout:
     """
-    Messages that differ in nothing but their stamp and numbers, many of them at once.
+    Messages that differ in nothing but their stamp and numbers.
 
     Parameters
     ----------
@@ -234,11 +276,14 @@ class Layout:
         Where doubles stand in it.
     stamped : bool
         It has a header.
+    gaps : sequence of slice
+        Bytes that only align what follows: they may be anything.
 
     """
 
     def __init__(
             self, message: bytes, numbers: Sequence[tuple[int, int]], stamped: bool = True,
+            gaps: Sequence[slice] = (),
     ) -> None:
         self.size = len(message)
         self._message = message
@@ -252,6 +297,8 @@ class Layout:
             free[at:at + 8 * count] = True
             fields[f'numbers at {at}'] = (('<f8', (count,)), at)
             self._parts.append(f'numbers at {at}')
+        for gap in gaps:
+            free[gap] = True
         # What all have in common, in runs of bytes: what it is called, and what it is.
         edges = np.flatnonzero(np.diff(free, prepend=True, append=True)).tolist()
         self._fixed = {}
@@ -262,16 +309,44 @@ class Layout:
             'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
             'offsets': [at for _, at in fields.values()], 'itemsize': self.size})
 
+        # The same for a single message: what has a place in it, in order.
+        places = sorted([
+            *((begin, f'{end - begin}s') for begin, end in zip(
+                edges[::2], edges[1::2], strict=True)),
+            *((at, f'{count}d') for at, count in numbers), *([(4, 'iI')] if stamped else [])])
+        layout, constant, values, many = '<', list[int](), list[int](), 0
+        for at, place in places:
+            layout += f'{at - Struct(layout).size}x{place}'
+            if place[-1] == 's':
+                constant.append(many)
+            elif place[-1] == 'd':
+                values += range(many, many + int(place[:-1]))
+            many = len(Struct(layout).unpack(bytes(Struct(layout).size)))
+        self._struct = Struct(f'{layout}{self.size - Struct(layout).size}x')
+        self._values, self._constant = itemgetter(*values), itemgetter(*constant)
+        self._expected = self._constant(self._struct.unpack(message))
+
     @classmethod
     def of(cls, topic_reader: Callable[[bytes], Stamped], message: bytes) -> Layout | None:
         """Return the layout of a message that its reader has read; none if big-endian."""
         if message[:2] != LITTLE_ENDIAN[:2]:
             return None
         if topic_reader is combined:
-            counts = (7, 6, 6)
-            return cls(message, list(zip(_combined_numbers(message), counts, strict=True)))
-        size = _COUNT[1].unpack_from(message, 12)[0]
-        return cls(message, [(_aligned8(16 + size), 7 if topic_reader is pose else 6)])
+            gaps: list[slice] = []
+            numbers = zip(_combined_numbers(message, gaps), (7, 6, 6), strict=True)
+            return cls(message, list(numbers), gaps=gaps)
+        end = 16 + _COUNT[1].unpack_from(message, 12)[0]
+        at = _aligned8(end)
+        return cls(message, [(at, 7 if topic_reader is pose else 6)], gaps=[slice(end, at)])
+
+    def read_one(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return stamp [ns] and numbers of a message with a stamp; None if of another layout."""
+        if len(data) != self.size:
+            return None
+        fields = self._struct.unpack(data)
+        if fields[2] >= 1_000_000_000 or self._constant(fields) != self._expected:
+            return None
+        return fields[1] * 1_000_000_000 + fields[2], self._values(fields)
 
     def read(
             self, data: NDArray[np.uint8], starts: NDArray[np.int64],
@@ -323,4 +398,5 @@ def at_any_byte(data: NDArray[np.uint8], size: int) -> NDArray[np.void]:
 
 def finite(values: Sequence[float]) -> bool:
     """Return whether all numbers are finite."""
-    return all(map(math.isfinite, values))
+    # A sum is not finite where one of its terms is not; it may also overflow.
+    return math.isfinite(sum(values)) or all(map(math.isfinite, values))

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What the node says of itself: one status each for setpoints, singularity and limits.
+What the node says of itself: one status each for setpoints, singularity, limits and timing.
 
 A check knows no ROS: it is told what happened and returns words; the node makes messages.
 """
@@ -22,10 +22,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from operator import attrgetter
+from statistics import median
 from typing import NamedTuple
 
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.setpoints import Refusal
+from stewart_dynamics.setpoints import NOT_JOINED, PASSED_OVER, Refusal
+from stewart_dynamics.singularity import Cause
 from stewart_dynamics.step import Excess, Output
 
 OK, WARN, ERROR, STALE = range(4)
@@ -33,6 +36,26 @@ OK, WARN, ERROR, STALE = range(4)
 # A level holds for this long after its cause was last seen, so that a machine that dances on
 # a limit is not reported a thousand times in a second.
 _HOLD_SECONDS = 1.0
+
+_QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
+               'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
+
+
+class Level(NamedTuple):
+    """How grave something is, and what it is in words."""
+
+    level: int
+    message: str
+    weight: int = 0
+    """Of two of the same level the weightier one is said."""
+
+    @property
+    def gravity(self) -> tuple[int, int]:
+        """By which the gravest is found."""
+        return self.level, self.weight
+
+
+_FINE = Level(OK, '')
 
 
 class Status(NamedTuple):
@@ -45,17 +68,26 @@ class Status(NamedTuple):
 
 
 class _Held:
-    """Levels and their words for as long as they hold; the worst one counts."""
+    """A state, and what was worse for as long as that holds."""
 
     def __init__(self) -> None:
-        self._seen: dict[int, tuple[float, str]] = {}
+        self._state = _FINE
+        self._seen: dict[tuple[int, int], tuple[float, Level]] = {}
 
-    def see(self, level: int, message: str, now: float) -> None:
-        self._seen[level] = now + _HOLD_SECONDS, message
+    def see(self, state: Level, now: float, lasting: bool = False) -> None:
+        """Note a state; a lasting one is there until the next, others for their time."""
+        if lasting:
+            self._state = state
+        if state.level > OK:
+            self._seen[state.gravity] = now + _HOLD_SECONDS, state
 
-    def at(self, now: float) -> tuple[int, str]:
-        return max(((level, message) for level, (until, message) in self._seen.items()
-                    if now < until), default=(OK, ''))
+    def at(self, now: float) -> Level:
+        """Return the worst that holds."""
+        if not self._seen:
+            return self._state
+        self._seen = {gravity: held for gravity, held in self._seen.items() if now < held[0]}
+        return max([self._state, *(state for _, state in self._seen.values())],
+                   key=attrgetter('gravity'))
 
 
 class Diagnostics:
@@ -77,6 +109,10 @@ class Diagnostics:
 
     def __init__(self, parameters: Parameters, topics: Sequence[str], now: float) -> None:
         self.parameters = parameters
+        self.writers: dict[str, int] = {}
+        """Of each setpoint topic."""
+        self.namesakes: tuple[str, int] = '', 1
+        """The node's name, and how many have it."""
         self._heard = dict.fromkeys(topics, now)
         self._silent = dict.fromkeys(topics, True)
         self._refusals: Counter[Refusal] = Counter()
@@ -85,11 +121,10 @@ class Diagnostics:
         self._answered_at = now
         self._output: Output | None = None
         self._worst_condition = 1.0
-        self._refused, self._singularity, self._limits = _Held(), _Held(), _Held()
+        self._processing: list[float] = []
+        self._refused, self._singularity, self._limits, self._timing = (
+            _Held(), _Held(), _Held(), _Held())
         self._levels: tuple[int, ...] = ()
-        # of the last output, singularity and limits: they hold until another one comes
-        self._states: tuple[tuple[int, str], tuple[int, str]] = (OK, ''), (OK, '')
-        self.writers: dict[str, int] = {}
 
     def heard(self, topic: str, now: float) -> None:
         """Note that a message came on a setpoint topic."""
@@ -99,66 +134,72 @@ class Diagnostics:
     def refused(self, refusal: Refusal, details: str, now: float) -> None:
         """Note a refusal."""
         self._refusals[refusal] += 1
-        self._refused.see(WARN, f'{refusal.topic}: {refusal.reason} ({details})', now)
+        state = Level(WARN, f'{refusal.topic}: {refusal.reason} ({details})')
+        self._refused.see(state, now)
+        if refusal.reason == PASSED_OVER:
+            self._timing.see(state, now)
 
-    def answered(self, output: Output, now: float) -> bool:
-        """Note an output, and return whether a level has changed with it."""
+    def answered(self, output: Output, came: float, now: float) -> bool:
+        """Note an output and when its setpoint came; return whether a level has changed."""
         self._answered += 1
         self._answered_at = now
+        self._processing.append(now - came)
         self._output = output
-        self._worst_condition = max(self._worst_condition, output.condition)
-        self._states = _singularity_of(output), self._limits_of(output)
-        for held, (level, message) in zip((self._singularity, self._limits), self._states,
-                                          strict=True):
-            if level > OK:
-                held.see(level, message, now)
+        if output.condition > self._worst_condition:
+            self._worst_condition = output.condition
+        self._singularity.see(_singularity_of(output), now, lasting=True)
+        self._limits.see(self._limits_of(output), now, lasting=True)
         return self.level_changed(now)
 
     def level_changed(self, now: float) -> bool:
         """Return whether any level is another than in the last report."""
         return self._current_levels(now) != self._levels
 
-    def report(self, now: float) -> tuple[Status, Status, Status]:
-        """Return the three statuses; the rate is counted since the last report."""
+    def report(self, now: float) -> tuple[Status, ...]:
+        """Return the statuses; rate and processing time are of the time since the last report."""
         self._levels = self._current_levels(now)
         statuses = (self._report_setpoints(now), self._report_singularity(now),
-                    self._report_limits(now))
+                    self._report_limits(now), self._report_timing(now))
         self._answered_before = (now, self._answered)
         self._worst_condition = self._output.condition if self._output else 1.0
+        self._processing = []
         return statuses
 
     def _current_levels(self, now: float) -> tuple[int, ...]:
-        return (self._setpoint_level(now)[0], self._level_of(0, now)[0],
-                self._level_of(1, now)[0])
+        return (self._setpoint_level(now).level, self._singularity.at(now).level,
+                self._limits.at(now).level, self._timing.at(now).level)
 
-    def _level_of(self, which: int, now: float) -> tuple[int, str]:
-        held = (self._singularity, self._limits)[which]
-        return max(self._states[which], held.at(now), key=lambda state: state[0])
-
-    def _limits_of(self, output: Output) -> tuple[int, str]:
+    def _limits_of(self, output: Output) -> Level:
         if output.excesses:
-            return ERROR, ', '.join(map(self._words, output.excesses))
-        return OK, ''
+            return Level(ERROR, ', '.join(map(self._words, output.excesses)))
+        return _FINE
 
-    def _setpoint_level(self, now: float) -> tuple[int, str]:
-        timeout = self.parameters['setpoint.timeout']
-        tolerance = self.parameters['setpoint.sync_tolerance']
-        if now - self._answered_at > timeout or not self._answered:
-            silent = [f'{topic} ' + ('never came' if self._silent[topic]
-                                     else f'silent for {now - at:.1f} s')
-                      for topic, at in self._heard.items() if now - at > timeout
-                      or self._silent[topic]]
-            why = ', '.join(silent) or (
+    def _setpoint_level(self, now: float) -> Level:
+        refused = self._refused.at(now)
+        stale = not self._answered or (
+            now - self._answered_at > self.parameters['setpoint.timeout'])
+        name, namesakes = self.namesakes
+        if namesakes < 2 and not stale and not any(n > 1 for n in self.writers.values()):
+            return refused
+        troubles = [f'{topic} has {n} writers' for topic, n in self.writers.items() if n > 1]
+        if namesakes > 1:
+            troubles.append(f'{namesakes} nodes are named {name}')
+        level = ERROR if troubles else STALE
+        if stale:
+            troubles.append('no setpoint: ' + (self._silence(now) or refused.message or (
                 'all topics speak, but none is joined: their stamps differ by more than '
-                f'setpoint.sync_tolerance, {tolerance:g} s')
-            return STALE, f'no setpoint: {why}'
-        several = [f'{topic} has {n} writers' for topic, n in self.writers.items() if n > 1]
-        if several:
-            return ERROR, ', '.join(several)
-        return self._refused.at(now)
+                f'setpoint.sync_tolerance, {self.parameters["setpoint.sync_tolerance"]:g} s')))
+        return Level(level, ', '.join(troubles))
+
+    def _silence(self, now: float) -> str:
+        """Return which topics are silent and since when."""
+        timeout = self.parameters['setpoint.timeout']
+        return ', '.join(
+            f'{topic} ' + ('never came' if self._silent[topic] else f'silent for {now - at:.1f} s')
+            for topic, at in self._heard.items() if now - at > timeout or self._silent[topic])
 
     def _report_setpoints(self, now: float) -> Status:
-        level, message = self._setpoint_level(now)
+        level, message, _ = self._setpoint_level(now)
         before, answered = self._answered_before
         rate = (self._answered - answered) / (now - before) if now > before else 0.0
         values = [('setpoints answered', str(self._answered)), ('rate (Hz)', f'{rate:.1f}')]
@@ -172,7 +213,7 @@ class Diagnostics:
         return Status('setpoints', level, message or 'answered', tuple(values))
 
     def _report_singularity(self, now: float) -> Status:
-        level, message = self._level_of(0, now)
+        level, message, _ = self._singularity.at(now)
         output = self._output
         if output is None:
             return Status('singularity', level, 'no setpoint yet', ())
@@ -190,7 +231,7 @@ class Diagnostics:
             ('its leg', self.parameters['joints'][worst])))
 
     def _report_limits(self, now: float) -> Status:
-        level, message = self._level_of(1, now)
+        level, message, _ = self._limits.at(now)
         output = self._output
         if output is None:
             return Status('limits', level, 'no setpoint yet', ())
@@ -203,22 +244,36 @@ class Diagnostics:
                        zip(self.parameters['joints'], output.demanded_forces, strict=True)]
         return Status('limits', level, message or 'all held', tuple(values))
 
+    def _report_timing(self, now: float) -> Status:
+        level, message, _ = self._timing.at(now)
+        values = []
+        if self._processing:
+            values = [('processing time, median (us)', f'{median(self._processing) * 1e6:.0f}'),
+                      ('processing time, largest (us)', f'{max(self._processing) * 1e6:.0f}')]
+        for key, reason in (('passed over', PASSED_OVER), ('incomplete', NOT_JOINED)):
+            values.append((key, str(sum(n for refusal, n in self._refusals.items()
+                                        if refusal.reason == reason))))
+        return Status('timing', level, message or (
+            'on time' if self._answered else 'no setpoint yet'), tuple(values))
+
     def _words(self, excess: Excess) -> str:
-        quantity, unit = {'limits.length_min': ('length', 'm'),
-                          'limits.length_max': ('length', 'm'),
-                          'limits.velocity_max': ('rate', 'm/s'),
-                          'limits.force_max': ('force', 'N')}[excess.limit]
+        quantity, unit = _QUANTITIES[excess.limit]
         beyond = abs(abs(excess.value) - excess.bound)
         how = ', clipped' if quantity == 'force' else ''
         return (f'{self.parameters["joints"][excess.leg]}: {quantity} {excess.value:.6g} {unit} '
                 f'is {beyond:.6g} {unit} beyond {excess.limit}{how}')
 
 
-def _singularity_of(output: Output) -> tuple[int, str]:
-    state = output.singularity
+_UNSOLVABLE = Level(ERROR, 'J_inv cannot be solved: no forces')
+_STOPPED = Level(ERROR, 'inside stop_condition')
+_SUPPRESSED = Level(ERROR, 'inside stop_condition: forces suppressed')
+# A crossing is of one sample: the next one has another cause.
+_WARNINGS = {cause: Level(WARN, cause.value, cause is Cause.CROSSED) for cause in Cause}
+
+
+def _singularity_of(output: Output) -> Level:
     if output.demanded_forces is None:
-        return ERROR, 'J_inv cannot be solved: no forces'
-    if state.stopped:
-        return ERROR, 'inside stop_condition' + (
-            ': forces suppressed' if output.forces is None else '')
-    return (WARN, state.cause.value) if state.warning else (OK, '')
+        return _UNSOLVABLE
+    if output.singularity.stopped:
+        return _SUPPRESSED if output.forces is None else _STOPPED
+    return _WARNINGS[output.singularity.cause] if output.singularity.warning else _FINE

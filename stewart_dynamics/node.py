@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from functools import partial
+import gc
+import math
 import time
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
@@ -32,18 +34,20 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from stewart_dynamics import compiled
+from stewart_dynamics import cdr, compiled
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
+from stewart_dynamics.series import Series
 from stewart_dynamics.setpoints import Refusal, Setpoints
 from stewart_dynamics.step import Output, OUTPUT_TYPES, Setpoint, Step
 
@@ -63,12 +67,11 @@ _TYPES: dict[str, Any] = {
 # When more setpoints wait the node has fallen behind: only the newest is answered.
 _QUEUE = 1000
 _BACKLOG = 100
+# A setpoint that comes so soon after the last answer may have waited for it, and more with it.
+_BUSY_SECONDS = 2e-4
 
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0
-_SAY_AGAIN_SECONDS = 5.0
-
-PASSED_OVER = 'passed over: the node had fallen behind'
 
 
 class DynamicsNode(LifecycleNode):
@@ -87,7 +90,7 @@ class DynamicsNode(LifecycleNode):
         self._active = False
         self._configured = False
         self._close_io: list[Callable[[], Any]] = []
-        self._said: dict[Refusal, tuple[float, int]] = {}
+        self._series = Series()
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._answer_impossible_transitions()
         self._set_parameters_together()
@@ -117,11 +120,10 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         self._setpoints = Setpoints(self._settings, self._on_refusal, self._on_notice)
         self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now)
-        self._waiting: deque[Setpoint] = deque()
+        self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
         self._restarting = False  # the last one was a restart and could not be answered
-        self._reported = now
-        self._said.clear()
+        self._reported = self._idle = now
         self._logged: dict[str, int] = {}
         self._active = True
         return TransitionCallbackReturn.SUCCESS
@@ -129,6 +131,7 @@ class DynamicsNode(LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._active = False
+        self._say_last(math.inf)
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -139,6 +142,7 @@ class DynamicsNode(LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more and close the topics."""
         self._active = False
+        self._say_last(math.inf)
         self._close()
         return TransitionCallbackReturn.SUCCESS
 
@@ -148,6 +152,8 @@ class DynamicsNode(LifecycleNode):
         # The first call compiles; it shall not wait for the first setpoint.
         self._step(Setpoint(0, (0.0,) * 24), None)
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
+        for doubt in doubts(self._settings):
+            self.get_logger().warning(doubt)
         self._publishers_of: dict[str, Publisher] = {}
         for topic, name in OUTPUT_TYPES.items():
             qos = QoSProfile(depth=10)
@@ -157,6 +163,7 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
+        self._exclusive = self._settings['setpoint.exclusive']
         self._answer_task = until_shutdown(self, self._answer)
         self._inputs = {topic: self._subscribe(topic, partial(self._on_setpoint, topic))
                         for topic in topics}
@@ -168,6 +175,11 @@ class DynamicsNode(LifecycleNode):
                                   clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._close_io.append(partial(self.destroy_timer, watch))
         self._configured = True
+        # What is there now stays: the collector would look at all of it again and again, for
+        # 50 ms and more, while a setpoint waits.
+        gc.unfreeze()  # what an earlier configuration has left
+        gc.collect()
+        gc.freeze()
 
     def _publisher(self, kind: Any, topic: str, qos: QoSProfile) -> Publisher:
         publisher = self.create_publisher(kind, topic, qos)
@@ -187,7 +199,7 @@ class DynamicsNode(LifecycleNode):
     def _on_incompatible_qos(self, topic: str, event: Any) -> None:
         self.get_logger().error(
             f'{topic}: a publisher offers an incompatible quality of service, policy '
-            f'{event.last_policy_kind}: it is not heard')
+            f'{qos_policy_name_from_kind(event.last_policy_kind)}: it is not heard')
 
     def _close(self) -> None:
         self._configured = False
@@ -207,7 +219,9 @@ class DynamicsNode(LifecycleNode):
             try:
                 return change_state(request, response)
             except RCLError as exc:
-                self.get_logger().error(f'transition refused: {exc}')
+                text = f'transition refused: {exc}'
+                if (line := self._series.add(text, text, time.monotonic())) is not None:
+                    self.get_logger().error(line)
                 response.success = False
                 return response
 
@@ -237,18 +251,30 @@ class DynamicsNode(LifecycleNode):
     def _on_setpoint(self, topic: str, data: bytes) -> None:
         if not self._active:
             return
-        self._diagnostics.heard(topic, time.monotonic())
-        if self._settings['setpoint.exclusive'] and self._diagnostics.writers.get(topic, 1) > 1:
-            self._setpoints.refuse(topic, inputs.NOT_EXCLUSIVE, self._topic_names[topic])
-            return
-        setpoint = self._setpoints.take(topic, data, self.get_clock().now().nanoseconds)
+        now = time.monotonic()
+        self._diagnostics.heard(topic, now)
+        if self._exclusive:
+            writers = self.count_publishers(self._topic_names[topic])
+            self._diagnostics.writers[topic] = writers
+            if writers > 1:
+                self._setpoints.refuse(topic, inputs.NOT_EXCLUSIVE, f'{writers} writers')
+                return
+        setpoint = self._setpoints.take(topic, data, self._ros_time)
         if setpoint is None:
             return
-        self._waiting.append(setpoint)
-        if len(self._waiting) == 1:
+        self._waiting.append((setpoint, now))
+        if len(self._waiting) > 1:
+            return
+        if now - self._idle > _BUSY_SECONDS:
+            self._answer()
+        else:
             # Runs behind the messages that have come already: it sees what waits.
             executor: Any = self.executor
             executor.create_task(self._answer_task)
+
+    def _ros_time(self) -> int:
+        now: int = self.get_clock().now().nanoseconds
+        return now
 
     def _on_wrench(self, data: bytes) -> None:
         if self._active:
@@ -261,14 +287,9 @@ class DynamicsNode(LifecycleNode):
         if isinstance(self.executor, SingleThreadedExecutor):
             self._take_what_has_come()
         if len(self._waiting) > _BACKLOG:
-            newest = self._waiting.pop()
-            for passed in self._waiting:
-                self._setpoints.refuse('setpoint', PASSED_OVER, f'stamp {passed.stamp} ns')
-            restart = newest.restart or any(passed.restart for passed in self._waiting)
-            self._waiting.clear()
-            self._waiting.append(newest._replace(restart=restart))
+            self._pass_over()
         while self._waiting:
-            setpoint = self._waiting.popleft()
+            setpoint, came = self._waiting.popleft()
             if self._restarting:
                 setpoint = setpoint._replace(restart=True)
             before = None if self._last is None else self._last.singularity
@@ -282,8 +303,19 @@ class DynamicsNode(LifecycleNode):
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
             self._last = output
-            if self._diagnostics.answered(output, time.monotonic()):
+            self._idle = time.monotonic()
+            if (self._diagnostics.answered(output, came, self._idle)
+                    or self._idle - self._reported >= _REPORT_SECONDS):
                 self._report()
+
+    def _pass_over(self) -> None:
+        """Let nothing wait but the newest setpoint, and count the others."""
+        newest, came = self._waiting.pop()
+        for passed, _ in self._waiting:
+            self._setpoints.refuse('setpoint', inputs.PASSED_OVER, f'stamp {passed.stamp} ns')
+        restart = newest.restart or any(passed.restart for passed, _ in self._waiting)
+        self._waiting.clear()
+        self._waiting.append((newest._replace(restart=restart), came))
 
     def _take_what_has_come(self) -> None:
         """
@@ -306,50 +338,44 @@ class DynamicsNode(LifecycleNode):
 
     def _on_refusal(self, refusal: Refusal, details: str) -> None:
         self._diagnostics.refused(refusal, details, time.monotonic())
-        due, since = self._due_to_say(refusal)
-        if due:
-            more = f' (and {since} before it)' if since else ''
-            self.get_logger().warning(
-                f'{refusal.topic} refused: {refusal.reason}: {details}{more}')
+        self._say(refusal, f'{refusal.topic} refused: {refusal.reason}: {details}')
 
     def _on_notice(self, text: str) -> None:
         # Two writers whose clocks differ restart with every setpoint.
-        if self._due_to_say(Refusal('notice', text[:20]))[0]:
-            self.get_logger().warning(text)
+        self._say(text[:20], text)
 
-    def _due_to_say(self, what: Refusal) -> tuple[bool, int]:
-        """Return whether this may be said again, and how often it was not since."""
-        now = time.monotonic()
-        said, since = self._said.get(what, (-_SAY_AGAIN_SECONDS, 0))
-        due = now - said >= _SAY_AGAIN_SECONDS
-        self._said[what] = (now, 0) if due else (said, since + 1)
-        return due, since
+    def _say(self, kind: Hashable, text: str) -> None:
+        if (line := self._series.add(kind, text, time.monotonic())) is not None:
+            self.get_logger().warning(line)
+
+    def _say_last(self, now: float) -> None:
+        for line in self._series.over(now):
+            self.get_logger().warning(line)
 
     def _on_watch(self) -> None:
         if not self._active:
             return
         now = time.monotonic()
-        due = now - self._reported >= _REPORT_SECONDS
-        if due or self._settings['setpoint.exclusive']:
-            self._diagnostics.writers = {topic: self.count_publishers(name)
-                                         for topic, name in self._topic_names.items()}
-        if due or self._diagnostics.level_changed(now):
+        self._say_last(now)
+        # While setpoints are answered it is done behind an answer, when time is left for it.
+        overdue = now - self._reported >= _REPORT_SECONDS + _WATCH_SECONDS
+        if overdue or self._diagnostics.level_changed(now):
             self._report()
 
     def _report(self) -> None:
         now = time.monotonic()
         self._reported = now
-        name = self.get_fully_qualified_name().lstrip('/')
+        full_name = self.get_fully_qualified_name()
+        self._diagnostics.writers = {topic: self.count_publishers(name)
+                                     for topic, name in self._topic_names.items()}
+        self._diagnostics.namesakes = full_name, self.get_node_names_and_namespaces().count(
+            (self.get_name(), self.get_namespace()))
+        name = full_name.lstrip('/')
         statuses = self._diagnostics.report(now)
         self._log_changes(statuses[1:])
-        array = DiagnosticArray(status=[
-            DiagnosticStatus(
-                level=bytes([status.level]), name=f'{name}: {status.name}',
-                message=status.message, hardware_id=name,
-                values=[KeyValue(key=key, value=value) for key, value in status.values])
-            for status in statuses])
-        array.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics_publisher.publish(array)
+        self._diagnostics_publisher.publish(cdr.diagnostics(
+            self._ros_time(), [(each.level, (f'{name}: {each.name}', each.message, name),
+                                each.values) for each in statuses]))
 
     def _log_changes(self, statuses: Iterable[Status]) -> None:
         for status in statuses:
@@ -377,8 +403,10 @@ class DynamicsNode(LifecycleNode):
                 fixed = [name for name in ours if name in Parameters.table
                          and not Parameters.table[name].while_active]
                 if fixed:
-                    raise ParameterError(f'{", ".join(fixed)}: only changed while the node is '
-                                         'unconfigured')
+                    raise ParameterError(
+                        f'{", ".join(fixed)}: only changed while the node is unconfigured: its '
+                        'topics, or the machine that the last setpoint was answered for, depend '
+                        'on it; deactivate and clean up first')
             parameters = self._settings.replaced(ours)
             step = Step(parameters)
         except ParameterError as exc:

@@ -82,7 +82,8 @@ class StewartPlatform:
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
-        self._machine = _machine_numbers(parameters)
+        self.machine = _machine_numbers(parameters)
+        """Its numbers (MACHINE,) as ``inverse_dynamics`` (the module) takes them."""
         self._no_wrench = np.zeros((1, runtime.WRENCH))
 
     @classmethod
@@ -142,13 +143,13 @@ class StewartPlatform:
         results = np.empty((len(rows), runtime.RESULT))
         threads = min(_CPUS, len(rows) // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
         if threads < 2:
-            runtime.solve(self._machine, rows, wrenches, results)
+            runtime.solve(self.machine, rows, wrenches, results)
             return results
         # More parts than threads: a thread that is held up leaves more to the others.
         edges = np.linspace(0, len(rows), _PARTS_OF_A_THREAD * threads + 1).astype(int)
 
         def part(first: int, end: int) -> None:
-            runtime.solve(self._machine, rows[first:end],
+            runtime.solve(self.machine, rows[first:end],
                           wrenches if len(wrenches) == 1 else wrenches[first:end],
                           results[first:end])
 

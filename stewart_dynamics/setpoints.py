@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 import math
 from typing import Any, NamedTuple
 
@@ -109,6 +110,7 @@ TWICE = 'same stamp twice'
 NOT_JOINED = 'passed over: not all topics had its stamp'
 OUT_OF_RANGE = 'out of range: the numbers overflow'
 NOT_EXCLUSIVE = 'more than one writer'
+PASSED_OVER = 'passed over: the node had fallen behind'
 
 
 class Setpoints:
@@ -149,10 +151,10 @@ class Setpoints:
         """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
         sample = self._sound(WRENCH, data)
         if sample is not None:
-            fx, fy, fz, tx, ty, tz = sample.values
+            fx, fy, fz, tx, ty, tz = sample[1]
             self.wrench = fx, fy, fz, tx, ty, tz
 
-    def take(self, topic: str, data: bytes, now: int) -> Setpoint | None:
+    def take(self, topic: str, data: bytes, now: Callable[[], int]) -> Setpoint | None:
         """
         Return the setpoint that this message completes, if it does.
 
@@ -162,8 +164,8 @@ class Setpoints:
             One of ``topics``.
         data : bytes
             The message as it came, CDR.
-        now : int
-            The clock [ns], for a setpoint whose own stamps are zero.
+        now : callable
+            The clock [ns]; asked where a setpoint's own stamps are zero.
 
         """
         sample = self._sound(topic, data)
@@ -171,22 +173,23 @@ class Setpoints:
             if self._unstamped_said and topic not in self._stamped:
                 self._join_unstamped(topic, None, now)  # it keeps its place in the order
             return None
+        stamp, values = sample
         if topic not in self._stamped:
-            if sample.stamp == 0:
-                return self._join_unstamped(topic, sample.values, now)
+            if stamp == 0:
+                return self._join_unstamped(topic, values, now)
             # From now on zero is a time as others are.
             self._stamped.add(topic)
             if self._unstamped.pop(topic, None):
                 self.refuse(topic, NOT_JOINED, 'stamp 0')
-        if not self._in_time(topic, sample.stamp):
+        if not self._in_time(topic, stamp):
             return None
         waiting = self._waiting[topic]
-        waiting[sample.stamp] = sample.values
+        waiting[stamp] = values
         if len(waiting) > WAITING:
             oldest = next(iter(waiting))
             del waiting[oldest]
             self.refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
-        return self._join(sample.stamp)
+        return self._join(stamp)
 
     def take_many(self, messages: Messages) -> Batch:
         """Return the setpoints that these messages complete."""
@@ -200,7 +203,7 @@ class Setpoints:
             if topic == WRENCH:
                 self.take_wrench(data)
                 continue
-            setpoint = self.take(topic, data, time)
+            setpoint = self.take(topic, data, partial(int, time))
             if setpoint is not None:
                 setpoints.append(setpoint)
                 times.append(time)
@@ -225,18 +228,24 @@ class Setpoints:
         self.counts[refusal] += number
         self._refused(refusal, details)
 
-    def _sound(self, topic: str, data: bytes) -> cdr.Stamped | None:
-        """Return the message, a rotation matrix in place of its quaternion, or refuse it."""
-        try:
-            sample = _READERS[topic](data)
-        except cdr.MalformedError as exc:
-            self.refuse(topic, MALFORMED, str(exc))
-            return None
-        values = sample.values
-        if sample.frame not in self._frames:
-            self.refuse(topic, WRONG_FRAME, f'{sample.frame.decode(errors="replace")!r}, must '
-                        f'be {max(self._frames).decode()!r} or empty')
-            return None
+    def _sound(self, topic: str, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return a message's stamp and numbers, a rotation matrix in them, or refuse it."""
+        # Most messages have the layout of the first one, whose frame was right.
+        layout = self._layouts.get(topic)
+        stamp_and_values = layout.read_one(data) if layout else None
+        if stamp_and_values is None:
+            try:
+                stamp, frame, values = _READERS[topic](data)
+            except cdr.MalformedError as exc:
+                self.refuse(topic, MALFORMED, str(exc))
+                return None
+            if frame not in self._frames:
+                self.refuse(topic, WRONG_FRAME, f'{frame.decode(errors="replace")!r}, must '
+                            f'be {max(self._frames).decode()!r} or empty')
+                return None
+            self._learn(topic, data)
+        else:
+            stamp, values = stamp_and_values
         if not cdr.finite(values):
             self.refuse(topic, NOT_FINITE, str(values))
             return None
@@ -249,7 +258,14 @@ class Setpoints:
                 return None
             values = values[:3] + from_quaternion(
                 x / length, y / length, z / length, w / length) + values[7:]
-        return sample._replace(values=values)
+        return stamp, values
+
+    def _learn(self, topic: str, data: bytes) -> None:
+        """Keep the layout of a topic's first sound message."""
+        if topic not in self._layouts:
+            layout = cdr.Layout.of(_READERS[topic], data)
+            if layout is not None:
+                self._layouts[topic] = layout
 
     def _in_time(self, topic: str, stamp: int) -> bool:
         """Return whether a sample may still be used, or refuse it."""
@@ -268,21 +284,31 @@ class Setpoints:
 
     def _join(self, stamp: int) -> Setpoint | None:
         """Return the setpoint that a sample completes, all its stamps within the tolerance."""
+        if self._tolerance:
+            stamps = self._nearest(stamp)
+        elif all(stamp in waiting for waiting in self._waiting.values()):
+            stamps = dict.fromkeys(self.topics, stamp)
+        else:
+            return None
+        if not stamps:
+            return None
+        restart = self._give_up(stamps)
+        values = [self._waiting[other].pop(at) for other, at in stamps.items()]
+        return Setpoint(stamps[self.topics[0]], self._motion(values), self.wrench, restart)
+
+    def _nearest(self, stamp: int) -> dict[str, int]:
+        """Return the stamps that belong to one, none if they are not all within the tolerance."""
         stamps = {}
         # A setpoint has the stamp of the first topic: what is nearest to it belongs to it.
         at = stamp
         for other, waiting in self._waiting.items():
             if at not in waiting:
-                if not waiting or not self._tolerance:
-                    return None
+                if not waiting:
+                    return {}
                 at = min(waiting, key=lambda candidate: abs(candidate - at))
             stamps[other] = at
             at = stamps[self.topics[0]]
-        if max(stamps.values()) - min(stamps.values()) > self._tolerance:
-            return None
-        restart = self._give_up(stamps)
-        values = [self._waiting[other].pop(at) for other, at in stamps.items()]
-        return Setpoint(at, self._motion(values), self.wrench, restart)
+        return stamps if max(stamps.values()) - min(stamps.values()) <= self._tolerance else {}
 
     def _give_up(self, stamps: dict[str, int]) -> bool:
         """
@@ -307,7 +333,8 @@ class Setpoints:
         return bool(jump > self._timeout)
 
     def _join_unstamped(
-            self, topic: str, values: tuple[float, ...] | None, now: int) -> Setpoint | None:
+            self, topic: str, values: tuple[float, ...] | None, now: Callable[[], int],
+    ) -> Setpoint | None:
         """
         Join samples without a stamp in their order of arrival; one without values was refused.
 
@@ -331,7 +358,7 @@ class Setpoints:
             return None
         self._unstamped_first = self._unstamped_first or next(iter(self._unstamped))
         self._unstamped.clear()
-        return Setpoint(now, self._motion(sound), self.wrench)
+        return Setpoint(now(), self._motion(sound), self.wrench)
 
     def _give_up_unstamped(self) -> None:
         for topic, values in self._unstamped.items():
@@ -415,10 +442,10 @@ class Setpoints:
                     return None
             except cdr.MalformedError:
                 return None
-            layout = cdr.Layout.of(_READERS[topic], first)
+            self._learn(topic, first)
+            layout = self._layouts.get(topic)
             if layout is None:
                 return None
-            self._layouts[topic] = layout
         if np.any(messages.sizes[at] != layout.size):
             return None
         read = layout.read(messages.data, messages.starts[at])

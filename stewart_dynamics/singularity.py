@@ -21,6 +21,7 @@ change of sign counts as one; and since d(det)/dt is known, it is foretold.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -59,9 +60,10 @@ class Cause(Enum):
 
 
 WARNING_CAUSES = tuple(Cause)
+_CODES = {cause: code for code, cause in enumerate(WARNING_CAUSES)}
 
 
-# A state as a row of numbers: the cause's place in WARNING_CAUSES, whether it is inside
+# A state as numbers: the cause's place in WARNING_CAUSES, whether it is inside
 # stop_condition, the last det(J) that was not zero, time to crossing, changes of sign so far.
 CAUSE, STOPPED, LAST, TIME, CROSSINGS, STATE = range(6)
 
@@ -105,37 +107,38 @@ def advance(state: Array, thresholds: Array, determinant: float, determinant_rat
 class Singularity(NamedTuple):
     """The state of the warning after a sample; the first sample follows Singularity()."""
 
-    warning: bool = False
+    cause: Cause = Cause.NONE
     stopped: bool = False
     """Inside stop_condition."""
-    cause: Cause = Cause.NONE
     determinant: float = 0.0
     """The last that was not zero."""
     time_to_crossing: float = np.inf
     crossings: int = 0
     """Changes of sign of det(J) so far."""
 
+    @property
+    def warning(self) -> bool:
+        """Whether the warning is on."""
+        return self.cause is not Cause.NONE
+
     @classmethod
-    def of(cls, state: Array) -> Singularity:
-        """Return the state that is in a row."""
-        cause, stopped, determinant, time, crossings = state.tolist()
-        return cls(cause > 0.0, stopped > 0.0, WARNING_CAUSES[int(cause)], determinant, time,
-                   int(crossings))
+    def of(cls, numbers: Iterable[float]) -> Singularity:
+        """Return the state that is in STATE numbers."""
+        cause, stopped, determinant, time, crossings = numbers
+        return cls(WARNING_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
 
     @property
-    def row(self) -> Array:
-        """The state in numbers, (STATE,)."""
-        # A warning may have been taken over without its cause.
-        cause = WARNING_CAUSES.index(self.cause) or self.warning
-        return np.array((cause, self.stopped, self.determinant, self.time_to_crossing,
-                         self.crossings), dtype=float)
+    def numbers(self) -> tuple[float, ...]:
+        """The state in STATE numbers."""
+        return (_CODES[self.cause], self.stopped, self.determinant, self.time_to_crossing,
+                self.crossings)
 
     def after(self, parameters: Parameters, determinant: float, determinant_rate: float,
               condition: float) -> Singularity:
         """Return the state after one more sample."""
-        state = self.row
+        state = np.array(self.numbers)
         advance(state, thresholds(parameters), determinant, determinant_rate, condition)
-        return Singularity.of(state)
+        return Singularity.of(state.tolist())
 
 
 def thresholds(parameters: Parameters) -> Array:

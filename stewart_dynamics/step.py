@@ -15,14 +15,16 @@
 """
 The one step from a setpoint to what is published for it; node and replay both take it.
 
-It knows neither ROS nor bags, holds no state, and gives the same bits for the same input,
+It knows neither ROS nor bags, remembers nothing, and gives the same bits for the same input,
 whether setpoints come one at a time or by the thousand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import math
+from operator import sub
+from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +32,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics import cdr
 from stewart_dynamics import inverse_dynamics as runtime
-from stewart_dynamics.compiled import entry_point, source_digest
+from stewart_dynamics.compiled import entry_point, inlined, source_digest
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.singularity import (
@@ -114,9 +116,6 @@ class Batch(NamedTuple):
         return Batch._make(part[which] for part in self)
 
 
-_NO_TIME = np.zeros(1, dtype=np.int64)
-
-
 class Outputs(NamedTuple):
     """What a batch gives: of those setpoints that could be answered, N of them."""
 
@@ -187,7 +186,7 @@ class Outputs(NamedTuple):
 
     def singularity(self, n: int = -1) -> Singularity:
         """Return the state after one of them."""
-        return Singularity.of(self.states[n])
+        return Singularity.of(self.states[n].tolist())
 
 
 # The numbers of the settings: thresholds, whether to suppress, and four limits of six legs.
@@ -197,7 +196,55 @@ LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limi
 _SETTINGS = _LIMITS + 6 * len(LIMITS)
 
 
-def _entry_point(source: str) -> Callable[..., None]:
+# One setpoint in numbers: machine, settings, motion, wrench, state before, restart, whether the
+# stamp is one; then, written, state after, result, forces, whether it is answered and exceeds.
+_ONE_SETTINGS = runtime.MACHINE
+_ONE_MOTION = _ONE_SETTINGS + _SETTINGS
+_ONE_WRENCH = _ONE_MOTION + runtime.MOTION
+_ONE_STATE = _ONE_WRENCH + runtime.WRENCH
+_ONE_RESTART = _ONE_STATE + STATE
+_ONE_STAMP = _ONE_RESTART + 1
+_ONE_RESULT = _ONE_STAMP + 1
+_ONE_FORCES = _ONE_RESULT + runtime.RESULT
+_ONE_AFTER = _ONE_FORCES + 6
+_ONE_ANSWERED = _ONE_AFTER + STATE
+_ONE_EXCEEDING = _ONE_ANSWERED + 1
+_ONE = _ONE_EXCEEDING + 1
+_GIVEN = Struct(f'{_ONE_RESULT - _ONE_MOTION}d')
+_GIVES = Struct(f'{_ONE - _ONE_RESULT}d')
+
+
+@inlined
+def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result: Array,
+           forces: Array) -> tuple[bool, bool]:
+    """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
+    finite = is_stamp
+    for k in range(runtime.RESULT):
+        finite = finite and math.isfinite(result[k])
+    if not finite:
+        return False, False
+    if restart:
+        state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
+    condition = result[runtime.CONDITION]
+    advance(state, settings, result[runtime.DETERMINANT], result[runtime.DETERMINANT_RATE],
+            condition)
+    solved = condition < UNSOLVABLE_CONDITION
+    published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS] > 0.0)
+    exceeding = False
+    for leg in range(6):
+        length, rate = result[runtime.LENGTHS + leg], result[runtime.RATES + leg]
+        force = result[runtime.FORCES + leg]
+        most = settings[_LIMITS + 18 + leg]
+        if not solved:
+            result[runtime.FORCES + leg] = np.nan
+        forces[leg] = min(max(force, -most), most) if published else np.nan
+        if (length < settings[_LIMITS + leg] or length > settings[_LIMITS + 6 + leg]
+                or abs(rate) > settings[_LIMITS + 12 + leg] or (solved and abs(force) > most)):
+            exceeding = True
+    return True, exceeding
+
+
+def _entry_points(source: str) -> tuple[Callable[..., None], Callable[[Array], None]]:
     @entry_point
     def watch(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
               forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
@@ -208,40 +255,34 @@ def _entry_point(source: str) -> Callable[..., None]:
         for n in range(len(results)):
             # One that cannot be answered hands it on.
             restart = restart or restarts[n]
-            finite = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
-            for k in range(runtime.RESULT):
-                finite = finite and math.isfinite(results[n, k])
-            answered[n] = finite
-            exceeding[n] = False
-            if not finite:
-                states[n] = state
-                continue
-            if restart:
-                restart = False
-                state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
-            condition = results[n, runtime.CONDITION]
-            advance(state, settings, results[n, runtime.DETERMINANT],
-                    results[n, runtime.DETERMINANT_RATE], condition)
+            is_stamp = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
+            answered[n], exceeding[n] = _watch(
+                settings, is_stamp, state, restart, results[n], forces[n])
+            restart = restart and not answered[n]
             states[n] = state
-            solved = condition < UNSOLVABLE_CONDITION
-            published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS] > 0.0)
-            for leg in range(6):
-                length = results[n, runtime.LENGTHS + leg]
-                rate = results[n, runtime.RATES + leg]
-                force = results[n, runtime.FORCES + leg]
-                most = settings[_LIMITS + 18 + leg]
-                if not solved:
-                    results[n, runtime.FORCES + leg] = np.nan
-                forces[n, leg] = min(max(force, -most), most) if published else np.nan
-                if (length < settings[_LIMITS + leg] or length > settings[_LIMITS + 6 + leg]
-                        or abs(rate) > settings[_LIMITS + 12 + leg]
-                        or (solved and abs(force) > most)):
-                    exceeding[n] = True
 
-    return watch
+    @entry_point
+    def one(numbers: Array) -> None:
+        """Do with one setpoint what solve and watch do with many; an array costs time to pass."""
+        _ = source
+        state = numbers[_ONE_AFTER:_ONE_AFTER + STATE]
+        state[:] = numbers[_ONE_STATE:_ONE_STATE + STATE]
+        results = numbers[_ONE_RESULT:_ONE_RESULT + runtime.RESULT].reshape(1, runtime.RESULT)
+        runtime.solve(
+            numbers[:runtime.MACHINE],
+            numbers[_ONE_MOTION:_ONE_MOTION + runtime.MOTION].reshape(1, runtime.MOTION),
+            numbers[_ONE_WRENCH:_ONE_WRENCH + runtime.WRENCH].reshape(1, runtime.WRENCH), results)
+        numbers[_ONE_ANSWERED], numbers[_ONE_EXCEEDING] = _watch(
+            numbers[_ONE_SETTINGS:_ONE_SETTINGS + _SETTINGS], numbers[_ONE_STAMP] > 0.0, state,
+            numbers[_ONE_RESTART] > 0.0, results[0], numbers[_ONE_FORCES:_ONE_FORCES + 6])
+
+    return watch, one
 
 
-_watch = _entry_point(source_digest('compiled', 'cdr', 'inverse_dynamics', 'singularity', 'step'))
+_watch_many, _one = _entry_points(source_digest(
+    'compiled', 'vectors', 'matrix6', 'cdr', 'inverse_dynamics', 'singularity', 'step'))
+
+_FIRST = Singularity()
 
 
 class Step:
@@ -251,7 +292,8 @@ class Step:
     Parameters
     ----------
     parameters : Parameters
-        They hold for every call; another set of them makes another step.
+        They hold for every call; another set of them makes another step. One thread at a time
+        may call it: a call for one setpoint works in memory that is the step's own.
 
     """
 
@@ -266,6 +308,10 @@ class Step:
         for n, name in enumerate(LIMITS):
             never = -math.inf if name == 'limits.length_min' else math.inf
             self._settings[_LIMITS + 6 * n:_LIMITS + 6 * n + 6] = self._limits.get(name, never)
+        self._numbers = np.zeros(_ONE)
+        self._memory = self._numbers.data  # the same as bytes
+        self._numbers[:_ONE_SETTINGS] = self._platform.machine
+        self._numbers[_ONE_SETTINGS:_ONE_MOTION] = self._settings
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = cdr.JointState(parameters['joints'])
         self._with_effort, self._without_effort = (
@@ -283,21 +329,37 @@ class Step:
             The output's before this one; none for the first.
 
         """
-        outputs = self.many(Batch(
-            np.array((setpoint.stamp,)), np.array((setpoint.motion,)),
-            np.array((setpoint.wrench,)), np.array((setpoint.restart,)),
-            _NO_TIME), before)
-        return self._output(outputs) if outputs.answered[0] else None
+        stamp = setpoint.stamp
+        _GIVEN.pack_into(
+            self._memory, 8 * _ONE_MOTION, *setpoint.motion, *setpoint.wrench,
+            *(before or _FIRST).numbers, setpoint.restart,
+            -cdr.STAMPS_END <= stamp < cdr.STAMPS_END)
+        _one(self._numbers)
+        result = _GIVES.unpack_from(self._memory, 8 * _ONE_RESULT)
+        if not result[_ONE_ANSWERED - _ONE_RESULT]:
+            return None
+        lengths, rates, demanded = result[0:6], result[6:12], result[12:18]
+        forces = result[_ONE_FORCES - _ONE_RESULT:_ONE_AFTER - _ONE_RESULT]
+        singularity = Singularity.of(result[_ONE_AFTER - _ONE_RESULT:_ONE_ANSWERED - _ONE_RESULT])
+        solved = demanded[0] == demanded[0]
+        return Output(
+            stamp, lengths, rates, demanded if solved else None,
+            forces if forces[0] == forces[0] else None, result[18:24],
+            result[runtime.DETERMINANT], result[runtime.DETERMINANT_RATE],
+            result[runtime.CONDITION], singularity,
+            before is None or singularity.warning != before.warning,
+            self._excesses(lengths, rates, demanded if solved else None)
+            if result[_ONE_EXCEEDING - _ONE_RESULT] else ())
 
     def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
         """Return what setpoints give one after the other; see the call for one."""
         results = self._platform.solve(setpoints.motions, setpoints.wrenches)
         many = len(results)
-        state = (before or Singularity()).row
+        state = np.array((before or _FIRST).numbers)
         forces, states = np.empty((many, 6)), np.empty((many, STATE))
         answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
-        _watch(self._settings, setpoints.stamps, setpoints.restarts, state, results, forces,
-               states, answered, exceeding)
+        _watch_many(self._settings, setpoints.stamps, setpoints.restarts, state, results, forces,
+                    states, answered, exceeding)
         stamps = setpoints.stamps
         if not answered.all():
             stamps, results, forces = stamps[answered], results[answered], forces[answered]
@@ -308,20 +370,17 @@ class Step:
         changed[1:] = warnings[1:] != warnings[:-1]
         return Outputs(answered, stamps, results, forces, states, changed, exceeding)
 
-    def messages(self, output: Output) -> list[tuple[str, bytes]]:
-        """Return topics (keys of OUTPUT_TYPES) and messages to publish for an output."""
-        positions = [length - zero for length, zero in
-                     zip(output.lengths, self._zero_lengths, strict=True)]
-        messages = [
-            ('leg_states', self._joint_state.write(
-                output.stamp, positions, output.rates, output.forces)),
-            ('leg_lengths', cdr.float64_array(output.lengths))]
+    def messages(self, output: Output) -> Iterator[tuple[str, bytes]]:
+        """Yield topics (keys of OUTPUT_TYPES) and messages to publish for an output."""
+        yield 'leg_states', self._joint_state.write(
+            output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
+            output.forces)
+        yield 'leg_lengths', cdr.float64_array(output.lengths)
         if output.forces is not None:
-            messages.append(('leg_forces', cdr.float64_array(output.forces)))
-        messages.append(('jacobian_determinant', cdr.float64(output.determinant)))
+            yield 'leg_forces', cdr.float64_array(output.forces)
+        yield 'jacobian_determinant', cdr.float64(output.determinant)
         if output.warning_changed:
-            messages.append(('singularity_warning', cdr.boolean(output.singularity.warning)))
-        return messages
+            yield 'singularity_warning', cdr.boolean(output.singularity.warning)
 
     def messages_of(self, outputs: Outputs) -> list[tuple[str, Stamps, NDArray[np.void]]]:
         """
@@ -355,19 +414,6 @@ class Step:
         messages.append(('singularity_warning', changed, np.frombuffer(
             b''.join(warnings), dtype=f'V{len(cdr.boolean(True))}')))
         return messages
-
-    def _output(self, outputs: Outputs) -> Output:
-        """Return the only one of them."""
-        result = outputs.results[0].tolist()
-        forces = outputs.forces[0].tolist()
-        lengths, rates = tuple(result[0:6]), tuple(result[6:12])
-        demanded = tuple(result[12:18]) if result[12] == result[12] else None
-        return Output(
-            int(outputs.stamps[0]), lengths, rates, demanded,
-            tuple(forces) if forces[0] == forces[0] else None, tuple(result[18:24]),
-            result[runtime.DETERMINANT], result[runtime.DETERMINANT_RATE],
-            result[runtime.CONDITION], outputs.singularity(), bool(outputs.changed[0]),
-            self._excesses(lengths, rates, demanded) if outputs.exceeding[0] else ())
 
     def _excesses(
             self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Excess, ...]:

@@ -22,11 +22,13 @@ import struct
 import time
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import (
     AccelStamped, PoseStamped, Transform, Twist, TwistStamped, WrenchStamped)
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from messages import STORE
+import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
@@ -267,6 +269,57 @@ def test_huge_counts_cost_no_time() -> None:
     assert time.perf_counter() - begun < 5.0
 
 
+@KINDS
+@moderately
+@given(st.data())
+def test_what_has_the_layout_of_another_is_read_alike(kind: str, data: st.DataObject) -> None:
+    frame = data.draw(texts)
+    names = data.draw(st.lists(texts, max_size=3))
+    first, second = (serialize_message(message(
+        kind, data.draw(stamps), frame, data.draw(st.tuples(*[st.floats()] * LENGTHS[kind])),
+        names)) for _ in range(2))
+    layout = cdr.Layout.of(READERS[kind], first)
+    assert layout is not None
+    expected = READERS[kind](second)
+    one = layout.read_one(second)
+    assert one is not None
+    assert one[0] == expected.stamp
+    assert same(one[1], expected.values)
+    many = layout.read(np.frombuffer(first + second, np.uint8), np.array([0, len(first)]))
+    assert many is not None
+    assert many[0].tolist() == [READERS[kind](first).stamp, expected.stamp]
+    assert same(many[1][1].tolist(), expected.values)
+
+
+@KINDS
+@moderately
+@given(st.data())
+def test_one_byte_that_differs_never_makes_another_message_of_it(
+        kind: str, data: st.DataObject) -> None:
+    """What a layout reads of a message is what the reader reads, whatever byte is changed."""
+    good = valid(kind)
+    layout = cdr.Layout.of(READERS[kind], good)
+    assert layout is not None
+    spoiled = bytearray(good)
+    spoiled[data.draw(st.integers(0, len(good) - 1))] = data.draw(st.integers(0, 255))
+    one = layout.read_one(bytes(spoiled))
+    many = layout.read(np.frombuffer(spoiled, np.uint8), np.array([0]))
+    assert (one is None) == (many is None)
+    if one is not None:
+        expected = READERS[kind](bytes(spoiled))
+        assert one[0] == expected.stamp
+        assert expected.frame == b'base'
+        assert same(one[1], expected.values)
+
+
+def test_a_layout_reads_no_message_of_another_size() -> None:
+    good = valid('geometry_msgs/msg/PoseStamped')
+    layout = cdr.Layout.of(cdr.pose, good)
+    assert layout is not None
+    assert layout.read_one(good[:-1]) is None
+    assert layout.read_one(good + b'\0') is None
+
+
 # Writing
 
 def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
@@ -357,6 +410,25 @@ def test_a_number_and_a_truth_value_are_what_rclpy_writes(number: float, truth: 
     assert serialize_message(Bool(data=truth))[:len(data)] == data  # padded to four bytes
     assert deserialize_message(data, Bool).data is truth
     assert STORE.deserialize_cdr(data, 'std_msgs/msg/Bool').data is truth
+
+
+statuses = st.lists(st.tuples(
+    st.integers(0, 3), st.tuples(texts, texts, texts),
+    st.lists(st.tuples(texts, texts), max_size=4)), max_size=4)
+
+
+@moderately
+@given(stamps, statuses)
+def test_diagnostics_are_what_rclpy_and_rosbags_write(stamp: int, written: Any) -> None:
+    data = cdr.diagnostics(stamp, written)
+    array = deserialize_message(data, DiagnosticArray)
+    assert (array.header.stamp.sec, array.header.stamp.nanosec) == divmod(stamp, SECOND)
+    assert array.header.frame_id == ''
+    assert [(status.level[0], (status.name, status.message, status.hardware_id),
+             [(pair.key, pair.value) for pair in status.values])
+            for status in array.status] == written
+    kind = 'diagnostic_msgs/msg/DiagnosticArray'
+    assert bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, kind), kind)) == data
 
 
 @pytest.mark.parametrize(('stamp', 'holds'), [

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is said of setpoints, singularity and limits, at which level, and for how long."""
+"""What is said of setpoints, singularity, limits and timing, at which level, and how long."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from referees import symmetric_parameters
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 from stewart_dynamics.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
-from stewart_dynamics.setpoints import ACCEL, NOT_FINITE, POSE, Refusal, TWICE, TWIST
+from stewart_dynamics.setpoints import (
+    ACCEL, NOT_FINITE, NOT_JOINED, PASSED_OVER, POSE, Refusal, TWICE, TWIST)
 from stewart_dynamics.singularity import Cause, Singularity
 from stewart_dynamics.step import Excess, Output, Setpoint, Step
 
@@ -52,19 +53,20 @@ def begun() -> Diagnostics:
 
 
 def answered(diagnostics: Diagnostics, now: float, output: Output = CLEAR,
-             topics: tuple[str, ...] = TOPICS) -> bool:
+             topics: tuple[str, ...] = TOPICS, took: float = 1e-4) -> bool:
     """Let messages of some topics come, and a setpoint be answered."""
     for topic in topics:
         diagnostics.heard(topic, now)
-    return diagnostics.answered(output, now)
+    return diagnostics.answered(output, now - took, now)
 
 
 def status(diagnostics: Diagnostics, name: str, now: float) -> Status:
     return next(status for status in diagnostics.report(now) if status.name == name)
 
 
-def test_there_is_one_status_for_each_of_three_things() -> None:
-    assert [s.name for s in begun().report(BEGIN)] == ['setpoints', 'singularity', 'limits']
+def test_there_is_one_status_for_each_of_four_things() -> None:
+    assert [s.name for s in begun().report(BEGIN)] == [
+        'setpoints', 'singularity', 'limits', 'timing']
 
 
 # Silence
@@ -172,6 +174,69 @@ def test_several_writers_of_a_topic_are_an_error() -> None:
     assert dict(of.values)[f'{TWIST}: writers'] == '2'
 
 
+def test_another_node_of_the_same_name_is_an_error() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    diagnostics.namesakes = '/ns/node', 3
+    of = status(diagnostics, 'setpoints', BEGIN)
+    assert (of.level, of.message) == (ERROR, '3 nodes are named /ns/node')
+    diagnostics.namesakes = '/ns/node', 1
+    assert status(diagnostics, 'setpoints', BEGIN).level == OK
+
+
+def test_an_error_is_not_covered_by_silence_and_says_that_too() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    diagnostics.writers = dict.fromkeys(TOPICS, 2)
+    of = status(diagnostics, 'setpoints', BEGIN + 3.0)
+    assert of.level == ERROR
+    assert of.message == (
+        f'{POSE} has 2 writers, {TWIST} has 2 writers, {ACCEL} has 2 writers, no setpoint: '
+        + ', '.join(f'{topic} silent for 3.0 s' for topic in TOPICS))
+
+
+def test_where_all_is_refused_silence_is_not_said_to_be_of_stamps() -> None:
+    diagnostics = begun()
+    for topic in TOPICS:
+        diagnostics.heard(topic, BEGIN)
+    diagnostics.refused(Refusal(POSE, NOT_FINITE), 'nan', BEGIN)
+    of = status(diagnostics, 'setpoints', BEGIN + 0.01)
+    assert (of.level, of.message) == (STALE, f'no setpoint: {POSE}: {NOT_FINITE} (nan)')
+
+
+# Timing
+
+def test_processing_times_are_those_since_the_last_report() -> None:
+    diagnostics = begun()
+    assert status(diagnostics, 'timing', BEGIN)[1:] == (
+        OK, 'no setpoint yet', (('passed over', '0'), ('incomplete', '0')))
+    for took in (100e-6, 900e-6, 200e-6):
+        answered(diagnostics, BEGIN, took=took)
+    of = status(diagnostics, 'timing', BEGIN)
+    assert (of.level, of.message) == (OK, 'on time')
+    assert of.values[:2] == (
+        ('processing time, median (us)', '200'), ('processing time, largest (us)', '900'))
+    answered(diagnostics, BEGIN, took=50e-6)
+    assert dict(status(diagnostics, 'timing', BEGIN).values)[
+        'processing time, largest (us)'] == '50'
+    assert 'processing time, median (us)' not in dict(
+        status(diagnostics, 'timing', BEGIN).values)
+
+
+def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> None:
+    diagnostics = begun()
+    for n in range(3):
+        diagnostics.refused(Refusal('setpoint', PASSED_OVER), f'stamp {n} ns', BEGIN)
+    diagnostics.refused(Refusal(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
+    diagnostics.refused(Refusal(POSE, TWICE), 'stamp 4 ns', BEGIN)
+    answered(diagnostics, BEGIN)
+    of = status(diagnostics, 'timing', BEGIN + 0.5)
+    assert (of.level, of.message) == (WARN, f'setpoint: {PASSED_OVER} (stamp 2 ns)')
+    of = status(diagnostics, 'timing', BEGIN + 1.5)
+    assert (of.level, of.message) == (OK, 'on time')
+    assert of.values == (('passed over', '3'), ('incomplete', '1'))
+
+
 # Singularity
 
 def test_a_clear_motion_is_ok() -> None:
@@ -191,7 +256,7 @@ def test_a_clear_motion_is_ok() -> None:
 def test_a_warning_says_its_cause(cause: Cause) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, CLEAR._replace(singularity=Singularity(
-        warning=True, cause=cause, time_to_crossing=0.25, crossings=4)))
+        cause=cause, time_to_crossing=0.25, crossings=4)))
     of = status(diagnostics, 'singularity', BEGIN)
     assert (of.level, of.message) == (WARN, cause.value)
     assert dict(of.values)['time to crossing (s)'] == '0.250'
@@ -211,7 +276,7 @@ def test_a_pose_that_cannot_be_solved_is_an_error(setpoint: Setpoint) -> None:
 
 @pytest.mark.parametrize('suppressed', [False, True])
 def test_inside_the_stop_condition_is_an_error(suppressed: bool) -> None:
-    stopped = Singularity(warning=True, stopped=True, cause=Cause.CONDITION)
+    stopped = Singularity(stopped=True, cause=Cause.CONDITION)
     output = CLEAR._replace(singularity=stopped)
     diagnostics = begun()
     answered(diagnostics, BEGIN, output._replace(forces=None) if suppressed else output)
@@ -293,12 +358,22 @@ def test_a_level_holds_for_a_second_after_its_cause() -> None:
 def test_a_worse_level_is_not_covered_by_a_lesser_one() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, output_of(QUARTER))
-    near = CLEAR._replace(singularity=Singularity(warning=True, cause=Cause.CONDITION))
+    near = CLEAR._replace(singularity=Singularity(cause=Cause.CONDITION))
     for after in (0.2, 0.9):
         answered(diagnostics, BEGIN + after, near)
         assert status(diagnostics, 'singularity', BEGIN + after).level == ERROR
     answered(diagnostics, BEGIN + 1.1, near)
     assert status(diagnostics, 'singularity', BEGIN + 1.1).level == WARN
+
+
+def test_a_crossing_is_said_for_a_second_whatever_comes_after_it() -> None:
+    diagnostics = begun()
+    for n, cause in enumerate((Cause.FORETOLD, Cause.CROSSED, Cause.CONDITION, Cause.CONDITION)):
+        answered(diagnostics, BEGIN + 0.001 * n, CLEAR._replace(singularity=Singularity(cause)))
+    of = status(diagnostics, 'singularity', BEGIN + 0.9)
+    assert (of.level, of.message) == (WARN, Cause.CROSSED.value)
+    of = status(diagnostics, 'singularity', BEGIN + 1.1)
+    assert (of.level, of.message) == (WARN, Cause.CONDITION.value)
 
 
 def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
@@ -321,9 +396,10 @@ def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
 
 # Every value
 
+UNIT = re.compile(r'\((m|m/s|N|s|us|s ago|Hz|m\^3|m\^3/s)\)$')
 PLAIN = re.compile(
     r'setpoints answered|crossings|condition number|worst condition number since the last report'
-    r'|largest leg force under a unit load|its leg|refused, .*|.*: writers')
+    r'|largest leg force under a unit load|its leg|refused, .*|.*: writers|passed over|incomplete')
 
 
 def _check_values(diagnostics: Diagnostics, now: float) -> None:
@@ -333,7 +409,7 @@ def _check_values(diagnostics: Diagnostics, now: float) -> None:
         keys = [key for key, _ in of.values]
         assert len(set(keys)) == len(keys)
         for key, value in of.values:
-            assert re.search(r'\((m|m/s|N|s|s ago|Hz|m\^3|m\^3/s)\)$', key) or PLAIN.fullmatch(key)
+            assert UNIT.search(key) or PLAIN.fullmatch(key)
             assert not re.search('nan|inf', value, re.IGNORECASE)
             assert value
 
@@ -364,9 +440,8 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
 
 def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
     diagnostics = begun()
-    warned = CLEAR._replace(singularity=Singularity(warning=True, cause=Cause.CONDITION))
-    stopped = CLEAR._replace(singularity=Singularity(warning=True, stopped=True,
-                                                     cause=Cause.CONDITION))
+    warned = CLEAR._replace(singularity=Singularity(cause=Cause.CONDITION))
+    stopped = CLEAR._replace(singularity=Singularity(Cause.CONDITION, stopped=True))
     answered(diagnostics, BEGIN, stopped)
     levels = []
     for n in range(1, 40):

@@ -67,7 +67,7 @@ class Feed:
     def __call__(self, topic: str, data: bytes) -> Setpoint | None:
         """Take one message."""
         self.given[topic] += 1
-        return self.setpoints.take(topic, data, NOW)
+        return self.setpoints.take(topic, data, lambda: NOW)
 
     def sample(self, topic: str, stamp: int, mark: float = 0.0) -> Setpoint | None:
         """Take a good message of a topic, the mark in its first number."""
@@ -265,9 +265,9 @@ def test_another_base_frame_is_the_only_one() -> None:
     setpoints = Setpoints(
         PARAMETERS.replaced({'base_frame': 'sol élevé', 'setpoint.source': 'pose'}),
         lambda refusal, details: None, lambda text: None)
-    assert setpoints.take(POSE, messages.pose(SECOND, frame='base'), NOW) is None
+    assert setpoints.take(POSE, messages.pose(SECOND, frame='base'), lambda: NOW) is None
     assert setpoints.counts == {Refusal(POSE, WRONG_FRAME): 1}
-    assert setpoints.take(POSE, messages.pose(SECOND, frame='sol élevé'), NOW)
+    assert setpoints.take(POSE, messages.pose(SECOND, frame='sol élevé'), lambda: NOW)
 
 
 def test_a_wrench_holds_until_the_next() -> None:
@@ -517,7 +517,7 @@ def test_memory_does_not_grow_while_a_topic_is_silent(stamped: bool) -> None:
         for n in range(first, end):
             for topic in (POSE, TWIST):
                 data = WRITERS[topic](n * MS if stamped else 0)
-                assert setpoints.take(topic, data, NOW) is None
+                assert setpoints.take(topic, data, lambda: NOW) is None
 
     feed(1, 1000)
     tracemalloc.start()
@@ -680,7 +680,7 @@ def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **option
         if topic == WRENCH:
             one.setpoints.take_wrench(data)
             continue
-        setpoint = one.setpoints.take(topic, data, NOW + 1000 * n)
+        setpoint = one.setpoints.take(topic, data, lambda n=n: NOW + 1000 * n)
         if setpoint is not None:
             expected.append(setpoint)
             times.append(NOW + 1000 * n)

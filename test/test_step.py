@@ -29,7 +29,7 @@ from referees import (
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.rotation import from_quaternion
-from stewart_dynamics.singularity import Singularity, UNSOLVABLE_CONDITION
+from stewart_dynamics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.step import (
     Excess, NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Six, Step)
 
@@ -110,7 +110,7 @@ def test_messages_carry_the_output() -> None:
     step = Step(parameters)
     for setpoint, wrench in rows(parameters, 10):
         output = answered(step, setpoint, wrench)
-        messages = step.messages(output)
+        messages = list(step.messages(output))
         assert [topic for topic, _ in messages] == list(OUTPUT_TYPES)
         of = decoded(messages)
         state = of['leg_states']
@@ -135,7 +135,7 @@ def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
         rotation = from_quaternion(0.0, 0.0, math.sin(half), math.cos(half))
         output = answered(STEP, Setpoint(STAMP, (0.0, 0.0, 1.0, *rotation, *REST)), NO_WRENCH,
                           state)
-        message = decoded(STEP.messages(output)).get('singularity_warning')
+        message = decoded(list(STEP.messages(output))).get('singularity_warning')
         if message is not None:
             sent.append(message.data)
         changed = state is None or state.warning != output.singularity.warning
@@ -146,7 +146,7 @@ def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
 
 def test_it_holds_no_state() -> None:
     given = [setpoint._replace(wrench=wrench) for setpoint, wrench in rows(PARAMETERS, 30)]
-    states = [None, Singularity(), Singularity(warning=True, stopped=True, determinant=-1.0)]
+    states = [None, Singularity(), Singularity(Cause.CONDITION, stopped=True, determinant=-1.0)]
     first = [STEP(setpoint, state) for setpoint in given for state in states]
     again = [STEP(setpoint, state) for setpoint in given for state in states]
     other = Step(PARAMETERS)
@@ -155,7 +155,8 @@ def test_it_holds_no_state() -> None:
     assert first == again == backward[::-1]
     for output in first:
         assert output is not None
-        assert STEP.messages(output) == other.messages(output) == STEP.messages(output)
+        assert (list(STEP.messages(output)) == list(other.messages(output))
+                == list(STEP.messages(output)))
 
 
 # Limits
@@ -175,7 +176,7 @@ def test_forces_are_clipped_and_said_to_exceed() -> None:
         assert output.excesses == tuple(
             Excess('limits.force_max', leg, free.demanded_forces[leg], bounds[leg])
             for leg in (1, 3, 5))
-        state = decoded(STEP.messages(output))
+        state = decoded(list(STEP.messages(output)))
         assert tuple(state['leg_states'].effort) == output.forces
         assert tuple(state['leg_forces'].data) == output.forces
 
@@ -224,7 +225,7 @@ def test_forces_are_suppressed_inside_the_stop_condition(action: str) -> None:
     assert 100.0 < near.condition < UNSOLVABLE_CONDITION
     assert near.demanded_forces is not None
     assert near.singularity.stopped
-    of = decoded(step.messages(near))
+    of = decoded(list(step.messages(near)))
     if action == 'warn':
         assert near.forces == near.demanded_forces
         assert tuple(of['leg_forces'].data) == near.forces
@@ -260,7 +261,7 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Setp
     legs = (setpoint.motion[:3] + PARAMETERS['geometry.platform_joints'] @ rotation.T
             - PARAMETERS['geometry.base_joints'])
     assert np.allclose(output.lengths, np.linalg.norm(legs, axis=1), rtol=1e-14)
-    of = decoded(step.messages(output))
+    of = decoded(list(step.messages(output)))
     assert list(of) == ['leg_states', 'leg_lengths', 'jacobian_determinant',
                         'singularity_warning']
     assert len(of['leg_states'].effort) == 0
@@ -300,7 +301,7 @@ def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
     after = step(setpoint._replace(wrench=wrench), output.singularity)
     assert after is not None
     for of in (output, after):
-        read = decoded(step.messages(of))
+        read = decoded(list(step.messages(of)))
         assert np.all(np.isfinite(numbers_of(read)))
         assert read['leg_states'].position.shape == (6,)
         assert ('leg_forces' in read) == bool(len(read['leg_states'].effort))
@@ -323,11 +324,11 @@ def test_only_finite_numbers_are_published(
 
 _LIMITED = Step(PARAMETERS.replaced({
     'limits.force_max': 1000.0, 'limits.length_max': 2.0, 'limits.velocity_max': 1.0,
-    'singularity.action': 'suppress_forces', 'geometry.zero_length': -1.79e308}))
+    'singularity.action': 'suppress_forces', 'geometry.zero_length': 1.79e308}))
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
-@given(st.floats(5e-324, 1.79e308), st.floats(0.0, 1.79e308), huge,
+@given(st.floats(5e-324, 1.79e308), st.floats(0.0, 1.79e308), st.floats(0.0, 1.79e308),
        st.tuples(*[st.floats(-2.0, 2.0)] * 3), rotations, st.tuples(*[sizes] * 12))
 def test_only_finite_numbers_are_published_whatever_the_machine(
         mass: float, leg_mass: float, zero_length: float, position: tuple[float, ...],
@@ -339,7 +340,7 @@ def test_only_finite_numbers_are_published_whatever_the_machine(
 
 
 def test_a_restart_is_no_crossing() -> None:
-    before = Singularity(warning=True, stopped=True, determinant=-0.2, crossings=1)
+    before = Singularity(Cause.CONDITION, True, -0.2, crossings=1)
     output = STEP(HOME._replace(restart=True), before)
     assert output is not None
     assert output.singularity.crossings == 1

@@ -1,0 +1,70 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What a log says of what happens over and over: the first, one in five seconds, and the last.
+
+It knows no ROS and no clock: it is told the time and returns the lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+# A series is over when nothing of its kind came for so long, and said again after so long.
+SECONDS = 5.0
+
+
+@dataclass
+class _One:
+    """A series that is not over."""
+
+    text: str
+    said: float
+    seen: float
+    unsaid: int = 0
+    number: int = 1
+
+
+class Series:
+    """Tells series of alike events apart by their kind; times are seconds of a steady clock."""
+
+    def __init__(self) -> None:
+        self._of_kind: dict[Hashable, _One] = {}
+
+    def add(self, kind: Hashable, text: str, now: float) -> str | None:
+        """Return what to say of one more event, None for nothing yet."""
+        one = self._of_kind.get(kind)
+        if one is None:
+            self._of_kind[kind] = _One(text, now, now)
+            return text
+        one.text, one.seen = text, now
+        one.number += 1
+        if now - one.said < SECONDS:
+            one.unsaid += 1
+            return None
+        before = f' (and {one.unsaid} before it)' if one.unsaid else ''
+        one.said, one.unsaid = now, 0
+        return text + before
+
+    def over(self, now: float) -> list[str]:
+        """Return what to say of the series that are over by now: the last of each, if unsaid."""
+        lines = []
+        for kind, one in list(self._of_kind.items()):
+            if now - one.seen >= SECONDS:
+                del self._of_kind[kind]
+                if one.unsaid:
+                    lines.append(f'{one.text} (the last of {one.number})')
+        return lines
