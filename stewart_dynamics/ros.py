@@ -18,28 +18,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
+import gc
+import math
 import signal
 import sys
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult)
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import NameValidationException, ROSInterruptException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
+from stewart_dynamics.security import check_environment, without_security_libraries
 
 # The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
 _SPIN_SECONDS = 10.0
 
 # What is the user's to mend, said in one line: all else is a fault of ours.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
+
+_TYPES = {
+    'string': (ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_STRING_ARRAY),
+    'double': (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_DOUBLE_ARRAY),
+    'bool': (ParameterType.PARAMETER_BOOL, ParameterType.PARAMETER_BOOL_ARRAY)}
 
 Kind = TypeVar('Kind', bound=ParameterSet)
 
@@ -50,37 +62,102 @@ def parameter_files(arguments: Sequence[str]) -> list[str]:
             if option == '--params-file']
 
 
+def _overrides(arguments: Sequence[str], node: str) -> list[tuple[str, str]]:
+    """Return names and texts of the values that a command line sets, for all nodes or this."""
+    rules = [rule.partition(':=') for option, rule in zip(arguments, arguments[1:], strict=False)
+             if option in ('-p', '--param')]
+    return [(name.rpartition(':')[2], text) for name, _, text in rules
+            if name.rpartition(':')[0] in ('', node)]
+
+
 def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
     The node must have been made with ``automatically_declare_parameters_from_overrides``.
-    Types are left to the table's own check, whose texts say more than ROS's. Raises
-    ParameterError, for an unknown name as well.
+    Types and ranges are left to the table's own check, whose texts say more than ROS's. A node
+    without a lifecycle takes no changes. Raises ParameterError, for an unknown name as well.
     """
     sources = parameter_files(sys.argv)
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
+    # ROS drops a value silently that is of another type than that in a file.
+    for name, text in _overrides(sys.argv, kind.node):
+        kind.check_value(name, text, 'command line')
     declared: dict[str, Any] = node.get_parameters_by_prefix('')
     given = {name: parameter.value for name, parameter in declared.items() if not is_of_ros(name)}
     parameters = kind(given, source)
     for name, parameter in kind.table.items():
+        unchecked = ParameterDescriptor(dynamic_typing=True)
         if node.has_parameter(name):
-            node.set_descriptor(name, _descriptor(parameter))
+            node.set_descriptor(name, unchecked)
         else:
             default = parameter.default
             if isinstance(default, tuple):
                 default = list(default) or None
-            node.declare_parameter(name, default, _descriptor(parameter))
+            node.declare_parameter(name, default, unchecked)
+    if not isinstance(node, LifecycleNode):
+        node.add_on_set_parameters_callback(partial(_refuse_changes, kind))
+    _describe_by_table(node, kind)
     return parameters
 
 
-def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+def _refuse_changes(
+        kind: type[ParameterSet], changes: Sequence[RosParameter]) -> SetParametersResult:
+    for change in changes:
+        if not is_of_ros(change.name):
+            try:
+                kind.declared(change.name)
+            except ParameterError as exc:
+                return SetParametersResult(successful=False, reason=str(exc))
+            return SetParametersResult(successful=False, reason=(
+                f'{change.name}: only read when the node starts: start it anew'))
+    return SetParametersResult(successful=True)
+
+
+def _describe_by_table(node: Node, kind: type[ParameterSet]) -> None:
+    """
+    Answer requests for a parameter's description from the table.
+
+    rclpy 7.1 would check by the description that it holds: a double by its range, in words of
+    its own before our check is asked, and with ``more than 0`` as if it were ``at least 0``. And
+    it writes the type of a value into it that is then refused.
+    """
+    def describe(request: Any, response: Any) -> Any:
+        response = describe_by_node(request, response)
+        if response.descriptors:  # none where a name is unknown
+            response.descriptors = [
+                _descriptor(kind.table[name], node) if name in kind.table else known
+                for name, known in zip(request.names, response.descriptors, strict=True)]
+        return response
+
+    for service in node.services:
+        if service.srv_name.endswith('/describe_parameters'):
+            describe_by_node = service.callback
+            service.callback = describe
+
+
+def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
+    """Return all that is known of a parameter, as ROS describes it."""
+    has_lifecycle = isinstance(node, LifecycleNode)
+    when = 'only while unconfigured' if has_lifecycle else 'only when the node starts'
+    if parameter.while_active:
+        when = 'also while active'
+    sizes = ' or '.join(map(str, parameter.sizes))
+    constraints = [f'{sizes} entries' if sizes else '', parameter.rule, f'set {when}']
     unit = f' [{parameter.unit}]' if parameter.unit else ''
+    in_range = math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum)
+    # What may be one number or six is of the type that it has now.
+    type_ = node.get_parameter(parameter.name).type_.value
+    if type_ == ParameterType.PARAMETER_NOT_SET:
+        type_ = _TYPES[parameter.kind][bool(parameter.sizes)]
     return ParameterDescriptor(
-        description=parameter.text + unit, additional_constraints=parameter.rule,
-        dynamic_typing=True)
+        name=parameter.name, type=type_, description=parameter.text + unit,
+        additional_constraints='; '.join(filter(None, constraints)),
+        read_only=not has_lifecycle, dynamic_typing=len(parameter.sizes) > 1,
+        floating_point_range=[FloatingPointRange(
+            from_value=parameter.minimum, to_value=parameter.maximum)] if in_range else [])
 
 
 def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., None]:
@@ -158,8 +235,10 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
             kind.check_file(path)
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
+        check_environment(sys.argv)
         rclpy.init()
-        node = make_node()
+        with without_security_libraries():
+            node = make_node()
         executor = _executor()
         executor.add_node(node)
         starting = False
@@ -183,5 +262,8 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
             executor.shutdown()
         if node is not None:
             node.destroy_node()
+        # What a node has frozen is not collected before the libraries are gone that Fast DDS
+        # needs to leave: over TLS that crashes.
+        gc.unfreeze()
         with suppress(RCLError):  # a signal's own shutdown may come between check and call
             rclpy.try_shutdown()

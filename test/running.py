@@ -26,11 +26,14 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 import fcntl
+from functools import partial
+from itertools import count
 import math
 import os
 from pathlib import Path
 import re
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -64,9 +67,12 @@ from stewart_dynamics.rotation import from_quaternion
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 NODE = '/stewart_dynamics'
+FEEDER = Path(__file__).with_name('feeder.py')
 
 # Nothing here takes seconds on a machine at rest: this is for one that is not.
 DEADLINE = 60.0
+
+STEP = 10_000_000  # between two setpoints' stamps [ns]
 
 QOS = QoSProfile(depth=2000)
 LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -74,6 +80,8 @@ LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 INPUTS: dict[str, Any] = {
     'setpoint/pose': PoseStamped, 'setpoint/twist': TwistStamped, 'setpoint/accel': AccelStamped,
     'setpoint/combined': MultiDOFJointTrajectory, 'wrench': WrenchStamped}
+# Their stamps are those of the answers.
+FIRST = ('setpoint/pose', 'setpoint/combined')
 OUTPUTS: dict[str, Any] = {
     'leg_states': JointState, 'leg_lengths': Float64MultiArray, 'leg_forces': Float64MultiArray,
     'jacobian_determinant': Float64, 'singularity_warning': Bool}
@@ -178,10 +186,31 @@ class Program:
         return self.wait()
 
     def kill(self) -> None:
-        """End it if it still runs: after a test that has failed."""
+        """End it, if it still runs, without a chance to end by itself."""
         if not self.ended:
             self.process.kill()
             self.process.wait()
+
+    def held(self) -> dict[str, int]:
+        """Return how many file descriptors and threads it has, and its resident memory [kB]."""
+        of_process = Path('/proc') / str(self.process.pid)
+        status = dict(line.split(':', 1) for line in
+                      (of_process / 'status').read_text(encoding='utf-8').splitlines())
+        return {'descriptors': len(list((of_process / 'fd').iterdir())),
+                'threads': int(status['Threads']), 'memory': int(status['VmRSS'].split()[0])}
+
+
+def refused(domain: int, folder: Path, *arguments: str | Path) -> str:
+    """Return the one line that the node ends with, exit code 1, for these ROS arguments."""
+    program = Program([executable('stewart_dynamics'), '--ros-args', *arguments], domain, folder)
+    try:
+        assert program.wait() == 1, program.stderr
+    finally:
+        program.kill()
+    assert program.stdout == ''
+    lines = program.stderr.splitlines()
+    assert len(lines) == 1, program.stderr
+    return lines[0]
 
 
 class Peer:
@@ -201,9 +230,9 @@ class Peer:
         self.node.create_subscription(kind, topic, received.append, qos, raw=True)
         return received
 
-    def writer(self, topic: str, kind: Any) -> Publisher:
+    def writer(self, topic: str, kind: Any, qos: QoSProfile = QOS) -> Publisher:
         """Return a publisher."""
-        return self.node.create_publisher(kind, topic, QOS)
+        return self.node.create_publisher(kind, topic, qos)
 
     def spin(self, seconds: float = 0.05) -> None:
         """Take one message if one comes."""
@@ -326,6 +355,7 @@ class DynamicsNode:
         self._stack.callback(self.peer.close)
         self._stamp = 1_700_000_000_000_000_000
         self.expected: Counter[str] = Counter()
+        self.asked: Counter[int] = Counter()  # setpoints that were sent, by their stamp
         self.platform = StewartPlatform.from_yaml(file)
         self._statuses: dict[str, DiagnosticStatus] = {}
         self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
@@ -344,9 +374,14 @@ class DynamicsNode:
         self.peer.node.create_subscription(
             DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
         arguments = [part for override in overrides for part in ('-p', override)]
-        self.program = Program(
-            [*(command or [executable('stewart_dynamics')]), '--ros-args', '--params-file', file,
-             *arguments], self.domain, folder, **environment)
+        self._begin = partial(
+            Program, [*(command or [executable('stewart_dynamics')]), '--ros-args',
+                      '--params-file', file, *arguments], self.domain, **environment)
+        self._folders = (folder / f'again_{n}' for n in count(1))
+        self._run(folder)
+
+    def _run(self, folder: Path) -> None:
+        self.program = self._begin(folder=folder)
         self._stack.callback(self.program.kill)
         self.peer.watched = self.program
 
@@ -410,13 +445,15 @@ class DynamicsNode:
 
     # -- setpoints -------------------------------------------------------------------------
 
-    def stamp(self, step: int = 10_000_000) -> int:
+    def stamp(self, step: int = STEP) -> int:
         """Return the next setpoint's stamp [ns], 10 ms after the one before."""
         self._stamp += step
         return self._stamp
 
     def publish(self, topic: str, message: Any) -> None:
         """Publish a message, or bytes in the place of one."""
+        if topic in FIRST:
+            self.asked[_stamp_of(message)] += 1
         self.writers[topic].publish(message)
 
     def send(self, sample: Sample = HOME, stamp: int | None = None,
@@ -472,16 +509,33 @@ class DynamicsNode:
         """Expect that the diagnostics count so many more refusals."""
         self.expected[f'refused, {topic}: {reason}'] += number
 
+    def counted(self) -> Counter[str]:
+        """Return how many refusals of each kind the last diagnostics count."""
+        return Counter({key: int(number) for key, number in self.values('setpoints').items()
+                        if key.startswith('refused, ')})
+
     def until_counted(self) -> None:
         """Wait until the diagnostics count the refusals that are expected, and no others."""
-        def counted() -> Counter[str]:
-            return Counter({key: int(number) for key, number in self.values('setpoints').items()
-                            if key.startswith('refused, ')})
-
         try:
-            self.until(lambda: counted() == self.expected, 'refusals are counted')
+            self.until(lambda: self.counted() == self.expected, 'refusals are counted')
         except AssertionError as exc:
-            raise AssertionError(f'counted {counted()}, expected {self.expected}: {exc}') from exc
+            raise AssertionError(
+                f'counted {self.counted()}, expected {self.expected}: {exc}') from exc
+
+    def at_work(self) -> None:
+        """
+        Check that the node does its work, and has done nothing else so far.
+
+        A setpoint is answered with the library's bits, refusals are counted as expected, and of
+        all that has come out nothing is without a setpoint that asked for it.
+        """
+        self.answer()
+        self.until_counted()
+        states = self.received('leg_states')
+        self.until(lambda: len(self.raw['leg_forces']) >= sum(
+            len(state.effort) > 0 for state in states), 'all forces have come')
+        assert len(self.raw['leg_forces']) == sum(len(state.effort) > 0 for state in states)
+        self.check_answers()
 
     # -- services --------------------------------------------------------------------------
 
@@ -512,7 +566,38 @@ class DynamicsNode:
         assert code == 0, self.program.stderr
         assert_only_log_lines(self.program.stderr)
         assert self.program.stdout == ''
+        self.check_answers()
+
+    def start_again(self) -> None:
+        """Kill the node, as nothing in it can notice, and start it anew with what it had."""
+        self.program.kill()
+        # What was on its way comes before anything of the new one.
+        came = -1
+        while came != (came := sum(map(len, self.raw.values()))):
+            self.peer.spin(0.2)
+        assert_only_log_lines(self.program.stderr)
+        self.check_answers()
+        for messages in (*self.raw.values(), *self._decoded.values()):
+            messages.clear()
+        self.expected.clear()
+        self._run(next(self._folders))
+
+    def check_answers(self) -> None:
+        """
+        Check that every answer was asked for, no more often than that, and is of numbers.
+
+        A setpoint whose stamp is zero is answered with the time.
+        """
         self.check_finite()
+        states = self.received('leg_states')
+        answered = Counter(nanoseconds(state.header.stamp) for state in states)
+        repeated = answered - self.asked
+        assert repeated.total() <= self.asked[0], repeated
+        # Forces carry no stamp: each is that of an answer, in their order.
+        efforts = [bits(state.effort) for state in states if len(state.effort)]
+        forces = [bits(each.data) for each in self.received('leg_forces')]
+        for n, (effort, force) in enumerate(zip(efforts, forces, strict=False)):
+            assert effort == force, f'force {n} of {len(forces)}'
 
     def check_finite(self) -> None:
         """Check that no output had a number that is not finite."""
@@ -531,6 +616,65 @@ class DynamicsNode:
             self._stack.close()
 
 
+class Feeder(Program):
+    """
+    A publisher of setpoints in a process of its own: the machine at rest, over and over.
+
+    Parameters
+    ----------
+    node : DynamicsNode
+        Whom it feeds, on the topics that it listens to.
+    folder : Path
+        Gets what it writes.
+    rate : int
+        Setpoints in a second.
+    many : int
+        How many it sends; it ends when the node has them all.
+    environment
+        What its environment has beside.
+
+    """
+
+    def __init__(self, node: DynamicsNode, folder: Path, rate: int, many: int,
+                 **environment: str) -> None:
+        self._node = node
+        self._before, self._known = self._writers(), self._endpoints()
+        first = node.stamp()
+        self.stamps = range(first, first + many * STEP, STEP)
+        node.stamp(many * STEP)
+        messages = {**HOME.messages(0), 'setpoint/combined': HOME.combined(0)}
+        parts = [part for topic in node.topics for part in (topic, raw(messages[topic]).hex())]
+        super().__init__([sys.executable, FEEDER, *map(str, (rate, first, STEP, many)), *parts],
+                         node.domain, folder, **environment)
+
+    def begin(self, heard: bool = True) -> None:
+        """Let it begin, and expect answers; its first setpoints may be lost if it is not heard."""
+        if heard:
+            self._node.until(lambda: self._writers() > self._before, 'the node hears the feeder')
+        else:
+            self._node.until(lambda: self._endpoints() - self._known, 'the feeder is there')
+        self._node.asked.update(self.stamps)
+        self.process.send_signal(signal.SIGUSR1)
+
+    def end(self) -> None:
+        """Tell it to end, if it has not yet, and wait until the node knows that it is gone."""
+        if not self.ended:
+            self.process.terminate()
+        assert self.wait() == 0, self.stderr
+        assert_only_log_lines(self.stderr)
+        self._node.until(lambda: self._writers() <= self._before, 'the feeder is gone')
+
+    def _endpoints(self) -> set[bytes]:
+        """Return what identifies the writers, those of killed processes as well."""
+        topic = f'{NODE}/{self._node.topics[-1]}'  # the last that it makes
+        return {bytes(info.endpoint_gid) for info in
+                self._node.peer.node.get_publishers_info_by_topic(topic)}
+
+    def _writers(self) -> int:
+        values = self._node.values('setpoints')
+        return min(int(values[f'{topic}: writers']) for topic in self._node.topics)
+
+
 def bits(numbers: Any) -> bytes:
     """Return the bits of float64 numbers."""
     return np.ascontiguousarray(numbers, dtype=np.float64).tobytes()
@@ -539,3 +683,13 @@ def bits(numbers: Any) -> bytes:
 def raw(message: Any) -> bytes:
     """Return a message's bytes as they are sent."""
     return bytes(serialize_message(message))
+
+
+def _stamp_of(message: Any) -> int:
+    """Return the stamp of a message, or of the bytes of one; any other number for no message."""
+    data = message if isinstance(message, bytes) else raw(message)
+    try:
+        sec, nanosec = struct.unpack_from('<iI' if data[1] else '>iI', data, 4)
+    except (IndexError, struct.error):
+        return -1
+    return int(sec) * 1_000_000_000 + int(nanosec)

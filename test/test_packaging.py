@@ -34,7 +34,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
 EXECUTABLES = ('stewart_dynamics', 'stewart_replay', 'stewart_trajectory')
-PACKAGED = ('bags', 'config', 'launch', 'resource', NAME, 'LICENSE', 'package.xml',
+PACKAGED = ('bags', 'config', 'launch', 'resource', 'security', NAME, 'LICENSE', 'package.xml',
             'pyproject.toml', 'setup.cfg', 'setup.py')
 SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'launch', 'test', NAME)
 
@@ -171,7 +171,7 @@ def check_share(share: Path) -> None:
     """Check that the files are there which ROS and the launch files look up."""
     assert (share / 'ament_index/resource_index/packages' / NAME).is_file()
     assert (share / NAME / 'package.xml').is_file()
-    for pattern in ('bags/*.mcap', 'config/*.yaml', 'launch/*.launch.py'):
+    for pattern in ('bags/*.mcap', 'config/*.yaml', 'launch/*.launch.py', 'security/*'):
         expected = {path.name for path in ROOT.glob(pattern)}
         folder, _, files = pattern.partition('/')
         assert {path.name for path in (share / NAME / folder).glob(files)} == expected

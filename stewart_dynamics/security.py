@@ -1,0 +1,120 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Refuses to start where ROS and Fast DDS would start less secure than the environment asks for.
+
+Where a keystore, a profile or a setting is missing or misspelt, both go on without a word, open
+to everybody. What each setting is for is in security/README.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import re
+import warnings
+from xml.etree import ElementTree
+
+from stewart_dynamics.errors import StewartError
+
+_PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # as Fast DDS knows them
+_KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
+_ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTILINE)
+
+
+def check_environment(arguments: Sequence[str]) -> None:
+    """Raise StewartError, naming the variable, where security that is asked for would not be."""
+    _check_dds_security(arguments)
+    if os.environ.get(_PROFILE):
+        _check_profile(Path(os.environ[_PROFILE]))
+
+
+@contextmanager
+def without_security_libraries() -> Iterator[None]:
+    """Say what it means when the node cannot be made because Fast DDS has no DDS Security."""
+    with warnings.catch_warnings():
+        # rclpy's own, two lines about what it could not clean up then
+        warnings.filterwarnings('ignore', 'Failed to fini', RuntimeWarning)
+        try:
+            yield
+        except Exception as exc:
+            if "doesn't have the security libraries" not in str(exc):
+                raise
+            raise StewartError(
+                'ROS_SECURITY_ENABLE: true: but this Fast DDS is built without DDS Security, as '
+                'that of the wheels from PyPI is; that of a ROS 2 installation has it') from exc
+
+
+def _check_dds_security(arguments: Sequence[str]) -> None:
+    enable = os.environ.get('ROS_SECURITY_ENABLE', '')
+    if enable in ('', 'false'):
+        return
+    if enable != 'true':
+        raise StewartError(f"ROS_SECURITY_ENABLE: '{enable}': must be true or false: ROS takes "
+                           'all but true for false')
+    strategy = os.environ.get('ROS_SECURITY_STRATEGY', '')
+    if strategy != 'Enforce':
+        raise StewartError(f"ROS_SECURITY_STRATEGY: '{strategy}': must be Enforce where "
+                           'ROS_SECURITY_ENABLE is true: else ROS starts without security where '
+                           'it finds no keys')
+    keystore = os.environ.get('ROS_SECURITY_KEYSTORE', '')
+    named = [value for option, value in zip(arguments, arguments[1:], strict=False)
+             if option in ('-e', '--enclave')]
+    enclave = os.environ.get('ROS_SECURITY_ENCLAVE_OVERRIDE') or (named or ['/'])[-1]
+    if not keystore or not (Path(keystore) / 'enclaves' / enclave.lstrip('/')).is_dir():
+        raise StewartError(f"ROS_SECURITY_KEYSTORE: '{keystore}': holds no enclave '{enclave}'; "
+                           'another one is named with --ros-args --enclave NAME')
+
+
+def _check_profile(path: Path) -> None:
+    try:
+        text = path.read_text(encoding='utf-8')
+        root = ElementTree.fromstring(text)
+    except (OSError, UnicodeDecodeError, ElementTree.ParseError) as exc:
+        reason = exc.strerror if isinstance(exc, OSError) else f'not XML: {exc}'
+        raise StewartError(f'{_PROFILE}: {path}: cannot be read: {reason}') from exc
+    unset = [name for name in _VARIABLE.findall(text) if name not in os.environ]
+    if unset:
+        raise StewartError(f'{_PROFILE}: {path}: needs the variable {unset[0]}, which is not set')
+    elements = [(element.tag.rpartition('}')[2], _VARIABLE.sub(
+        lambda found: os.environ[found[1]], element.text or '').strip())
+        for element in root.iter()]
+    on_localhost = (os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
+                    or os.environ.get('ROS_LOCALHOST_ONLY') == '1')
+    if on_localhost and ('useBuiltinTransports', 'false') in elements:
+        raise StewartError(f'{_PROFILE}: {path}: does not hold where '
+                           'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, which adds shared memory '
+                           'and UDP on all addresses: set it to SYSTEM_DEFAULT, and '
+                           'ROS_LOCALHOST_ONLY not at all')
+    for kind, name in elements:
+        if kind in _KEY_FILES:
+            _read(Path(name), f'{_PROFILE}: {path}: {kind}')
+    kinds = {kind for kind, _ in elements}
+    if {'tls', 'listening_ports'} <= kinds:
+        name = os.environ.get('OPENSSL_CONF', '')
+        if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):
+            raise StewartError(f"OPENSSL_CONF: '{name}': has no VerifyMode = Require: everybody "
+                               'could dial the port of the profile')
+
+
+def _read(path: Path, what: str) -> str:
+    try:
+        return path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as exc:
+        reason = exc.strerror if isinstance(exc, OSError) else 'not UTF-8 text'
+        raise StewartError(f'{what}: {path}: cannot be read: {reason}') from exc

@@ -1,0 +1,652 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Who takes part, and who does not: the policy, the profiles and the keys of security/.
+
+Intruders are real processes that run the program that source and receiver run. That one gets
+nothing in and reads nothing is tested while setpoints flow, and the same intruder succeeds where
+what stops it is taken away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+import json
+import os
+from pathlib import Path
+import re
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from referees import ROOT  # noqa: E402
+from running import (  # noqa: E402
+    assert_only_log_lines, DEADLINE, DynamicsNode, executable, INPUTS, log_lines, NODE, OUTPUTS,
+    Peer, PLATFORM, Program)
+
+from stewart_dynamics.errors import StewartError  # noqa: E402
+from stewart_dynamics.security import check_environment  # noqa: E402
+
+SECURITY = ROOT / 'security'
+ONE_HOST = SECURITY / 'one_host.xml'
+PARTICIPANT = Path(__file__).with_name('participant.py')
+
+Start = Callable[..., DynamicsNode]
+
+
+# The policy
+
+# sros2's policy.xsd of version 0.2.0: each element's attributes and what may stand inside.
+SCHEMA: dict[str, tuple[set[str], set[str]]] = {
+    'policy': ({'version'}, {'enclaves'}),
+    'enclaves': (set(), {'enclave'}),
+    'enclave': ({'path'}, {'profiles'}),
+    'profiles': (set(), {'profile'}),
+    'profile': ({'ns', 'node'}, {'topics', 'services', 'actions'}),
+    'topics': ({'publish', 'subscribe'}, {'topic'}),
+    'services': ({'reply', 'request'}, {'service'}),
+    'actions': ({'call', 'execute'}, {'action'}),
+    'topic': (set(), set()), 'service': (set(), set()), 'action': (set(), set())}
+
+
+def policy() -> ElementTree.Element:
+    """Return the root of the policy."""
+    return ElementTree.parse(SECURITY / 'policy.xml').getroot()
+
+
+def granted(enclave: str) -> dict[str, set[str]]:
+    """Return what an enclave of the policy may do, with whole names as sros2 makes them."""
+    profile, = policy().findall(f"enclaves/enclave[@path='{enclave}']/profiles/profile")
+    namespace = profile.get('ns', '').rstrip('/') + '/'
+    node = profile.get('node', '')
+    names: dict[str, set[str]] = {}
+    for rule in profile:
+        for right in rule.keys():
+            for element in rule:
+                name = element.text or ''
+                if name.startswith('~'):
+                    name = f'{namespace}{node}{name[1:]}'
+                elif not name.startswith('/'):
+                    name = f'{namespace}{name}'
+                assert name not in names.setdefault(right, set()), f'{name}: granted twice'
+                names[right].add(name)
+    return names
+
+
+def done_by(peer: Peer, name: str) -> dict[str, set[str]]:
+    """Return what a running node does, as the ROS graph has it, in the words of a policy."""
+    node = peer.node
+    asked = {'publish': node.get_publisher_names_and_types_by_node,
+             'subscribe': node.get_subscriber_names_and_types_by_node,
+             'reply': node.get_service_names_and_types_by_node,
+             'request': node.get_client_names_and_types_by_node}
+    found = {right: {topic for topic, _ in ask(name, '/')} for right, ask in asked.items()}
+    return {right: names for right, names in found.items() if names}
+
+
+def test_the_policy_is_one_of_sros2() -> None:
+    """No element or attribute that its schema does not have, and nothing but ALLOW."""
+    assert policy().tag == 'policy'
+    assert policy().attrib == {'version': '0.2.0'}
+    for element in policy().iter():
+        attributes, children = SCHEMA[element.tag]
+        assert set(element.keys()) <= attributes, element.tag
+        assert {child.tag for child in element} <= children, element.tag
+        assert bool(len(element)) == bool(children), f'{element.tag} is empty'
+        if element.tag in ('topics', 'services', 'actions'):
+            assert list(element.attrib.values()) == ['ALLOW']
+        if not children:
+            # No wildcard, and no blank that would become a part of the name.
+            assert re.fullmatch(r'[~/]?[a-z_/]+', element.text or ''), element.text
+
+
+def test_the_policy_is_what_the_node_does(start: Start) -> None:
+    """Each name that the node has with any source of setpoints is in it, and no other."""
+    nodes = [start('setpoint.source:=separate'), start('setpoint.source:=combined'),
+             start('setpoint.source:=pose', 'use_sim_time:=true')]
+    union: dict[str, set[str]] = {}
+    for node in nodes:
+        node.until_active()
+        of_inputs = {f'{NODE}/{topic}' for topic in (*node.topics, 'wrench')}
+        node.until(lambda node=node, of_inputs=of_inputs: of_inputs <= done_by(
+            node.peer, 'stewart_dynamics').get('subscribe', set()), 'its topics are known')
+        for right, names in done_by(node.peer, 'stewart_dynamics').items():
+            union.setdefault(right, set()).update(names)
+    assert union == granted('/stewart_dynamics')
+    assert {f'{NODE}/{topic}' for topic in OUTPUTS} < union['publish']
+    assert {f'{NODE}/{topic}' for topic in INPUTS} < union['subscribe']
+
+
+def test_the_policy_is_what_the_source_does(domain: int, tmp_path: Path) -> None:
+    """The same for stewart_trajectory, with both of its outputs and simulated time."""
+    peer = Peer(domain)
+    union: dict[str, set[str]] = {}
+    name = 'stewart_trajectory'
+    for number, arguments in enumerate([('output:=separate',),
+                                        ('output:=combined', 'use_sim_time:=true')]):
+        program = Program(
+            [executable(name), '--ros-args', '--params-file',
+             ROOT / 'config' / 'trajectory_hold.yaml', '-p', 'start_timeout:=1000.0',
+             *(part for argument in arguments for part in ('-p', argument))],
+            domain, tmp_path / str(number))
+        peer.watched = program
+        try:
+            peer.until(lambda: name in peer.node.get_node_names(), 'the source is there')
+            # What it makes last: its services are there long before.
+            peer.until(lambda number=number: any('/setpoint/' in topic for topic in done_by(
+                peer, name).get('publish', ())) and len(done_by(peer, name)['publish'])
+                == (5, 3)[number], 'its topics are known')
+            for right, names in done_by(peer, name).items():
+                union.setdefault(right, set()).update(names)
+        finally:
+            peer.watched = None
+            program.stop()
+        peer.until(lambda: name not in peer.node.get_node_names(), 'the source has gone')
+    peer.close()
+    assert union == granted('/stewart_trajectory')
+
+
+# What would start with less security than is asked for does not start
+
+def refused(domain: int, folder: Path, name: str, *arguments: str | Path,
+            **environment: str) -> str:
+    """Return the one line, beside ROS's log, that a program ends with."""
+    program = Program([executable(name), '--ros-args', *arguments], domain, folder, **environment)
+    assert program.wait() == 1, program.stderr
+    assert program.stdout == ''
+    line, = [line for line in program.stderr.splitlines()
+             if line not in log_lines(program.stderr, 'INFO')]
+    return line
+
+
+@pytest.mark.parametrize('name, parameters', [
+    ('stewart_dynamics', PLATFORM),
+    ('stewart_trajectory', ROOT / 'config' / 'trajectory_hold.yaml')])
+def test_without_dds_security_nothing_starts(domain: int, tmp_path: Path, name: str,
+                                             parameters: Path) -> None:
+    """A keystore is given, but Fast DDS cannot use it: that is said in one line."""
+    (tmp_path / 'keystore' / 'enclaves' / name).mkdir(parents=True)
+    line = refused(domain, tmp_path / 'program', name, '--params-file', parameters,
+                   '--enclave', f'/{name}', ROS_SECURITY_ENABLE='true',
+                   ROS_SECURITY_STRATEGY='Enforce',
+                   ROS_SECURITY_KEYSTORE=str(tmp_path / 'keystore'))
+    if 'built without DDS Security' not in line:
+        pytest.skip(f'this Fast DDS has DDS Security: {line}')
+    assert line.startswith(f'{name}: ROS_SECURITY_ENABLE: true: but this Fast DDS is built ')
+
+
+KEYSTORE = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce',
+            'ROS_SECURITY_KEYSTORE': '{tmp}/keystore'}
+TLS = {'FASTRTPS_DEFAULT_PROFILES_FILE': '{tmp}/profile.xml', 'STEWART_KEYS': '{tmp}',
+       'OPENSSL_CONF': '{tmp}/openssl.cnf'}
+LISTENS = """\
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <listening_ports><port>7001</port></listening_ports>
+  <tls><private_key_file>${STEWART_KEYS}/key.pem</private_key_file></tls>
+  <useBuiltinTransports> false </useBuiltinTransports>
+</dds>
+"""
+
+
+@pytest.fixture
+def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Return a function that sets variables; what they are about is in tmp_path."""
+    (tmp_path / 'keystore' / 'enclaves' / 'mine').mkdir(parents=True)
+    (tmp_path / 'key.pem').touch()
+    (tmp_path / 'profile.xml').write_text(LISTENS)
+    (tmp_path / 'openssl.cnf').write_text('[tls]\nVerifyMode = Require\n')
+    for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', *KEYSTORE, *TLS,
+                 'ROS_SECURITY_ENCLAVE_OVERRIDE'):
+        monkeypatch.delenv(name, raising=False)
+
+    def change(**variables: str) -> None:
+        for name, value in variables.items():
+            monkeypatch.setenv(name, value.replace('{tmp}', str(tmp_path)))
+
+    return change
+
+
+@pytest.mark.parametrize('variables, arguments', [
+    ({}, []),
+    ({**KEYSTORE, 'ROS_SECURITY_ENABLE': 'false', 'ROS_SECURITY_KEYSTORE': '/none'}, []),
+    (KEYSTORE, []),
+    (KEYSTORE, ['--enclave', '/mine']),
+    (KEYSTORE, ['-e', '/mine']),
+    ({**KEYSTORE, 'ROS_SECURITY_ENCLAVE_OVERRIDE': '/mine'}, ['-e', '/not_this']),
+    (TLS, []),
+    ({**TLS, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}, []),
+    ({'FASTRTPS_DEFAULT_PROFILES_FILE': str(ONE_HOST)}, []),
+    ({'FASTRTPS_DEFAULT_PROFILES_FILE': ''}, []),
+])
+def test_a_sound_environment_is_let_be(environment: Callable[..., None],
+                                       variables: dict[str, str], arguments: list[str]) -> None:
+    """Where all that is named is there, nothing is said; nor where no security is asked for."""
+    environment(**variables)
+    check_environment(arguments)
+
+
+@pytest.mark.parametrize('changes, text', [
+    ({'ROS_SECURITY_ENABLE': '1'}, "ROS_SECURITY_ENABLE: '1': must be true or false"),
+    ({'ROS_SECURITY_STRATEGY': ''}, "ROS_SECURITY_STRATEGY: '': must be Enforce"),
+    ({'ROS_SECURITY_STRATEGY': 'enforce'}, "ROS_SECURITY_STRATEGY: 'enforce': must be Enforce"),
+    ({'ROS_SECURITY_KEYSTORE': ''}, "ROS_SECURITY_KEYSTORE: '': holds no enclave '/mine'"),
+    ({'ROS_SECURITY_KEYSTORE': '{tmp}'}, "ROS_SECURITY_KEYSTORE: '{tmp}': holds no enclave"),
+    ({'ROS_SECURITY_ENCLAVE_OVERRIDE': '/yours'}, "holds no enclave '/yours'"),
+    ({'FASTRTPS_DEFAULT_PROFILES_FILE': '{tmp}/none.xml'},
+     'FASTRTPS_DEFAULT_PROFILES_FILE: {tmp}/none.xml: cannot be read: No such file'),
+    ({'FASTRTPS_DEFAULT_PROFILES_FILE': '{tmp}/openssl.cnf'}, 'cannot be read: not XML'),
+    ({'STEWART_KEYS': '/none'}, 'private_key_file: /none/key.pem: cannot be read: No such file'),
+    ({'OPENSSL_CONF': ''}, "OPENSSL_CONF: '': has no VerifyMode = Require"),
+    ({'OPENSSL_CONF': '{tmp}/key.pem'}, "OPENSSL_CONF: '{tmp}/key.pem': has no VerifyMode"),
+    ({'OPENSSL_CONF': '{tmp}/none'}, 'OPENSSL_CONF: {tmp}/none: cannot be read: No such file'),
+    ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, 'set it to SYSTEM_DEFAULT'),
+    ({'ROS_LOCALHOST_ONLY': '1'}, 'and ROS_LOCALHOST_ONLY not at all'),
+])
+def test_what_would_be_open_is_refused(environment: Callable[..., None], tmp_path: Path,
+                                       changes: dict[str, str], text: str) -> None:
+    """Each is a mistake with which ROS or Fast DDS goes on without a word, open to others."""
+    environment(**KEYSTORE, **TLS)
+    check_environment(['--enclave', '/mine'])
+    environment(**changes)
+    with pytest.raises(StewartError, match=re.escape(text.replace('{tmp}', str(tmp_path)))):
+        check_environment(['--enclave', '/mine'])
+
+
+def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast DDS would take nothing in its place."""
+    environment(**TLS)
+    monkeypatch.delenv('STEWART_KEYS')
+    with pytest.raises(StewartError, match='needs the variable STEWART_KEYS, which is not set'):
+        check_environment([])
+
+
+# Processes that take part, or try to
+
+class Partner(Program):
+    """participant.py in a process of its own, and what it says last."""
+
+    def said(self) -> dict[str, Any]:
+        """Return what it says last, all keys empty before it says anything."""
+        # Fast DDS writes its log there as well.
+        lines = [line for line in self.stdout.splitlines()
+                 if line.startswith('{') and line.endswith('}')]
+        return dict(json.loads(lines[-1])) if lines else {
+            'sent': 0, 'heard': {}, 'diagnostics': {}, 'nodes': []}
+
+    def heard(self, topic: str, mark: int = 0) -> int:
+        """Return how many messages of a topic, with this mark, it has heard."""
+        return int(self.said()['heard'].get(f'{topic} {mark}', 0))
+
+
+class Crowd:
+    """Programs of one ROS domain, each in an environment of its own, and the node among them."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self._domain, self._folder = domain, folder
+        self._programs: list[Program] = []
+
+    def begin(self, kind: type[Program], name: str, command: Sequence[str | Path],
+              file: Path | None = None, **environment: str) -> Any:
+        """Start a program; a file is read by the shell first, as an operator does it."""
+        given = [f'{key}={value}' for key, value in environment.items()]
+        if file is not None:
+            command = ['bash', '-c', '. "$0" && exec env "$@"', file, *given, *command]
+            environment = {}
+        program = kind(command, self._domain, self._folder / name, **environment)
+        self._programs.append(program)
+        return program
+
+    def partner(self, name: str, mark: int, **options: Any) -> Partner:
+        """Start participant.py."""
+        partner: Partner = self.begin(
+            Partner, name, [sys.executable, PARTICIPANT, str(mark)], **options)
+        return partner
+
+    def node(self, name: str = 'node', **options: Any) -> Program:
+        """Start the node."""
+        program: Program = self.begin(Program, name, [
+            executable('stewart_dynamics'), '--ros-args', '--params-file', PLATFORM], **options)
+        return program
+
+    def until(self, condition: Callable[[], Any], what: str) -> None:
+        """Wait until a condition holds; fail at the deadline, or when any program ends."""
+        end = time.monotonic() + DEADLINE
+        while not condition():
+            if time.monotonic() > end or any(each.ended for each in self._programs):
+                raise AssertionError(f'{what}: not within {DEADLINE:g} s, or one has ended:\n'
+                                     + '\n'.join(f'{each.process.args}\n{each.stdout[-1000:]}\n'
+                                                 f'{each.stderr}' for each in self._programs))
+            time.sleep(0.05)
+
+    def until_tried(self, intruders: Sequence[Partner]) -> None:
+        """Wait until intruders have sent two seconds' setpoints."""
+        self.until(lambda: all(each.said()['sent'] >= 40 for each in intruders), 'they have tried')
+
+    def end(self, program: Program) -> None:
+        """End a program whose part is played."""
+        self._programs.remove(program)
+        program.kill()
+
+    def close(self) -> None:
+        """End them all, and check how those of the package end."""
+        for program in self._programs:
+            program.process.send_signal(signal.SIGINT)
+        for program in self._programs:
+            code = program.wait()
+            assert isinstance(program, Partner) or code == 0, (code, program.stderr)
+
+
+@pytest.fixture
+def crowd(domain: int, tmp_path: Path) -> Iterator[Crowd]:
+    """Return a crowd in a domain of its own."""
+    each = Crowd(domain, tmp_path)
+    yield each
+    each.close()
+
+
+def bound(program: Program) -> set[str]:
+    """Return the addresses at which a program's UDP sockets are bound and its TCP ones listen."""
+    of_process = Path('/proc') / str(program.process.pid)
+    inodes = set()
+    for descriptor in (of_process / 'fd').iterdir():
+        try:
+            inodes.add(os.readlink(descriptor))
+        except FileNotFoundError:  # closed by now
+            continue
+    found = set()
+    for table, states in (('udp', None), ('udp6', None), ('tcp', '0A'), ('tcp6', '0A')):
+        for line in (of_process / 'net' / table).read_text().splitlines()[1:]:
+            fields = line.split()
+            if f'socket:[{fields[9]}]' in inodes and states in (None, fields[3]):
+                address = fields[1].rpartition(':')[0]
+                found.add(socket.inet_ntoa(struct.pack('=I', int(address, 16)))
+                          if len(address) == 8 else f'[{address}]')
+    return found
+
+
+def shares_memory(program: Program) -> bool:
+    """Return whether a program has the shared memory of Fast DDS."""
+    maps = (Path('/proc') / str(program.process.pid) / 'maps').read_text()
+    return '/dev/shm/fastrtps' in maps
+
+
+def flows(receiver: Partner, mark: int, more: int = 20) -> Callable[[], bool]:
+    """Return a condition: the receiver has heard so many more answers to setpoints of a mark."""
+    begun = receiver.heard('leg_states', mark)
+    return lambda: receiver.heard('leg_states', mark) >= begun + more
+
+
+def assert_only(receiver: Partner, mark: int) -> None:
+    """Check that the node has answered setpoints of this mark alone, and has seen no others."""
+    said = receiver.said()
+    assert {name for name in said['heard'] if name.startswith('leg_states')} == {
+        f'leg_states {mark}'}
+    assert {key: value for key, value in said['diagnostics'].items() if 'writers' in key} == {
+        f'{topic}: writers': '1' for topic in ('setpoint/pose', 'setpoint/twist',
+                                               'setpoint/accel')}
+
+
+def assert_left_out(intruder: Partner) -> None:
+    """Check that an intruder that has tried has heard nothing and seen nobody."""
+    said = intruder.said()
+    assert said['heard'] == {}
+    assert said['nodes'] == [name for name in said['nodes'] if name.startswith('participant_')]
+    assert len(said['nodes']) == 1
+
+
+# One host
+
+def _another_address() -> str:
+    """Return an address of this machine that others reach, empty where it has none."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(('192.0.2.1', 9))  # sends nothing
+        except OSError:
+            return ''
+        address = str(probe.getsockname()[0])
+        return '' if address.startswith('127.') else address
+
+
+def test_one_host(crowd: Crowd, tmp_path: Path) -> None:
+    """
+    The node is bound to 127.0.0.1 alone, and who does not use that address gets nothing.
+
+    Any process of the host may use it, and then gets all: the page says so.
+    """
+    system = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
+    profile = {**system, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(ONE_HOST)}
+    node = crowd.node(**profile)
+    receiver = crowd.partner('receiver', 0, **profile)
+    crowd.partner('source', 1, **profile)
+    intruders = [crowd.partner('shm', 2, FASTDDS_BUILTIN_TRANSPORTS='SHM', **system)]
+    if address := _another_address():
+        elsewhere = tmp_path / 'elsewhere.xml'
+        elsewhere.write_text(ONE_HOST.read_text().replace('127.0.0.1', address))
+        intruders.append(crowd.partner(
+            'udp', 3, FASTRTPS_DEFAULT_PROFILES_FILE=str(elsewhere), **system))
+    crowd.until(flows(receiver, 1), 'forces flow')
+    crowd.until_tried(intruders)
+    crowd.until(flows(receiver, 1), 'forces flow on')
+    for intruder in intruders:
+        assert_left_out(intruder)
+    assert_only(receiver, 1)
+    assert bound(node) == {'127.0.0.1'}
+    assert not shares_memory(node)
+    assert_only_log_lines(node.stderr)
+    neighbour = crowd.partner('neighbour', 4, **system)
+    crowd.until(lambda: receiver.heard('leg_states', 4) and neighbour.heard('leg_states', 1),
+                'a process of the host that uses the address gets in and reads')
+    assert bound(neighbour) > {'0.0.0.0'}
+    assert shares_memory(neighbour)
+
+
+# TLS
+
+# What a profile lacks that has no certificate, and so verifies none.
+NO_CERTIFICATE = 'private_key_file|cert_chain_file|verify_mode|verify_file'
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that makes keys for the node and named processes, and says where."""
+    if not shutil.which('openssl'):
+        pytest.skip('there is no openssl: keys cannot be made')
+    return partial(make_keys, tmp_path)
+
+
+def make_keys(folder: Path, *names: str) -> Path:
+    """Make keys, each of the processes on a port that is free."""
+    sockets = [socket.create_server(('127.0.0.1', 0)) for _ in names]
+    ports = [each.getsockname()[1] for each in sockets]
+    for each in sockets:
+        each.close()
+    made = folder / f'keys_{names[0]}'
+    subprocess.run([SECURITY / 'make_keys.sh', made, *(
+        f'{name}=127.0.0.1:{port}' for name, port in zip(names, ports, strict=True))],
+        check=True, capture_output=True)
+    return made
+
+
+def self_signed(keys: Path) -> Path:
+    """Make keys as an intruder can: a certificate by itself, with the names of the real one."""
+    folder = keys / 'intruder'
+    folder.mkdir()
+    subprocess.run(
+        ['openssl', 'req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:P-256',
+         '-nodes', '-keyout', folder / 'key.pem', '-out', folder / 'cert.pem', '-days', '1',
+         '-subj', '/CN=source'], check=True, capture_output=True)
+    shutil.copy(keys / 'ca' / 'cert.pem', folder / 'ca.pem')
+    return folder
+
+
+def without(profile: Path, elements: str) -> str:
+    """Return the path of a profile that lacks elements."""
+    text, number = re.subn(rf'<({elements})>.*?</\1>', '', profile.read_text(), flags=re.DOTALL)
+    assert number
+    lacking = profile.with_name(f'without_{elements.partition("|")[0]}.xml')
+    lacking.write_text(text)
+    return str(lacking)
+
+
+def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
+    """
+    Forces flow where keys are right, and all others are turned away.
+
+    First intruders dial source and receiver, as the node does; then they listen where the node
+    dials.
+    """
+    folder = keys('source', 'receiver', 'spare', 'bare')
+    own = {'STEWART_KEYS': str(self_signed(folder))}
+    of = {name: folder / name / 'environment.sh' for name in
+          ('node', 'source', 'receiver', 'spare', 'bare')}
+    dials = folder / 'node' / 'profile.xml'
+    node = crowd.node(file=of['node'])
+    receiver = crowd.partner('receiver', 0, file=of['receiver'])
+    source = crowd.partner('source', 1, file=of['source'])
+    crowd.until(flows(receiver, 1), 'forces flow')
+    turned_away = [
+        crowd.partner('self_signed', 2, file=of['node'], **own),
+        crowd.partner('no_certificate', 3, file=of['node'], FASTRTPS_DEFAULT_PROFILES_FILE=without(
+            dials, NO_CERTIFICATE)),
+        crowd.partner('certificate_of_a_listener', 4, file=of['node'],
+                      STEWART_KEYS=str(folder / 'source'))]
+    crowd.until(lambda: all('Handshake failed' in each.stdout for each in turned_away),
+                'they are turned away')
+    # Not before: who dials and does not speak TLS keeps the next ones waiting.
+    unheard = [
+        crowd.partner('plain_tcp', 5, file=of['node'],
+                      FASTRTPS_DEFAULT_PROFILES_FILE=without(dials, 'tls')),
+        crowd.partner('udp_and_shm', 6)]
+    crowd.until_tried(turned_away + unheard)
+    crowd.until(flows(receiver, 1), 'forces flow on')
+    for intruder in turned_away + unheard:
+        assert_left_out(intruder)
+        crowd.end(intruder)
+    assert_only(receiver, 1)
+    # The source has no business but with the node.
+    assert not [name for name in source.said()['heard'] if name.startswith('setpoint')]
+    assert source.said()['nodes'] == ['participant_1', 'stewart_dynamics']
+    assert bound(node) == set()
+    assert bound(source) == bound(receiver) == {'127.0.0.1'}
+    assert not shares_memory(node)
+
+    assert node.stdout == ''
+    plain = crowd.partner('plain_tcp_listens', 7, file=of['bare'], FASTRTPS_DEFAULT_PROFILES_FILE=(
+        without(folder / 'bare' / 'profile.xml', 'tls')))
+    crowd.until_tried([plain])
+    crowd.until(flows(receiver, 1), 'forces flow on')
+    impostor = crowd.partner('self_signed_listens', 8, file=of['spare'], **own)
+    crowd.until(lambda: 'certificate verify failed' in node.stdout, 'the node refuses it')
+    crowd.until_tried([impostor])
+    for intruder in (plain, impostor):
+        assert_left_out(intruder)
+        crowd.end(intruder)
+    # Fast DDS waits for 5 s after a certificate that it refuses, and nothing flows meanwhile.
+    crowd.until(flows(receiver, 1), 'forces flow again')
+    assert_only(receiver, 1)
+
+
+def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None:
+    """
+    The same intruders succeed where just that is missing which is to keep each of them out.
+
+    Three that do not know of each other: a source without OPENSSL_CONF, whose setpoints anybody
+    reads; a node that does not verify, and works for whoever listens; and one without a profile.
+    """
+    read, fooled = keys('source'), keys('impostor')
+    crowd.partner('source', 1, file=read / 'source' / 'environment.sh', OPENSSL_CONF='/dev/null')
+    impostor = crowd.partner('self_signed_listens', 2,
+                             file=fooled / 'impostor' / 'environment.sh',
+                             STEWART_KEYS=str(self_signed(fooled)))
+    stranger = crowd.partner('udp_and_shm', 3)
+    reader = crowd.partner(
+        'no_certificate', 4, file=read / 'node' / 'environment.sh',
+        FASTRTPS_DEFAULT_PROFILES_FILE=without(
+            read / 'node' / 'profile.xml', NO_CERTIFICATE))
+    crowd.node('open')
+    crowd.node('fooled', file=fooled / 'node' / 'environment.sh',
+               FASTRTPS_DEFAULT_PROFILES_FILE=without(
+                   fooled / 'node' / 'profile.xml', 'verify_mode'))
+    crowd.until(lambda: reader.heard('setpoint/pose', 1), 'who has no certificate reads')
+    crowd.until(flows(impostor, 2), 'who has signed its own is answered')
+    crowd.until(flows(stranger, 3), 'who has neither keys nor profile is answered')
+
+
+def test_a_key_that_cannot_be_read_is_said_in_one_line(
+        domain: int, tmp_path: Path, keys: Callable[..., Path]) -> None:
+    """Fast DDS would go on, and turn everybody away without a word."""
+    folder = keys('source') / 'node'
+    (folder / 'ca.pem').unlink()
+    line = refused(domain, tmp_path / 'node', 'stewart_dynamics', '--params-file', PLATFORM,
+                   FASTRTPS_DEFAULT_PROFILES_FILE=str(folder / 'profile.xml'),
+                   STEWART_KEYS=str(folder), ROS_AUTOMATIC_DISCOVERY_RANGE='SYSTEM_DEFAULT')
+    assert line == (f'stewart_dynamics: FASTRTPS_DEFAULT_PROFILES_FILE: {folder}/profile.xml: '
+                    f'verify_file: {folder}/ca.pem: cannot be read: No such file or directory')
+
+
+def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> None:
+    """Nobody else can read a key, each opens one side only, and what exists is left alone."""
+    folder = keys('source', 'controller')
+    files = [path for path in folder.rglob('*') if path.is_file()]
+    assert {path.stat().st_mode & 0o777 for path in files} == {0o600}
+    assert {path.stat().st_mode & 0o777 for path in (folder, *folder.iterdir())} == {0o700}
+    assert {path.name for path in folder.iterdir()} == {'ca', 'node', 'source', 'controller'}
+    assert len({path.read_bytes() for path in files if path.name == 'key.pem'}) == 4
+    for name, good_for in (('node', 'sslclient'), ('source', 'sslserver'),
+                           ('controller', 'sslserver')):
+        for purpose in ('sslclient', 'sslserver'):
+            checked = subprocess.run(
+                ['openssl', 'verify', '-purpose', purpose, '-CAfile', folder / name / 'ca.pem',
+                 folder / name / 'cert.pem'], check=False, capture_output=True)
+            assert (checked.returncode == 0) == (purpose == good_for), (name, purpose)
+    before = {path: path.read_bytes() for path in files}
+    again = subprocess.run([SECURITY / 'make_keys.sh', folder, 'source=127.0.0.1:7001'],
+                           check=False, capture_output=True, text=True)
+    assert again.returncode == 2
+    assert again.stderr == f'make_keys.sh: {folder}: exists; keys are never overwritten\n'
+    assert {path: path.read_bytes() for path in folder.rglob('*') if path.is_file()} == before
+
+
+@pytest.mark.parametrize('peers, text', [
+    ([], 'usage: make_keys.sh FOLDER NAME=ADDRESS:PORT ...'),
+    (['source'], 'source: must be NAME=ADDRESS:PORT'),
+    (['source=localhost:7001'], 'source=localhost:7001: must be NAME=ADDRESS:PORT'),
+    (['source=127.0.0.256:7001'], 'source=127.0.0.256:7001: must be NAME=ADDRESS:PORT'),
+    (['source=127.0.0.1:65536'], 'source=127.0.0.1:65536: the port must be at most 65535'),
+    (['../ca=127.0.0.1:7001'], '../ca=127.0.0.1:7001: must be NAME=ADDRESS:PORT'),
+    (['node=127.0.0.1:7001'], 'node: given twice, or ca or node, which are made anyway'),
+    (['a=127.0.0.1:7001', 'a=127.0.0.1:7002'], 'a: given twice'),
+])
+def test_what_no_keys_can_be_made_for_is_said(tmp_path: Path, peers: list[str],
+                                              text: str) -> None:
+    """In one line, and nothing is left behind."""
+    done = subprocess.run([SECURITY / 'make_keys.sh', tmp_path / 'keys', *peers], check=False,
+                          capture_output=True, text=True)
+    assert done.returncode == 2
+    line, = done.stderr.splitlines()
+    assert line.startswith(f'make_keys.sh: {text}')
+    assert not list(tmp_path.iterdir())
