@@ -1,0 +1,232 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The processes around the node whose latency is measured.
+
+A source publishes setpoints and notes when it begins to publish the last message of each; a
+listener notes when its leg states have come, by the same clock of the machine; a caller asks
+for parameters and states meanwhile.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+import gc
+import itertools
+from pathlib import Path
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import AccelStamped, PoseStamped, Transform, Twist, TwistStamped
+from lifecycle_msgs.srv import GetState
+import numpy as np
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParametersAtomically
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from stewart_dynamics import cdr
+from stewart_dynamics.rotation import to_quaternion
+from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
+
+QOS = QoSProfile(depth=2000)
+TOPICS: dict[str, dict[str, Any]] = {
+    'separate': {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped},
+    'combined': {'combined': MultiDOFJointTrajectory}}
+PERIOD = 1_000_000  # [ns]
+FIRST_STAMP = 1_700_000_000_000_000_000
+DISCOVERY_SECONDS = 60.0
+CALLS_PERIOD = 0.1  # [s]
+# All six coordinates move, within the limits of config/platform.yaml, and repeat themselves.
+MOTION = {
+    'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
+    'motion.amplitude': (0.03, 0.03, 0.04, 0.04, 0.04, 0.06),
+    'motion.frequency': (0.25, 0.5, 0.25, 0.5, 0.25, 0.25),
+    'motion.phase': (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)}
+REPEATED = 4000
+
+
+def messages(source: str) -> list[tuple[bytes, ...]]:
+    """Return the messages of each setpoint, in the order of their topics, with no stamp yet."""
+    motion = motion_at(TrajectoryParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
+    numbers = (np.column_stack([motion.position, to_quaternion(motion.rotation)]),
+               np.column_stack([motion.linear_velocity, motion.angular_velocity]),
+               np.column_stack([motion.linear_acceleration, motion.angular_acceleration]))
+    if source == 'combined':
+        empty = MultiDOFJointTrajectory(
+            joint_names=['platform'], points=[MultiDOFJointTrajectoryPoint(
+                transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])])
+        written = [_layout(cdr.combined, empty).write(None, *numbers)]
+    else:
+        written = [_layout(cdr.pose, PoseStamped()).write(None, numbers[0]),
+                   _layout(cdr.twist, TwistStamped()).write(None, numbers[1]),
+                   _layout(cdr.twist, AccelStamped()).write(None, numbers[2])]
+    return [tuple(each.tobytes() for each in together) for together in zip(*written, strict=True)]
+
+
+def _layout(reader: Any, message: Any) -> cdr.Layout:
+    layout = cdr.Layout.of(reader, bytes(serialize_message(message)))
+    assert layout is not None
+    return layout
+
+
+def publish(path: Path, turns: Sequence[str]) -> None:
+    """
+    Publish turn after turn of setpoints at 1 kHz, each when a line comes on stdin.
+
+    Parameters
+    ----------
+    path : Path
+        Gets the times [ns], one array for each turn.
+    turns : sequence of str
+        ``NODE SOURCE SETPOINTS`` each: who gets them.
+
+    """
+    node = rclpy.create_node('setpoint_source')
+    of_source = {source: messages(source) for source in TOPICS}
+    publishers: dict[str, list[Any]] = {}
+    plan = []
+    for turn in turns:
+        name, source, number = turn.split()
+        if name not in publishers:
+            publishers[name] = [node.create_publisher(kind, f'/{name}/setpoint/{topic}', QOS)
+                                for topic, kind in TOPICS[source].items()]
+        plan.append((publishers[name], of_source[source], int(number)))
+    wait_for(lambda: all(each.get_subscription_count() for of_node in publishers.values()
+                         for each in of_node), 'every topic has a subscriber')
+    print('ready', flush=True)
+    stamp = FIRST_STAMP
+    times = []
+    gc.disable()
+    for of_node, content, number in plan:
+        sys.stdin.readline()
+        times.append(_publish_turn(of_node, content, stamp, number))
+        stamp += number * PERIOD
+        print('done', flush=True)
+    np.savez(path, *times)
+
+
+def _publish_turn(publishers: Any, content: Any, stamp: int, number: int) -> Any:
+    published = np.zeros(number, dtype=np.int64)
+    *first, last = publishers
+    begin = time.monotonic_ns()
+    for n in range(number):
+        sec, nanosec = divmod(stamp + n * PERIOD, 1_000_000_000)
+        head = b'\x00\x01\x00\x00' + sec.to_bytes(4, 'little') + nanosec.to_bytes(4, 'little')
+        together = [head + body[12:] for body in content[n % REPEATED]]
+        left = begin + n * PERIOD - time.monotonic_ns()
+        if left > 0:
+            time.sleep(left * 1e-9)
+        for publisher, message in zip(first, together, strict=False):
+            publisher.publish(message)
+        published[n] = time.monotonic_ns()
+        last.publish(together[-1])
+    return published
+
+
+def listen(path: Path, names: Sequence[str]) -> None:
+    """Note stamp and time of the leg states of these nodes [ns], until a signal."""
+    node = rclpy.create_node('leg_states_listener')
+    stamps, times = array('Q'), array('q')
+    now = time.monotonic_ns
+
+    def note(data: bytes) -> None:
+        times.append(now())
+        stamps.append(int.from_bytes(data[4:12], 'little'))
+
+    for name in names:
+        node.create_subscription(JointState, f'/{name}/leg_states', note, QOS, raw=True)
+    wait_for(lambda: all(node.count_publishers(f'/{name}/leg_states') for name in names),
+             'every node is there')
+    print('ready', flush=True)
+    gc.disable()
+    spin(node)
+    both = np.array(stamps, dtype=np.uint64)
+    seconds, nanoseconds = both & 0xFFFFFFFF, both >> 32
+    np.savez(path, stamps=(seconds * 1_000_000_000 + nanoseconds).astype(np.int64),
+             times=np.array(times, dtype=np.int64))
+
+
+def call(name: str) -> None:
+    """Call parameter and lifecycle services of a node in turns, and say how many answered."""
+    node = rclpy.create_node('caller')
+    clients = [(node.create_client(kind, f'/{name}/{service}'), request)
+               for kind, service, request in (
+        (SetParametersAtomically, 'set_parameters_atomically', SetParametersAtomically.Request(
+            parameters=[Parameter('platform.mass', value=150.0).to_parameter_msg()])),
+        (DescribeParameters, 'describe_parameters', DescribeParameters.Request(
+            names=['platform.mass'])),
+        (GetParameters, 'get_parameters', GetParameters.Request(names=['geometry.base_joints'])),
+        (GetState, 'get_state', GetState.Request()))]
+    wait_for(lambda: all(client.service_is_ready() for client, _ in clients),
+             'every service is there')
+    turn = itertools.cycle(clients)
+    answered = []
+
+    def ask() -> None:
+        client, request = next(turn)
+        client.call_async(request).add_done_callback(lambda _: answered.append(1))
+
+    node.create_timer(CALLS_PERIOD, ask)
+    print('ready', flush=True)
+    spin(node)
+    print(len(answered), flush=True)
+
+
+def wait_for(condition: Any, what: str) -> None:
+    """Wait for discovery."""
+    end = time.monotonic() + DISCOVERY_SECONDS
+    while not condition():
+        if time.monotonic() > end:
+            raise SystemExit(f'not within {DISCOVERY_SECONDS:g} s: {what}')
+        time.sleep(0.05)
+
+
+def spin(node: Any) -> None:
+    """Spin until a signal."""
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        while rclpy.ok():
+            executor.spin_until_future_complete(Future(), 10.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        executor.shutdown()
+
+
+def main() -> None:
+    """Be one of them."""
+    role, *arguments = sys.argv[1:]
+    rclpy.init(args=[])
+    if role == 'publish':
+        publish(Path(arguments[0]), arguments[1:])
+    elif role == 'listen':
+        listen(Path(arguments[0]), arguments[1:])
+    else:
+        call(*arguments)
+    rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,380 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The node at 1 kHz beside nodes that compute nothing, in turns in one run.
+
+Run by hand, ``make bench-node``, on Linux; README.md beside this file says what is compared
+and how.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, ExitStack
+from importlib.metadata import version
+import os
+from pathlib import Path
+import platform
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from typing import NamedTuple
+
+from inverse_dynamics import Array, HERE, processor_name, write
+from latency import FIRST_STAMP, PERIOD
+import numpy as np
+from replay import table
+
+BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
+PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
+NODE = str(Path(sys.executable).with_name('stewart_dynamics'))
+
+DOMAIN = '101'  # the tests have those below
+ROUNDS = 6
+SECONDS = 5
+MINUTES = 10
+RATE = 1_000_000_000 // PERIOD
+SETTLE = 0.5  # [s] between turns: what is under way arrives
+TICKS = os.sysconf('SC_CLK_TCK')
+EACH = [50.0, 99.0, 99.9, 100.0]
+
+
+class Contestant(NamedTuple):
+    """A node that answers setpoints."""
+
+    title: str
+    name: str
+    source: str
+    command: tuple[str, ...]
+
+
+def ours(name: str, source: str) -> Contestant:
+    """Return the node under a name."""
+    return Contestant('`stewart_dynamics`', name, source, (
+        NODE, '--ros-args', '-r', f'__node:={name}', '--params-file', str(PARAMETERS),
+        '-p', f'setpoint.source:={source}'))
+
+
+def pass_through(how: str, source: str) -> Contestant:
+    """Return a node that computes nothing."""
+    name = f'{how}_{source}'
+    return Contestant(f'pass-through, {how}', name, source, (
+        sys.executable, str(HERE / 'pass_through.py'), name, source, how))
+
+
+CONTESTANTS = {source: (
+    ours(f'node_{source}', source), pass_through('typed', source),
+    pass_through('serialized', source)) for source in ('separate', 'combined')}
+CALLED = ours('called', 'separate')
+KILLED_AFTER = 1.0  # [s]
+SECURITY = HERE.parent / 'security'
+PROFILE = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT', 'SKIP_DEFAULT_XML_FILE': '1'}
+
+
+class Transport(NamedTuple):
+    """How processes talk: the environments that tell Fast DDS."""
+
+    source: Mapping[str, str]
+    node: Mapping[str, str]
+    listener: Mapping[str, str]
+
+
+SHARED_MEMORY = Transport(*[{'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}] * 3)
+ONE_HOST = Transport(*[
+    {**PROFILE, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(SECURITY / 'one_host.xml')}] * 3)
+
+
+def tls(folder: Path) -> Transport:
+    """Return TLS over TCP with keys that are made into a folder."""
+    with socket.socket() as source, socket.socket() as listener:
+        for one in (source, listener):
+            one.bind(('127.0.0.1', 0))
+        ports = source.getsockname()[1], listener.getsockname()[1]
+    keys = folder / 'keys'
+    subprocess.run([str(SECURITY / 'make_keys.sh'), str(keys), f'source=127.0.0.1:{ports[0]}',
+                    f'listener=127.0.0.1:{ports[1]}'], check=True, stdout=subprocess.DEVNULL)
+    environments = [{
+        **PROFILE, 'STEWART_KEYS': str(keys / name),
+        'FASTRTPS_DEFAULT_PROFILES_FILE': str(keys / name / 'profile.xml')}
+        for name in ('source', 'node', 'listener')]
+    for of, name in ((0, 'source'), (2, 'listener')):
+        environments[of]['OPENSSL_CONF'] = str(keys / name / 'openssl.cnf')
+    return Transport(*environments)
+
+
+class Turn(NamedTuple):
+    """What one turn of a contestant gave."""
+
+    latencies: Array
+    """From the last message of a setpoint to its leg states, of those that came [us]."""
+    sent: int
+    cores: float
+    """Processor time of the node by elapsed time."""
+
+    @property
+    def lost(self) -> int:
+        """Setpoints that were not answered."""
+        return self.sent - len(self.latencies)
+
+
+class Process:
+    """One of the processes around a node, or a node."""
+
+    def __init__(self, command: Sequence[str], environment: dict[str, str]) -> None:
+        self.command = command
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+            env={**os.environ, **environment})
+
+    def expect(self, line: str) -> None:
+        """Wait until it says a line."""
+        assert self.process.stdout is not None
+        if (said := self.process.stdout.readline().strip()) != line:
+            raise SystemExit(f'{" ".join(self.command)}: said {said!r} in place of {line!r}')
+
+    def go(self) -> None:
+        """Let it begin its next turn."""
+        assert self.process.stdin is not None
+        self.process.stdin.write('\n')
+        self.process.stdin.flush()
+
+    def stop(self) -> str:
+        """End it by a signal and return what it said last."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        return self.process.communicate(timeout=60)[0]
+
+    @property
+    def processor(self) -> float:
+        """Processor time so far [s]."""
+        stat = Path(f'/proc/{self.process.pid}/stat').read_text().rpartition(')')[2].split()
+        return (int(stat[11]) + int(stat[12])) / TICKS
+
+    @property
+    def memory(self) -> float:
+        """What it has in memory [kB]."""
+        lines = Path(f'/proc/{self.process.pid}/status').read_text().splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith('VmRSS'))
+
+
+def role(*arguments: str) -> list[str]:
+    """Return the command of one of the processes around a node."""
+    return [sys.executable, str(HERE / 'latency.py'), *arguments]
+
+
+class Measurement:
+    """
+    Contestants, a source and a listener, and what comes of each turn.
+
+    Parameters
+    ----------
+    contestants : sequence of Contestant
+        All of them run all the time; those without a turn have nothing to do.
+    turns : sequence of (index of contestant, setpoints)
+        In this order.
+    folder : Path
+        Gets the times.
+    transport : Transport
+        How they talk.
+    called : bool
+        The services of the first contestant are called all the time.
+    killed : bool
+        One more listener is killed by SIGKILL in the middle of the last turn.
+
+    """
+
+    def __init__(self, contestants: Sequence[Contestant], turns: Sequence[tuple[int, int]],
+                 folder: Path, transport: Transport = SHARED_MEMORY,
+                 called: bool = False, killed: bool = False) -> None:
+        self._contestants, self._turns, self._folder = contestants, turns, folder
+        self._transport, self._called, self._killed = transport, called, killed
+        self._cores: list[float] = []
+        self.memory: list[float] = []
+        """Of the first contestant, every ten seconds [kB]."""
+
+    def run(self) -> list[Turn]:
+        """Take the turns."""
+        with self._processes() as (nodes, source, spare):
+            for n, (which, setpoints) in enumerate(self._turns, start=1):
+                node = nodes[which]
+                time.sleep(SETTLE)
+                processor, begin = node.processor, time.monotonic()
+                source.go()
+                if spare and n == len(self._turns):
+                    time.sleep(KILLED_AFTER)
+                    spare.process.kill()
+                while (left := begin + setpoints / RATE - time.monotonic()) > 0.0:
+                    time.sleep(min(left, 10.0))
+                    self.memory.append(nodes[0].memory)
+                source.expect('done')
+                self._cores.append((node.processor - processor) / (time.monotonic() - begin))
+            time.sleep(SETTLE)
+        return self._read()
+
+    @contextmanager
+    def _processes(self) -> Iterator[tuple[list[Process], Process, Process | None]]:
+        common = {'ROS_DOMAIN_ID': DOMAIN, 'ROS_LOG_DIR': str(self._folder / 'log')}
+        with ExitStack() as stack:
+            def start(command: Sequence[str], environment: Mapping[str, str]) -> Process:
+                process = Process(command, {**common, **environment})
+                stack.callback(process.stop)
+                return process
+
+            nodes = [start(each.command, self._transport.node) for each in self._contestants]
+            names = [each.name for each in self._contestants]
+            listener, spare = (start(
+                role('listen', str(self._folder / f'{which}.npz'), *names),
+                self._transport.listener) if wanted else None
+                for which, wanted in (('listened', True), ('spare', self._killed)))
+            called = self._called and start(
+                role('call', self._contestants[0].name), self._transport.listener)
+            for process in (listener, spare, called):
+                if process:
+                    process.expect('ready')
+            plan = [f'{self._contestants[which].name} {self._contestants[which].source} {number}'
+                    for which, number in self._turns]
+            source = start(role('publish', str(self._folder / 'published.npz'), *plan),
+                           self._transport.source)
+            source.expect('ready')
+            yield nodes, source, spare
+            source.process.wait(60)
+
+    def _read(self) -> list[Turn]:
+        heard = np.load(self._folder / 'listened.npz')
+        arrived = dict(zip(heard['stamps'].tolist(), heard['times'].tolist(), strict=True))
+        if len(arrived) != len(heard['stamps']):
+            raise SystemExit('a setpoint was answered twice')
+        published = np.load(self._folder / 'published.npz')
+        turns = []
+        stamp = FIRST_STAMP
+        for (_, number), cores, times in zip(
+                self._turns, self._cores, published.values(), strict=True):
+            latencies = [(arrived[at] - time) * 1e-3 for at, time in zip(
+                range(stamp, stamp + number * PERIOD, PERIOD), times.tolist(), strict=True)
+                if at in arrived]
+            turns.append(Turn(np.array(latencies), number, cores))
+            stamp += number * PERIOD
+        return turns
+
+
+def in_turns(contestants: Sequence[Contestant], rounds: int, seconds: int, folder: Path,
+             transport: Transport = SHARED_MEMORY, called: bool = False,
+             ) -> list[list[Turn]]:
+    """Return the turns of each contestant; they take turns in one order and then the other."""
+    order = list(range(len(contestants)))
+    plan = [which for n in range(rounds) for which in (order if n % 2 == 0 else order[::-1])]
+    setpoints = seconds * RATE
+    # The first turn of each is not measured: discovery settles, caches fill.
+    turns = Measurement(contestants, [(which, RATE) for which in order] + [
+        (which, setpoints) for which in plan], folder, transport, called).run()[len(order):]
+    return [[turn for turn, of in zip(turns, plan, strict=True) if of == which]
+            for which in order]
+
+
+def latency_rows(label: str, contestants: Sequence[Contestant], of_each: list[list[Turn]],
+                 beside: int) -> list[tuple[str, ...]]:
+    """Return rows of the table of latencies; ratios are to one of the contestants."""
+    rows = []
+    for contestant, turns in zip(contestants, of_each, strict=True):
+        latencies = np.concatenate([turn.latencies for turn in turns])
+        ratios = [np.percentile(turn.latencies, (50, 99)) / np.percentile(
+            other.latencies, (50, 99)) for turn, other in zip(turns, of_each[beside], strict=True)]
+        middle = np.median(ratios, axis=0)
+        rows.append((
+            f'{label}, {contestant.title}',
+            *(f'{value:,.0f}' for value in np.percentile(latencies, EACH)),
+            str(sum(turn.lost for turn in turns)),
+            f'{np.mean([turn.cores for turn in turns]):.0%}',
+            f'{middle[0]:.2f}', f'{middle[1]:.2f}'))
+    return rows
+
+
+def long_rows(turn: Turn, memory: list[float], minutes: int) -> list[tuple[str, ...]]:
+    """Return the table of a long run, minute by minute."""
+    rows = [('minute', 'p50', 'p99', 'p99.9', 'max', 'memory (MB)')]
+    of_minute = np.array_split(turn.latencies, minutes)
+    of_memory = np.array_split(np.array(memory), minutes)
+    for n, (latencies, kilobytes) in enumerate(zip(of_minute, of_memory, strict=True), start=1):
+        rows.append((str(n), *(f'{value:,.0f}' for value in np.percentile(latencies, EACH)),
+                     f'{kilobytes[-1] / 1024:.2f}'))
+    return rows
+
+
+def stall_rows(folder: Path) -> list[tuple[str, ...]]:
+    """Return the table of what could make a setpoint wait."""
+    rows = [('what could make a setpoint wait (ms)', 'before', 'now')]
+    measured = subprocess.run(
+        [sys.executable, str(HERE / 'stalls.py'), str(PARAMETERS)], check=True, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={
+            **os.environ, 'ROS_DOMAIN_ID': DOMAIN, **SHARED_MEMORY.node}).stdout
+    rows += [tuple(line.split('\t')) for line in measured.splitlines()]
+    longest = []
+    for transport in (SHARED_MEMORY, ONE_HOST):
+        turns = Measurement([CALLED], [(0, RATE), (0, 5 * RATE)], folder, transport,
+                            killed=True).run()
+        longest.append(f'{turns[-1].latencies.max() * 1e-3:.3f}')
+    rows.append(('a listener is killed: shared memory, then `security/one_host.xml`', *longest))
+    return rows
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
+    parser.add_argument('--seconds', type=int, default=SECONDS, help='of a turn (%(default)s)')
+    parser.add_argument('--minutes', type=int, default=MINUTES,
+                        help='of the long run; 0: none (%(default)s)')
+    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    options = parser.parse_args()
+    if options.rounds < 1 or options.seconds < 1 or options.minutes < 0:
+        parser.error('--rounds and --seconds must be at least 1, --minutes 0')
+
+    cells: list[tuple[str, ...]] = [(
+        'latency (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core', 'p50, times typed',
+        'p99, times typed')]
+    lines = ['']
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for source, contestants in CONTESTANTS.items():
+            turns = in_turns(contestants, options.rounds, options.seconds, folder)
+            cells += latency_rows(source, contestants, turns, beside=1)
+        called = [CALLED, CONTESTANTS['separate'][1]]
+        turns = in_turns(called, options.rounds, options.seconds, folder, called=True)
+        cells += latency_rows('separate, services called', called, turns, beside=1)
+        for label, transport in (('one host', ONE_HOST), ('TLS', tls(folder))):
+            turns = in_turns(called, options.rounds, options.seconds, folder, transport)
+            cells += latency_rows(f'separate, {label}', called, turns, beside=1)
+        lines += [*table(cells), '', *table(stall_rows(folder)), '']
+        if options.minutes:
+            run = Measurement([CALLED], [(0, options.minutes * 60 * RATE)], folder)
+            turn, = run.run()
+            lines += [*table(long_rows(turn, run.memory, options.minutes)), '',
+                      f'{turn.sent:,} setpoints in {options.minutes} minutes, {turn.lost} lost.',
+                      '']
+    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
+    lines += [f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
+              f'{platform.python_version()}, {versions}. {options.rounds} turns of '
+              f'{options.seconds} s each.', '']
+    print('\n'.join(lines))
+    if options.write:
+        write(lines, BEGIN, END)
+
+
+if __name__ == '__main__':
+    main()
