@@ -31,7 +31,6 @@ install_requires = [
     'plotly>=6',  # plotly.js in the report
     'pyyaml>=6',
     'rosbags>=0.11',
-    'ruamel.yaml>=0.18',
     'tqdm>=4.64',
     'zstandard>=0.21',
 ]

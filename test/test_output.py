@@ -38,8 +38,8 @@ import pyarrow.parquet
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
-from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
+import yaml  # type: ignore[import-untyped]
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable
@@ -229,7 +229,7 @@ def test_statistics_checksum_and_metadata_agree(number: int, tmp_path: Path) -> 
     begin, end = (RECORDED, RECORDED + 1000 * (number - 1)) if number else (0, 0)
     assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (
         begin, end)
-    document = YAML(typ='safe').load(bag / 'metadata.yaml')['rosbag2_bagfile_information']
+    document = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     assert document['message_count'] == sum(expected.values())
     assert document['starting_time'] == {'nanoseconds_since_epoch': begin}
     assert document['duration'] == {'nanoseconds': end - begin}
@@ -258,7 +258,7 @@ def test_blocks_that_overlap_in_time_are_found_in_its_order(tmp_path: Path) -> N
         times = [message.log_time for _, channel, message in make_reader(file).iter_messages()
                  if channel.topic.endswith('leg_states')]
     assert times == sorted([*times_of(50, 25).tolist(), *times_of(50).tolist()])
-    document = YAML(typ='safe').load(bag / 'metadata.yaml')['rosbag2_bagfile_information']
+    document = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     assert document['starting_time'] == {'nanoseconds_since_epoch': RECORDED}
     assert document['duration'] == {'nanoseconds': 74_000}
 

@@ -45,15 +45,14 @@ KEYS = {
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
     'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
-    'ruamel': 'python3-ruamel.yaml', 'scipy': 'python3-scipy',
-    'setuptools': 'python3-setuptools', 'tqdm': 'python3-tqdm', 'yaml': 'python3-yaml',
+    'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools', 'tqdm': 'python3-tqdm',
+    'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
 OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'pyarrow': 'parquet',
             'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
-PIP_NAMES = {'ruamel': 'ruamel.yaml', 'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin',
-             'yaml': 'pyyaml'}
+PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'yaml': 'pyyaml'}
 
 HEADER = re.compile(r"""(#!.*
 )?# Copyright 20\d\d The stewart_dynamics developers

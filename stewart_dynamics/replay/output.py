@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 import orjson
 from rosbags.typesys import get_typestore, Stores
-from ruamel.yaml import YAML
+import yaml  # type: ignore[import-untyped]
 
 from stewart_dynamics.cdr import at_any_byte
 from stewart_dynamics.errors import StewartError
@@ -131,9 +131,7 @@ class OutputBag:
                      + b''.join(map(_bytes, self._chunks)) + _bytes(footer)[:-4])
             self._file.write(index + zlib.crc32(index).to_bytes(4, 'little') + MAGIC)
         with (self._folder / 'metadata.yaml').open('w', encoding='utf-8') as file:
-            yaml = YAML(typ='safe')
-            yaml.default_flow_style = False
-            yaml.dump(self._metadata(begin, end), file)
+            yaml.safe_dump(self._metadata(begin, end), file, sort_keys=False)
 
     def abandon(self) -> None:
         """Close what is not to be kept."""
