@@ -67,8 +67,6 @@ _TYPES: dict[str, Any] = {
 # When more setpoints wait the node has fallen behind: only the newest is answered.
 _QUEUE = 1000
 _BACKLOG = 100
-# A setpoint that comes so soon after the last answer may have waited for it, and more with it.
-_BUSY_SECONDS = 2e-4
 
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0
@@ -123,7 +121,8 @@ class DynamicsNode(LifecycleNode):
         self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
         self._restarting = False  # the last one was a restart and could not be answered
-        self._reported = self._idle = now
+        self._reported = now
+        self._busy = False
         self._logged: dict[str, int] = {}
         self._active = True
         return TransitionCallbackReturn.SUCCESS
@@ -263,14 +262,8 @@ class DynamicsNode(LifecycleNode):
         if setpoint is None:
             return
         self._waiting.append((setpoint, now))
-        if len(self._waiting) > 1:
-            return
-        if now - self._idle > _BUSY_SECONDS:
+        if not self._busy:
             self._answer()
-        else:
-            # Runs behind the messages that have come already: it sees what waits.
-            executor: Any = self.executor
-            executor.create_task(self._answer_task)
 
     def _ros_time(self) -> int:
         now: int = self.get_clock().now().nanoseconds
@@ -281,11 +274,20 @@ class DynamicsNode(LifecycleNode):
             self._setpoints.take_wrench(data)
 
     def _answer(self) -> None:
-        """Answer what waits: all of it, or the newest where the node has fallen behind."""
+        """
+        Answer what waits: all of it, or the newest where the node has fallen behind.
+
+        And do so again behind the messages that have come meanwhile: until nothing has waited
+        there, setpoints are gathered and not answered one by one, however late.
+        """
         if not self._active:
             return
+        self._busy = True
         if isinstance(self.executor, SingleThreadedExecutor):
             self._take_what_has_come()
+        if not self._waiting:
+            self._busy = False
+            return
         if len(self._waiting) > _BACKLOG:
             self._pass_over()
         while self._waiting:
@@ -303,10 +305,12 @@ class DynamicsNode(LifecycleNode):
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
             self._last = output
-            self._idle = time.monotonic()
-            if (self._diagnostics.answered(output, came, self._idle)
-                    or self._idle - self._reported >= _REPORT_SECONDS):
+            now = time.monotonic()
+            if (self._diagnostics.answered(output, came, now)
+                    or now - self._reported >= _REPORT_SECONDS):
                 self._report()
+        executor: Any = self.executor
+        executor.create_task(self._answer_task)
 
     def _pass_over(self) -> None:
         """Let nothing wait but the newest setpoint, and count the others."""

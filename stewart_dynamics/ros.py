@@ -36,6 +36,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
+from rclpy.time_source import TimeSource
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
@@ -176,6 +177,18 @@ def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., N
     return guarded
 
 
+class _TimeSource(TimeSource):
+    """What follows /clock for a node; rclpy's own ends the program at a time before zero."""
+
+    def clock_callback(self, msg: Any) -> None:
+        """Follow a message, or say that it cannot be."""
+        try:
+            super().clock_callback(msg)
+        except ValueError as exc:
+            get_logger('stewart_dynamics').error(
+                f'/clock: {msg.clock.sec} s: not followed: {exc}', throttle_duration_sec=5.0)
+
+
 def _executor() -> Executor:
     try:
         from rclpy.experimental.events_executor import EventsExecutor
@@ -236,6 +249,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
         check_environment(sys.argv)
+        rclpy.node.TimeSource = _TimeSource  # type: ignore[misc]
         rclpy.init()
         with without_security_libraries():
             node = make_node()

@@ -33,6 +33,7 @@ from stewart_dynamics.errors import StewartError
 
 _PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # as Fast DDS knows them
+_COMMENT = re.compile('<!--.*?-->', re.DOTALL)
 _KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
 _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTILINE)
 
@@ -40,7 +41,8 @@ _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTIL
 def check_environment(arguments: Sequence[str]) -> None:
     """Raise StewartError, naming the variable, where security that is asked for would not be."""
     _check_dds_security(arguments)
-    if os.environ.get(_PROFILE):
+    rmw = os.environ.get('RMW_IMPLEMENTATION') or 'rmw_fastrtps_cpp'
+    if os.environ.get(_PROFILE) and 'fastrtps' in rmw:
         _check_profile(Path(os.environ[_PROFILE]))
 
 
@@ -68,10 +70,12 @@ def _check_dds_security(arguments: Sequence[str]) -> None:
         raise StewartError(f"ROS_SECURITY_ENABLE: '{enable}': must be true or false: ROS takes "
                            'all but true for false')
     strategy = os.environ.get('ROS_SECURITY_STRATEGY', '')
+    if strategy == 'Permissive':
+        return  # asked for in so many words: without keys it is open
     if strategy != 'Enforce':
         raise StewartError(f"ROS_SECURITY_STRATEGY: '{strategy}': must be Enforce where "
-                           'ROS_SECURITY_ENABLE is true: else ROS starts without security where '
-                           'it finds no keys')
+                           'ROS_SECURITY_ENABLE is true, or Permissive, with which ROS starts '
+                           'without security where it finds no keys')
     keystore = os.environ.get('ROS_SECURITY_KEYSTORE', '')
     named = [value for option, value in zip(arguments, arguments[1:], strict=False)
              if option in ('-e', '--enclave')]
@@ -83,7 +87,8 @@ def _check_dds_security(arguments: Sequence[str]) -> None:
 
 def _check_profile(path: Path) -> None:
     try:
-        text = path.read_text(encoding='utf-8')
+        # Fast DDS takes an empty line before <?xml, and -- in a comment.
+        text = _COMMENT.sub('', path.read_text(encoding='utf-8')).lstrip()
         root = ElementTree.fromstring(text)
     except (OSError, UnicodeDecodeError, ElementTree.ParseError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else f'not XML: {exc}'
@@ -94,9 +99,11 @@ def _check_profile(path: Path) -> None:
     elements = [(element.tag.rpartition('}')[2], _VARIABLE.sub(
         lambda found: os.environ[found[1]], element.text or '').strip())
         for element in root.iter()]
+    kinds = {kind for kind, _ in elements}
     on_localhost = (os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
                     or os.environ.get('ROS_LOCALHOST_ONLY') == '1')
-    if on_localhost and ('useBuiltinTransports', 'false') in elements:
+    if (on_localhost and ('useBuiltinTransports', 'false') in elements
+            and kinds & {'interfaceWhiteList', 'tls'}):
         raise StewartError(f'{_PROFILE}: {path}: does not hold where '
                            'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, which adds shared memory '
                            'and UDP on all addresses: set it to SYSTEM_DEFAULT, and '
@@ -104,7 +111,6 @@ def _check_profile(path: Path) -> None:
     for kind, name in elements:
         if kind in _KEY_FILES:
             _read(Path(name), f'{_PROFILE}: {path}: {kind}')
-    kinds = {kind for kind, _ in elements}
     if {'tls', 'listening_ports'} <= kinds:
         name = os.environ.get('OPENSSL_CONF', '')
         if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):

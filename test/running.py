@@ -358,6 +358,7 @@ class DynamicsNode:
         self.asked: Counter[int] = Counter()  # setpoints that were sent, by their stamp
         self.platform = StewartPlatform.from_yaml(file)
         self._statuses: dict[str, DiagnosticStatus] = {}
+        self._reported: list[DiagnosticStatus] = []
         self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
                         for topic, kind in INPUTS.items()}
         self.raw = {topic: self.peer.listen(
@@ -386,8 +387,9 @@ class DynamicsNode:
         self.peer.watched = self.program
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        self._statuses.update({
-            status.name.rpartition(': ')[2]: status for status in message.status})
+        for status in message.status:
+            self._statuses[status.name.rpartition(': ')[2]] = status
+            self._reported.append(status)
 
     # -- what is awaited -------------------------------------------------------------------
 
@@ -442,6 +444,12 @@ class DynamicsNode:
         self.until(lambda: self.status(name).level == level and text in self.status(name).message,
                    f'diagnostics of {name} have level {level!r} and {text!r}')
         return str(self.status(name).message)
+
+    def until_reported(self, name: str, level: bytes, text: str) -> None:
+        """Wait until the diagnostics of a name have had a level and a text in it, ever."""
+        self.until(lambda: any(
+            status.name.endswith(f': {name}') and status.level == level and text in status.message
+            for status in self._reported), f'diagnostics of {name} had {level!r} and {text!r}')
 
     # -- setpoints -------------------------------------------------------------------------
 

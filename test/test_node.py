@@ -40,7 +40,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
     assert_only_log_lines, bits, DynamicsNode, executable, HOME, LATCHED, log_lines, nanoseconds,
-    NODE, OUTPUTS, Peer, PLATFORM, Program, raw, ROOT, Sample, SEPARATE, wrench_message)
+    NODE, OUTPUTS, Peer, PLATFORM, raw, refused, ROOT, Sample, SEPARATE, wrench_message)
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Parameters, StewartPlatform
@@ -100,14 +100,14 @@ def test_node_and_replay_give_the_same_bits(bag: str, start: Start, tmp_path: Pa
                'all messages have come')
     assert node.raw == messages
     summary = json.loads((tmp_path / bag / 'summary.json').read_text(encoding='utf-8'))
-    refused = {f'refused, {each["topic"]}: {each["reason"]}': str(each['count'])
-               for each in summary['refused']}
-    assert bool(refused) == (bag == 'flawed')
+    counts = {f'refused, {each["topic"]}: {each["reason"]}': str(each['count'])
+              for each in summary['refused']}
+    assert bool(counts) == (bag == 'flawed')
 
     def counted() -> bool:
         values = node.values('setpoints')
         return (values.get('setpoints answered') == str(answers)
-                and {key: n for key, n in values.items() if key in refused} == refused)
+                and {key: n for key, n in values.items() if key in counts} == counts)
 
     node.until(counted, 'the node refuses what the replay refuses')
 
@@ -815,8 +815,8 @@ def test_the_whole_lifecycle(start: Start) -> None:
 
     assert _change(node, Transition.TRANSITION_CONFIGURE)
     assert _state(node) == 'inactive'
-    refused = node.set_parameters(geometry__zero_length=0.9)
-    assert 'only changed while the node is unconfigured' in refused.reason
+    change = node.set_parameters(geometry__zero_length=0.9)
+    assert 'only changed while the node is unconfigured' in change.reason
     assert not _change(node, Transition.TRANSITION_CONFIGURE)
     _send_to_all(node)
     _activate(node)
@@ -845,7 +845,9 @@ def test_the_whole_lifecycle(start: Start) -> None:
     _send_to_all(node)
     assert not _change(node, Transition.TRANSITION_CONFIGURE)
     assert len(node.raw['leg_states']) == 3
-    assert len(log_lines(node.program.stderr, 'ERROR')) == 6
+    said = log_lines(node.program.stderr, 'ERROR')
+    assert said
+    assert all('transition refused: ' in line for line in said)
     node.until_counted()
     node.stop()
 
@@ -940,23 +942,13 @@ BROKEN = {
 }
 
 
-def _refused(domain: int, folder: Path, *arguments: str) -> str:
-    """Return the one line that the node ends with."""
-    program = Program([executable('stewart_dynamics'), '--ros-args', *arguments], domain, folder)
-    assert program.wait() == 1, program.stderr
-    assert program.stdout == ''
-    lines = program.stderr.splitlines()
-    assert len(lines) == 1, program.stderr
-    return lines[0]
-
-
 @pytest.mark.parametrize('case', BROKEN)
 def test_a_broken_rule_is_said_in_one_line(domain: int, tmp_path: Path, case: str) -> None:
     good, bad, text = BROKEN[case]
     assert good in GOOD
     file = tmp_path / 'machine.yaml'
     file.write_text(GOOD.replace(good, bad), encoding='utf-8')
-    line = _refused(domain, tmp_path / 'node', '--params-file', str(file))
+    line = refused(domain, tmp_path / 'node', '--params-file', str(file))
     assert line.startswith(f'stewart_dynamics: {file}: {text}')
 
 
@@ -970,7 +962,7 @@ def test_the_file_that_those_spoil_is_good(start: Start, tmp_path: Path) -> None
 
 def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
     file = tmp_path / 'none.yaml'
-    assert _refused(domain, tmp_path / 'node', '--params-file', str(file)) == (
+    assert refused(domain, tmp_path / 'node', '--params-file', str(file)) == (
         f'stewart_dynamics: {file}: cannot be read: No such file or directory')
 
 
@@ -980,12 +972,12 @@ def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None
 ])
 def test_a_bad_parameter_on_the_command_line_is_said_in_one_line(
         domain: int, tmp_path: Path, override: str, text: str) -> None:
-    line = _refused(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
+    line = refused(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
     assert text in line
 
 
 def test_no_parameters_at_all_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
-    assert _refused(domain, tmp_path / 'node') == (
+    assert refused(domain, tmp_path / 'node') == (
         'stewart_dynamics: command line: geometry.base_joints: missing, it has no default')
 
 
@@ -1054,6 +1046,6 @@ def test_help_is_given_and_a_stray_argument_is_refused(program: str) -> None:
     said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
     assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')
     assert not said.stderr
-    refused = subprocess.run([path, 'foo'], capture_output=True, text=True, check=False)
-    assert refused.returncode == 1
-    assert refused.stderr == f'{program}: foo: unknown argument; see --help\n'
+    ended = subprocess.run([path, 'foo'], capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr == f'{program}: foo: unknown argument; see --help\n'

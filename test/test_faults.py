@@ -1,0 +1,881 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Every fault in docs/faults.md, done to the real node: over topics, by signals, in its files."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+import math
+import os
+from pathlib import Path
+import re
+import sys
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+import numpy as np
+import pytest
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosbags.highlevel import AnyReader
+from rosgraph_msgs.msg import Clock
+from running import (
+    bits, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS, own_domain,
+    Peer, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
+
+import stewart_dynamics
+from stewart_dynamics import StewartPlatform
+
+Start = Callable[..., DynamicsNode]
+
+OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
+
+MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
+                (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
+NOT_JOINED = 'passed over: not all topics had its stamp'
+SPECIAL = (math.nan, math.inf, -math.inf)
+
+
+# In every case the node is at work when the fault has ended, and all that it has published was
+# asked for: these two fixtures check it behind every test, `close` how the node ends.
+
+@pytest.fixture
+def at_work(node: DynamicsNode) -> Iterator[DynamicsNode]:
+    """Return the module's node."""
+    yield node
+    try:
+        node.at_work()
+    except AssertionError:
+        node.expected = node.counted()  # the next test begins anew
+        raise
+
+
+@pytest.fixture
+def begin(start: Start) -> Iterator[Start]:
+    """Return a function that starts a node and waits until it is active."""
+    begun: list[DynamicsNode] = []
+
+    def started(*overrides: str, **options: Any) -> DynamicsNode:
+        begun.append(start(*overrides, **options))
+        begun[-1].until_active()
+        return begun[-1]
+
+    yield started
+    for each in begun:
+        each.at_work()
+
+
+# Numbers that are none
+
+def _spoilt(numbers: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
+    """Yield the numbers with one of them spoilt, each in each way."""
+    for n in range(len(numbers)):
+        for value in SPECIAL:
+            yield (*numbers[:n], value, *numbers[n + 1:])
+
+
+SPOILT = [(topic, MOVING._replace(**{field: numbers}))
+          for topic, field in (('setpoint/pose', 'position'), ('setpoint/pose', 'quaternion'),
+                               ('setpoint/twist', 'twist'), ('setpoint/accel', 'accel'))
+          for numbers in _spoilt(getattr(MOVING, field))]
+
+
+def test_nan_and_infinity_in_each_field_are_refused(at_work: DynamicsNode) -> None:
+    node = at_work
+    for number, (bad_topic, sample) in enumerate(SPOILT):
+        node.send(sample)
+        for topic in SEPARATE:
+            node.refuses(topic, 'not finite' if topic == bad_topic else NOT_JOINED)
+        if number % 8 == 0:
+            node.answer(MOVING)
+    node.answer(MOVING)
+    for load in _spoilt((1.0,) * 6):
+        node.publish('wrench', wrench_message(load))
+        node.refuses('wrench', 'not finite')
+    node.until_counted()
+    assert log_lines(node.program.stderr, 'WARN')
+
+
+def test_nan_and_infinity_in_each_field_of_one_message_are_refused(begin: Start) -> None:
+    node = begin('setpoint.source:=combined')
+    for _, sample in SPOILT:
+        node.send(sample)
+        node.refuses('setpoint/combined', 'not finite')
+
+    def told() -> bool:
+        node.send(MOVING._replace(position=(0.0, 0.0, math.nan)))
+        node.refuses('setpoint/combined', 'not finite')
+        status = node.status('setpoints')
+        return bool(status.level == STALE) and 'setpoint/combined: not finite' in status.message
+
+    node.until(told, 'diagnostics say why there is no setpoint')
+
+
+@pytest.mark.parametrize('quaternion', [
+    (0.0,) * 4, (0.0, 0.0, 0.0, 1.0011), (0.0, 0.0, 0.0, 0.9989), (0.0, 0.0, 0.0, 2.0),
+    (5e-324,) * 4, (1e200,) * 4, (1.7e308,) * 4,
+], ids=str)
+def test_a_quaternion_that_is_no_rotation_is_refused(
+        at_work: DynamicsNode, quaternion: tuple[float, ...]) -> None:
+    node = at_work
+    node.send(MOVING._replace(quaternion=quaternion))
+    node.refuses('setpoint/pose', 'quaternion not of unit length')
+    for topic in SEPARATE[1:]:
+        node.refuses(topic, NOT_JOINED)
+
+
+def test_a_quaternion_of_flipped_sign_is_the_same_rotation(at_work: DynamicsNode) -> None:
+    node = at_work
+    flipped = MOVING._replace(quaternion=tuple(-q for q in MOVING.quaternion))
+    states = [node.answer(sample) for sample in (MOVING, flipped, MOVING, flipped)]
+    for state in states[1:]:
+        for field in ('position', 'velocity', 'effort'):
+            assert bits(getattr(state, field)) == bits(getattr(states[0], field))
+
+
+# Stamps
+
+def test_a_setpoint_sent_twice_is_answered_once(at_work: DynamicsNode) -> None:
+    node = at_work
+    before = len(node.received('leg_states'))
+    stamps = [node.stamp() for _ in range(5)]
+    for stamp in stamps:
+        for topic, message in MOVING.messages(stamp).items():
+            node.publish(topic, message)
+            node.publish(topic, message)
+            node.refuses(topic, 'same stamp twice')
+    node.state_of(stamps[-1])
+    # The last once more when it is answered, those before it are older than the last.
+    for stamp in stamps:
+        node.send(MOVING, stamp)
+    for topic in SEPARATE:
+        node.refuses(topic, 'older than the last used', len(stamps) - 1)
+        node.refuses(topic, 'same stamp twice')
+    node.until_counted()
+    answered = [nanoseconds(state.header.stamp) for state in node.received('leg_states')]
+    assert answered[before:] == stamps
+
+
+def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: DynamicsNode) -> None:
+    node = at_work
+    node.answer(MOVING)
+    node.answer(MOVING, stamp=2**31 * 10**9 - 1)  # the last that a header can hold
+    for _ in range(3):
+        node.answer(MOVING)
+    node.until_said('followed as a restart')
+    # Not so far: what comes is older than the last used, until it is not.
+    node.answer(MOVING, stamp=node.stamp(0) + 5 * STEP)
+    for _ in range(4):
+        node.send()
+        for topic in SEPARATE:
+            node.refuses(topic, 'older than the last used')
+    node.stamp()
+    node.answer(MOVING)
+
+
+@pytest.mark.parametrize('topic', SEPARATE)
+def test_a_stamp_of_the_far_future_on_one_topic_holds_up_nothing(
+        at_work: DynamicsNode, topic: str) -> None:
+    node = at_work
+    far = node.stamp(0) + 4 * 10**17  # 12 years
+    node.publish(topic, MOVING.messages(far)[topic])
+    for _ in range(3):
+        node.answer(MOVING)
+    # It waits for the others until time jumps back.
+    node.stamp(1 - 10**9)  # to stamps that no other test has had
+    node.answer(MOVING)
+    node.refuses(topic, NOT_JOINED)
+    node.asked[far] = 0
+
+
+def test_a_zero_stamp_among_others_is_a_time(at_work: DynamicsNode) -> None:
+    node = at_work
+    node.answer(MOVING)
+    node.answer(MOVING, stamp=0)
+    node.until_said('followed as a restart')
+    node.send(MOVING, 0)
+    for topic in SEPARATE:
+        node.refuses(topic, 'same stamp twice')
+    node.until_counted()
+    node.asked[0] = 1
+
+
+def test_a_bag_that_loops_is_followed(at_work: DynamicsNode) -> None:
+    node = at_work
+    with AnyReader([ROOT / 'bags/clear']) as reader:
+        played = [(connection.topic.removeprefix(f'{NODE}/'), bytes(data))
+                  for connection, _, data in reader.messages()][:90]
+    before = len(node.raw['leg_states'])
+    for n in range(1, 4):
+        for topic, data in played:
+            node.publish(topic, data)
+        # What is on its way on several topics could arrive in another order.
+        node.until(lambda n=n: len(node.raw['leg_states']) == before + n * len(played) // 3,
+                   'the bag is answered')
+    states = node.raw['leg_states'][before:]
+    assert states[:30] == states[30:60] == states[60:]
+    assert len(set(states)) == 30
+    node.until_said('followed as a restart')
+
+
+def test_simulated_time_stands_still_and_jumps(begin: Start) -> None:
+    node = begin('use_sim_time:=true')
+    clock = node.peer.writer('/clock', Clock)
+
+    def answer_at(time: int) -> None:
+        """Send setpoints without a stamp until one is answered with this time."""
+        def is_time() -> bool:
+            answered = len(node.raw['leg_states'])
+            node.send(MOVING, 0)
+            node.until(lambda: len(node.raw['leg_states']) > answered, 'it is answered')
+            state = node.received('leg_states')[-1]
+            node.check(state, node.result_of(MOVING))
+            return nanoseconds(state.header.stamp) == time
+
+        node.until(is_time, f'it is {time} ns')
+
+    # Without a clock it is zero, and goes on being so.
+    answer_at(0)
+    node.until_status('setpoints', STALE, 'silent for ')
+    for now in (100, 1000, 50, 10**6):
+        message = Clock()
+        message.clock.sec = now
+        clock.publish(message)
+        for _ in range(3):  # it stands still
+            answer_at(now * 10**9)
+    # Diagnostics do not need the clock: a topic is silent, and they say so.
+    node.until_status('setpoints', STALE, 'silent for ')
+    node.answer(MOVING)
+    message.clock.sec = 1
+    clock.publish(message)
+    for _ in range(3):
+        node.answer(MOVING)
+
+
+def test_a_time_before_zero_on_clock_is_not_followed(begin: Start) -> None:
+    node = begin('use_sim_time:=true')
+    clock = node.peer.writer('/clock', Clock)
+    message = Clock()
+    message.clock.sec = -5
+
+    def said() -> bool:
+        clock.publish(message)  # best effort: the node may not have heard the first
+        return '/clock: -5 s: not followed' in node.program.stderr
+
+    node.until(said, 'it is said')
+    node.answer(MOVING)
+
+
+# Topics that are late or too many
+
+@pytest.mark.parametrize('late', SEPARATE)
+def test_a_late_topic_is_waited_for(at_work: DynamicsNode, late: str) -> None:
+    node = at_work
+    before = len(node.raw['leg_states'])
+    stamps = [node.stamp() for _ in range(50)]
+    for stamp in stamps:
+        for topic, message in MOVING.messages(stamp).items():
+            if topic != late:
+                node.publish(topic, message)
+    for stamp in stamps:
+        assert len(node.raw['leg_states']) == before
+        node.publish(late, MOVING.messages(stamp)[late])
+        node.check(node.state_of(stamp), node.result_of(MOVING))
+        before += 1
+    # Too late: a later setpoint has been answered.
+    stamp = node.stamp()
+    for topic, message in MOVING.messages(stamp).items():
+        if topic != late:
+            node.publish(topic, message)
+            node.refuses(topic, NOT_JOINED)
+    node.answer()
+    node.publish(late, MOVING.messages(stamp)[late])
+    node.refuses(late, 'older than the last used')
+    node.asked[stamp] = 0
+
+
+def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_given_up(
+        at_work: DynamicsNode) -> None:
+    node = at_work
+    stamps = [node.stamp() for _ in range(1010)]
+    for n, stamp in enumerate(stamps, 1):
+        node.publish('setpoint/pose', HOME.messages(stamp)['setpoint/pose'])
+        if n > 1000:
+            node.refuses('setpoint/pose', NOT_JOINED)
+        if n == 500:  # the middleware's queue is no longer: what it has is taken now
+            node.publish('setpoint/pose', HOME.messages(stamps[0])['setpoint/pose'])
+            node.refuses('setpoint/pose', 'same stamp twice')
+            node.until_counted()
+    node.until_counted()
+    for topic in SEPARATE[1:]:
+        node.publish(topic, HOME.messages(stamps[10])[topic])
+    node.state_of(stamps[10])
+    node.answer()
+    node.refuses('setpoint/pose', NOT_JOINED, 999)
+
+
+def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -> None:
+    node = begin(NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
+    stamps = [node.stamp() for _ in range(10_000 // 3 + 1)]
+    for stamp in stamps:
+        for topic, message in MOVING.messages(stamp).items():
+            node.publish(topic, message)
+    node.check(node.state_of(stamps[-1]), node.result_of(MOVING))
+    node.until_reported('timing', WARN, 'passed over')
+    assert int(node.values('timing')['passed over']) > 100
+    answered = [nanoseconds(state.header.stamp) for state in node.received('leg_states')]
+    assert answered == sorted(answered)
+    node.until_status('timing', OK, 'on time')
+    values = node.values('setpoints')
+    node.expected.update({key: int(number) for key, number in values.items()
+                          if key.startswith('refused, ')})
+    passed = node.expected['refused, setpoint: passed over: the node had fallen behind']
+    incomplete = node.expected[f'refused, setpoint/pose: {NOT_JOINED}']
+    # What the middleware drops of more than a thousand on one topic, nobody can count.
+    assert len(answered) + passed + incomplete <= len(stamps)
+    assert 'the node had fallen behind' in node.program.stderr
+
+
+def test_of_a_series_of_refusals_the_first_and_the_last_are_logged(
+        at_work: DynamicsNode) -> None:
+    node = at_work
+    for _ in range(50):
+        node.publish('wrench', raw(wrench_message((1.0,) * 6))[:20])
+        node.refuses('wrench', 'malformed')
+    node.until_counted()
+
+    def said() -> list[str]:
+        return [line for line in log_lines(node.program.stderr, 'WARN')
+                if 'wrench refused: malformed' in line]
+
+    assert len(said()) == 1
+    node.until(lambda: len(said()) > 1, 'the last is said when no more come')
+    _, last = said()
+    assert last.endswith('(the last of 50)')
+
+
+# Publishers
+
+BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def test_best_effort_publishers_are_heard_where_qos_overrides_ask_for_it(begin: Start) -> None:
+    node = begin(*(f'qos_overrides.{NODE}/{topic}.subscription.reliability:=best_effort'
+                   for topic in SEPARATE))
+    # Reliable ones are heard as well.
+    node.answer(MOVING)
+    best_effort = {topic: node.peer.writer(f'{NODE}/{topic}', type(message), BEST_EFFORT)
+                   for topic, message in MOVING.messages(0).items()}
+    node.until(lambda: all(node.values('setpoints')[f'{topic}: writers'] == '2'
+                           for topic in SEPARATE), 'the node hears them')
+    reliable, node.writers = node.writers, {**node.writers, **best_effort}
+    node.answer(MOVING)
+    node.writers = reliable
+    for writer in best_effort.values():
+        node.peer.node.destroy_publisher(writer)
+    assert not log_lines(node.program.stderr, 'ERROR')
+
+
+def test_an_incompatible_quality_of_service_is_named(at_work: DynamicsNode) -> None:
+    node = at_work
+    before = len(log_lines(node.program.stderr, 'ERROR'))
+    deaf = node.peer.writer(f'{NODE}/setpoint/twist', type(MOVING.messages(0)['setpoint/twist']),
+                            BEST_EFFORT)
+    node.until(lambda: len(log_lines(node.program.stderr, 'ERROR')) > before, 'it is told')
+    said = log_lines(node.program.stderr, 'ERROR')[before]
+    assert 'setpoint/twist: a publisher offers an incompatible quality of service' in said
+    assert 'RELIABILITY' in said
+    assert 'it is not heard' in said
+    node.answer(MOVING)
+    node.peer.node.destroy_publisher(deaf)
+
+
+def test_two_publishers_on_one_topic_are_told(at_work: DynamicsNode) -> None:
+    node = at_work
+    second = node.peer.writer(f'{NODE}/setpoint/pose', PoseStamped)
+    node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
+    # Both are heard: which of them is right the node cannot know.
+    node.answer(MOVING)
+    stamp = node.stamp()
+    node.asked[stamp] += 1
+    messages = MOVING.messages(stamp)
+    second.publish(messages.pop('setpoint/pose'))
+    for topic, message in messages.items():
+        node.publish(topic, message)
+    node.check(node.state_of(stamp), node.result_of(MOVING))
+    assert node.values('setpoints')['setpoint/pose: writers'] == '2'
+    node.peer.node.destroy_publisher(second)
+    node.until(lambda: node.status('setpoints').level != ERROR, 'one writer is left')
+
+
+def test_a_second_node_of_the_same_name_is_told(at_work: DynamicsNode) -> None:
+    node = at_work
+    second = Peer(node.domain, 'stewart_dynamics')
+    try:
+        node.until_status('setpoints', ERROR, f'2 nodes are named {NODE}')
+        node.answer(MOVING)
+    finally:
+        second.close()
+    node.until(lambda: node.status('setpoints').level != ERROR, 'it is alone')
+
+
+# How long others take a participant for living that says nothing any more; 20 s by default.
+BRIEF = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="brief" is_default_profile="true"><rtps><builtin><discovery_config>
+    <leaseDuration><sec>2</sec></leaseDuration>
+    <leaseAnnouncement><sec>0</sec><nanosec>500000000</nanosec></leaseAnnouncement>
+  </discovery_config></builtin></rtps></participant>
+</profiles>
+"""
+
+
+def _brief(folder: Path) -> dict[str, str]:
+    """Return the environment of a process that is soon forgotten when it is killed."""
+    profile = folder / 'brief.xml'
+    profile.write_text(BRIEF, encoding='utf-8')
+    return {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile)}
+
+
+def test_a_publisher_that_is_killed_and_started_again_is_heard(
+        at_work: DynamicsNode, tmp_path: Path) -> None:
+    node = at_work
+    killed = Feeder(node, tmp_path / 'killed', 100, 10_000, **_brief(tmp_path))
+    killed.begin()
+    _until_answered(node, killed)
+    killed.kill()
+    # Whether the node knows already that the first is gone or not.
+    again = Feeder(node, tmp_path / 'again', 100, 10_000)
+    again.begin(heard=False)
+    _until_answered(node, again)
+    node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
+    again.end()
+    _until_one_writer(node)
+    _expect_what_was_cut_off(node)
+
+
+def _until_answered(node: DynamicsNode, feeder: Feeder) -> None:
+    node.until(lambda: any(nanoseconds(state.header.stamp) in feeder.stamps
+                           for state in node.received('leg_states')), 'it is answered')
+
+
+def _until_one_writer(node: DynamicsNode) -> None:
+    node.until(lambda: all(node.values('setpoints')[f'{topic}: writers'] == '1'
+                           for topic in node.topics), 'there is one writer')
+
+
+def _expect_what_was_cut_off(node: DynamicsNode) -> None:
+    """Expect the refusals, of whatever number, of setpoints that came when it was not ready."""
+    stamp = node.send()
+    node.state_of(stamp)
+    # What the diagnostics count with this is behind all that came before.
+    for topic, message in HOME.messages(stamp).items():
+        node.writers[topic].publish(message)
+        node.refuses(topic, 'same stamp twice')
+    node.until(lambda: all(node.counted()[key] == number for key, number in node.expected.items()
+                           if key.endswith('same stamp twice')), 'it is counted')
+    counted = node.counted()
+    strange = {key: number for key, number in (counted - node.expected).items()
+               if ': passed over: ' not in key}
+    assert not strange
+    node.expected = counted
+
+
+def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_forgotten(
+        begin: Start, tmp_path: Path) -> None:
+    node = begin('setpoint.exclusive:=true')
+    node.answer(MOVING)
+    second = Feeder(node, tmp_path, 100, 1, **_brief(tmp_path))
+    node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
+    node.send(MOVING)
+    for topic in SEPARATE:
+        node.refuses(topic, 'more than one writer')
+    node.until_counted()
+    second.kill()
+    _until_one_writer(node)
+
+
+# The node itself
+
+def test_a_killed_node_is_soon_back_at_work(begin: Start, tmp_path: Path) -> None:
+    def machine_code() -> dict[str, int]:
+        folder = Path(stewart_dynamics.__file__).parent
+        return {str(path): path.stat().st_mtime_ns for path in folder.rglob('*.nbi')}
+
+    node = begin(NUMBA_CACHE_DIR='')  # where it is kept by default
+    feeder = Feeder(node, tmp_path, 100, 10_000)
+    feeder.begin()
+    _until_answered(node, feeder)
+    kept = machine_code()
+    assert kept
+    node.start_again()
+    node.until(lambda: node.raw['leg_states'], 'it answers what flows on')
+    assert machine_code() == kept
+    assert 'dynamics ready after' in node.program.stderr
+    feeder.end()
+    _expect_what_was_cut_off(node)
+
+
+def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
+        begin: Start, tmp_path: Path) -> None:
+    node = begin()
+    feeder = Feeder(node, tmp_path, 200, 100_000)
+    feeder.begin()
+
+    def cycle() -> None:
+        for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
+                           Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            assert _change(node, transition)
+        assert _state(node) == 'active'
+
+    def held() -> tuple[dict[str, int], dict[str, int]]:
+        before = len(node.raw['leg_states'])
+        node.until(lambda: len(node.raw['leg_states']) > before + 100, 'it answers again')
+        publishers = {topic: node.peer.node.count_publishers(f'{NODE}/{topic}')
+                      for topic in OUTPUTS}
+        return node.program.held(), publishers
+
+    for _ in range(20):
+        cycle()
+    before, publishers = held()
+    for _ in range(100):
+        cycle()
+    after, publishers_after = held()
+    feeder.end()
+    assert node.program.stderr.count('dynamics ready after') == 121
+    assert publishers_after == publishers == dict.fromkeys(OUTPUTS, 1)
+    for what in ('descriptors', 'threads'):
+        assert after[what] == before[what]
+    # A publisher that is left behind takes 30 kB; with none the middleware takes 3 to 7 a time.
+    assert after['memory'] - before['memory'] < 2000
+    _expect_what_was_cut_off(node)
+
+
+def _change(node: DynamicsNode, transition: int) -> bool:
+    return bool(node.call('change_state', ChangeState.Request(
+        transition=Transition(id=transition))).success)
+
+
+def _state(node: DynamicsNode) -> str:
+    return str(node.call('get_state', GetState.Request()).current_state.label)
+
+
+@pytest.mark.parametrize('configured', [False, True], ids=['unconfigured', 'inactive'])
+def test_it_is_shut_down_from_where_it_has_not_begun(start: Start, configured: bool) -> None:
+    node = start('autostart:=false')
+    node.until_said('unconfigured: autostart is false')
+    shutdown = Transition.TRANSITION_UNCONFIGURED_SHUTDOWN
+    if configured:
+        assert _change(node, Transition.TRANSITION_CONFIGURE)
+        shutdown = Transition.TRANSITION_INACTIVE_SHUTDOWN
+    assert _change(node, shutdown)
+    assert _state(node) == 'finalized'
+    # There is no way back, and it says so.
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE, shutdown):
+        assert not _change(node, transition)
+    assert 'transition refused: ' in node.program.stderr
+    node.until(lambda: not any(writer.get_subscription_count()
+                               for writer in node.writers.values()), 'it has no topics')
+
+
+def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+    node = at_work
+    before = len(node.raw['leg_states'])
+    feeder = Feeder(node, tmp_path, 250, 750)
+    feeder.begin()
+    mass = float(node.platform.parameters['platform.mass'])
+    names = list(node.platform.parameters)
+    masses = [mass]
+    while not feeder.ended:
+        masses.append(mass + len(masses) % 2)
+        assert node.set_parameters(platform__mass=masses[-1]).successful
+        assert len(node.call('describe_parameters', DescribeParameters.Request(
+            names=names)).descriptors) == len(names)
+        assert _state(node) == 'active'
+        assert not node.set_parameters(platform__mass=0.0).successful
+    assert not _change(node, Transition.TRANSITION_ACTIVATE)
+    assert 'transition refused: ' in node.program.stderr
+    assert node.set_parameters(platform__mass=mass).successful
+    feeder.end()
+    assert len(masses) > 10
+    node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
+    # Each with one mass or the other, and never with a part of each.
+    either = {bits(node.result_of(HOME, platform=StewartPlatform(
+        node.platform.parameters.replaced({'platform.mass': each}))).forces)
+        for each in (mass, mass + 1.0)}
+    assert {bits(state.effort) for state in node.received('leg_states')[before:]} == either
+
+
+def test_a_killed_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+    node = at_work
+    controller = Program([sys.executable, FEEDER], node.domain, tmp_path / 'controller',
+                         **_brief(tmp_path))
+    forces = f'{NODE}/leg_forces'
+    node.until(lambda: node.peer.node.count_subscribers(forces) == 2, 'the controller is there')
+    before = len(node.raw['leg_states'])
+    feeder = Feeder(node, tmp_path / 'feeder', 250, 750)
+    feeder.begin()
+    _until_answered(node, feeder)
+    controller.kill()
+    node.until(lambda: feeder.ended, 'all are sent')
+    feeder.end()
+    node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
+    node.until(lambda: node.peer.node.count_subscribers(forces) == 1, 'it is forgotten')
+
+
+# Singularities
+
+def _turned(degrees: float, rate: float = 0.0) -> Sample:
+    """Return a pose turned about the vertical; at 90 degrees the machine is singular."""
+    half = math.radians(degrees) / 2.0
+    return Sample((0.0, 0.0, 1.1), (0.0, 0.0, math.sin(half), math.cos(half)),
+                  (0.0,) * 5 + (rate,))
+
+
+def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> None:
+    node = at_work
+    node.answer()
+    node.until(lambda: node.received('singularity_warning')
+               and not node.received('singularity_warning')[-1].data, 'no warning is on')
+    crossings = int(node.values('singularity').get('crossings', '0'))
+    # 4 degrees in 10 ms.
+    there = [_turned(degrees, math.radians(400.0)) for degrees in (84.0, 88.0, 92.0, 96.0)]
+    clear = [node.result_of(sample) for sample in there]
+    assert clear[1].determinant * clear[2].determinant < 0.0
+    for sample in there:
+        state = node.answer(sample)
+        assert np.abs(state.effort).max() <= 6000.0
+        node.until(lambda: node.received('singularity_warning')[-1].data, 'it warns')
+    # One sample crossed, the next ones are only near: it is said for a second nevertheless.
+    node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
+    # Back with one leap, from where nothing is near into where nothing is.
+    for degrees in (130.0, 130.0, 50.0):
+        node.answer(_turned(degrees))
+    node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
+    node.answer(_turned(50.0))
+    node.until(lambda: not node.received('singularity_warning')[-1].data, 'the warning ends')
+    node.until_status('singularity', OK, 'clear')
+    assert node.values('singularity')['crossings'] == str(crossings + 2)
+
+
+def test_no_forces_go_out_through_a_singularity_where_they_are_suppressed(
+        at_work: DynamicsNode) -> None:
+    node = at_work
+    assert node.set_parameters(singularity__action='suppress_forces').successful
+    node.answer()
+    for degrees in (89.0, 89.9, 90.1, 91.0):
+        sample = _turned(degrees, math.radians(100.0))
+        assert node.result_of(sample).condition_number > 100.0
+        assert len(node.state_of(node.send(sample)).effort) == 0
+    node.until_status('singularity', ERROR, 'inside stop_condition: forces suppressed')
+    node.answer()
+    assert node.set_parameters(singularity__action='warn').successful
+    node.answer()
+
+
+def test_a_machine_that_is_singular_at_home_starts_and_gives_no_forces(
+        start: Start, tmp_path: Path) -> None:
+    # Similar hexagons: whatever the pose, the legs cannot hold a turn about the vertical.
+    angles = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
+    hexagon = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
+    file = tmp_path / 'hexagons.yaml'
+    file.write_text('/**:\n  ros__parameters:\n' + ''.join(
+        f'    {name}: {value}\n' for name, value in (
+            ('geometry.base_joints', hexagon.ravel().tolist()),
+            ('geometry.platform_joints', (0.6 * hexagon).ravel().tolist()),
+            ('platform.mass', 150.0), ('platform.inertia', [13.0, 0.0, 0.0, 14.0, 0.0, 22.0]))),
+        encoding='utf-8')
+    node = start(file=file)
+    node.until_active()
+    for sample in (HOME, MOVING):
+        state = node.state_of(node.send(sample))
+        assert len(state.effort) == 0
+        assert bits(state.position) == bits(node.platform.inverse_kinematics(
+            sample.position, sample.motion().rotation))
+    assert node.raw['leg_forces'] == []
+    assert node.received('singularity_warning')[-1].data
+    node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
+    node.check_answers()
+    assert any('singular' in line for line in log_lines(node.program.stderr, 'WARN'))
+
+
+# Parameters
+
+@pytest.mark.parametrize('name, value, reason', [
+    ('platform.mass', 150, 'platform.mass: 150: is an integer, must be a double: write 150.0'),
+    ('platform.mass', 'heavy', "platform.mass: 'heavy': must be a double"),
+    ('platform.inertia', [1.0], 'platform.inertia: [1.0]: must have 6 entries, has 1'),
+    ('platfrom.mass', 1.0, 'platfrom.mass: unknown parameter; do you mean platform.mass?'),
+])
+def test_both_services_refuse_a_bad_parameter(
+        at_work: DynamicsNode, name: str, value: Any, reason: str) -> None:
+    node = at_work
+    change = RosParameter(name, value=value)
+    assert reason in node.set_atomically([change]).reason
+    answer, = node.call('set_parameters', SetParameters.Request(
+        parameters=[change.to_parameter_msg()])).results
+    assert not answer.successful
+    assert reason in answer.reason
+
+
+@pytest.mark.parametrize('name, value, reason', [
+    ('legs.cylinder.mass', '-12.0', '-12.0 kg: must be at least 0'),
+    ('legs.piston.mass', '[6.0, 6.0, 6.0, -6.0, 6.0, 6.0]', ''),
+    ('platform.mass', 'heavy', ''),
+    ('legs.piston.inertia', '-0.3', '-0.3 kg m^2: must be at least 0'),
+    ('limits.length_min', '-0.9', '-0.9 m: must be at least 0'),
+    ('limits.length_max', '-1.6', '-1.6 m: must be more than 0'),
+    ('platform.inertia', '[13.0, 20.0, 0.0, 14.0, 0.0, 22.0]', 'must be positive definite'),
+    ('platform.inertia', '[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]', 'must be positive definite'),
+])
+def test_legs_and_inertias_that_no_machine_has_are_refused(
+        domain: int, tmp_path: Path, name: str, value: str, reason: str) -> None:
+    line = refused(domain, tmp_path, '--params-file', PLATFORM, '-p', f'{name}:={value}')
+    assert line.startswith('stewart_dynamics: ')
+    assert f'{name}: ' in line
+    assert reason in line
+
+
+MEASURED = """\
+import sys
+from stewart_dynamics.node import main
+code = main()
+print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))
+sys.exit(code)
+"""
+
+
+HOSTILE = {
+    'aliases that expand': (
+        'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
+            f'{this}: &{this} [{", ".join([f"*{before}"] * 9)}]\n'
+            for before, this in zip('abcdefgh', 'bcdefghi', strict=True)),
+        'has a YAML alias (*): write the value out'),
+    'an alias of itself': ('/**: &a\n  ros__parameters: *a\n', 'has a YAML alias (*)'),
+    'a tag that calls': (
+        '/**: !!python/object/apply:os.system ["touch called"]\n', 'not YAML: '),
+    'a tag that opens': ('/**: !!python/name:os.system\n', 'not YAML: '),
+    'lists in lists': ('[' * 90_000, ': '),
+    'names in names': ('{a: ' * 20_000, ': '),
+    'dashes': ('- ' * 45_000, ': '),
+    'an integer without an end': (
+        '/**:\n  ros__parameters:\n    platform.mass: ' + '9' * 90_000 + '\n', ': '),
+    'base sixty': ('%YAML 1.1\n---\n/**: 1' + ':1' * 40_000 + '.0\n', ': '),
+}
+
+
+@pytest.fixture(scope='module')
+def usual(ros_environment: None, tmp_path_factory: pytest.TempPathFactory) -> int:
+    """Return the memory that it takes to refuse a file of one line [kB]."""
+    folder = tmp_path_factory.mktemp('usual')
+    file = folder / 'machine.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    mass: 1.0\n', encoding='utf-8')
+    with own_domain() as domain:
+        return _memory_to_refuse(domain, folder / 'node', file, 'mass: unknown parameter')
+
+
+@pytest.mark.parametrize('case', HOSTILE)
+def test_a_hostile_parameter_file_is_refused_with_little_time_and_memory(
+        domain: int, tmp_path: Path, usual: int, case: str) -> None:
+    content, reason = HOSTILE[case]
+    file = tmp_path / 'machine.yaml'
+    file.write_text(content, encoding='utf-8')
+    assert _memory_to_refuse(domain, tmp_path / 'node', file, reason) < usual + 50_000
+    assert not list(tmp_path.rglob('called'))
+
+
+def test_a_parameter_file_of_100_mb_or_without_an_end_is_refused(
+        domain: int, tmp_path: Path, usual: int) -> None:
+    large, pipe = tmp_path / 'large.yaml', tmp_path / 'pipe'
+    large.touch()
+    os.truncate(large, 100_000_000)
+    os.mkfifo(pipe)
+    for n, (file, reason) in enumerate((
+            (large, 'larger than '), (pipe, 'not a regular file'),
+            (Path('/dev/zero'), 'not a regular file'))):
+        assert _memory_to_refuse(domain, tmp_path / f'{n}', file, reason) < usual + 50_000
+
+
+def _memory_to_refuse(domain: int, folder: Path, file: Path, reason: str) -> int:
+    """Return the most memory that the node had, until it refused a file for a reason [kB]."""
+    program = Program([sys.executable, '-c', MEASURED, '--ros-args', '--params-file', file],
+                      domain, folder)
+    try:
+        assert program.wait() == 1, program.stderr
+    finally:
+        program.kill()
+    line, = program.stderr.splitlines()
+    assert line.startswith(f'stewart_dynamics: {file}: ')
+    assert reason in line
+    assert len(line) < 500
+    return int(program.stdout)
+
+
+# The page
+
+def _rows() -> list[list[str]]:
+    """Return the cells of the page's tables."""
+    page = (ROOT / 'docs/faults.md').read_text(encoding='utf-8')
+    return [[cell.strip() for cell in line.strip('|').split(' | ')]
+            for line in page.splitlines() if line.startswith('| ')
+            and not line.startswith(('| --- |', '| fault |'))]
+
+
+def _of_module(name: str) -> tuple[dict[str, ast.FunctionDef], list[ast.stmt]]:
+    """Return a module's tests and the constants beside them."""
+    source = Path(__file__).with_name(f'{name}.py').read_text(encoding='utf-8')
+    body = ast.parse(source).body
+    return ({item.name: item for item in body if isinstance(item, ast.FunctionDef)
+             and item.name.startswith('test_')},
+            [item for item in body if isinstance(item, ast.Assign)])
+
+
+HERE, OF_NODE = (_of_module(name) for name in ('test_faults', 'test_node'))
+OF_THE_PAGE = ('test_every_fault_on_the_page_has_a_test_and_every_test_a_fault',
+               'test_what_the_page_says_that_it_says_its_test_asks_for')
+
+
+def test_every_fault_on_the_page_has_a_test_and_every_test_a_fault() -> None:
+    rows = _rows()
+    assert rows
+    named: set[str] = set()
+    for row in rows:
+        assert len(row) == 5, row
+        assert all(row), row
+        tests = re.findall(r'`(\w+)`', row[4])
+        assert tests, row
+        named.update(tests)
+    assert not set(HERE[0]) & set(OF_NODE[0])
+    assert named <= {*HERE[0], *OF_NODE[0]}
+    assert set(HERE[0]) - named == set(OF_THE_PAGE)
+
+
+@pytest.mark.parametrize('row', _rows(), ids=lambda row: row[0])
+def test_what_the_page_says_that_it_says_its_test_asks_for(row: list[str]) -> None:
+    texts = []
+    for test in re.findall(r'`(\w+)`', row[4]):
+        tests, constants = HERE if test in HERE[0] else OF_NODE
+        for part in (tests[test], *constants):
+            texts += [each.value for each in ast.walk(part)
+                      if isinstance(each, ast.Constant) and isinstance(each.value, str)]
+    for words in re.findall('`([^`]+)`', row[2]):
+        for part in filter(None, map(str.strip, words.split('...'))):
+            assert any(part in text for text in texts), part
