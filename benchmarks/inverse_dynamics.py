@@ -266,7 +266,7 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     """Return what is measured in single calls and in batches, after checking that all agree."""
     parameters = example_machine()
     machine = StewartPlatform(parameters)
-    numbers = machine._machine
+    numbers = machine.machine
     motion = random_motions(samples)
     rows, no_wrench = motion.rows, np.zeros((1, runtime.WRENCH))
     results, c_results = (np.empty((samples, runtime.RESULT)) for _ in range(2))

@@ -130,6 +130,8 @@ def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]
     count = _COUNT[order]
     size = count.unpack_from(data, 12)[0]
     names, at = _sequence(data, 16 + size, count, gaps)
+    if names > 1:
+        raise MalformedError(f'{names} joint_names: a setpoint has one')
     for _ in range(names):
         length, at = _sequence(data, at, count, gaps)
         at += length

@@ -27,6 +27,8 @@ import hashlib
 from pathlib import Path
 from typing import Any, cast, TypeVar
 
+import numpy as np
+
 __all__ = ['COMPILED', 'HINT', 'compiled', 'entry_point', 'inlined', 'source_digest']
 
 Function = TypeVar('Function', bound=Callable[..., Any])
@@ -36,6 +38,12 @@ _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a t
 # What a user should hear once, on a log, of how the runtime path is compiled; empty where all
 # is well.
 HINT = ''
+
+
+def _quiet(function: Function) -> Function:
+    """Return the function with no word of an overflow, as compiled code has none."""
+    return np.errstate(all='ignore')(function)
+
 
 try:
     import numba
@@ -47,7 +55,8 @@ except ImportError:
         """Return the function as it is: there is no compiler."""
         return function
 
-    compiled = entry_point = inlined
+    compiled = inlined
+    entry_point = _quiet
 else:
     COMPILED = not getattr(numba.config, 'DISABLE_JIT', 0)
     if not COMPILED:
@@ -66,6 +75,8 @@ else:
     def entry_point(function: Function) -> Function:
         """Compile what Python calls; its machine code is kept on disk for the next start."""
         global HINT
+        if not COMPILED:
+            return _quiet(function)
         kept = numba.njit(error_model='numpy', nogil=True, cache=True)
         try:
             return cast('Function', kept(function))

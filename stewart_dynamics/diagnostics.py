@@ -90,6 +90,16 @@ class _Held:
                    key=attrgetter('gravity'))
 
 
+class _Second:
+    """What is gathered in a second."""
+
+    def __init__(self, begin: float) -> None:
+        self.begin = begin
+        self.processing: list[float] = []
+        """How long each setpoint took [s]."""
+        self.worst_condition = 1.0
+
+
 class Diagnostics:
     """
     Gathers what happens to setpoints and what they give.
@@ -117,11 +127,9 @@ class Diagnostics:
         self._silent = dict.fromkeys(topics, True)
         self._refusals: Counter[Refusal] = Counter()
         self._answered = 0
-        self._answered_before = (now, 0)
         self._answered_at = now
         self._output: Output | None = None
-        self._worst_condition = 1.0
-        self._processing: list[float] = []
+        self._second = self._second_before = _Second(now)
         self._refused, self._singularity, self._limits, self._timing = (
             _Held(), _Held(), _Held(), _Held())
         self._levels: tuple[int, ...] = ()
@@ -143,10 +151,10 @@ class Diagnostics:
         """Note an output and when its setpoint came; return whether a level has changed."""
         self._answered += 1
         self._answered_at = now
-        self._processing.append(now - came)
+        self._second.processing.append(now - came)
+        if output.condition > self._second.worst_condition:
+            self._second.worst_condition = output.condition
         self._output = output
-        if output.condition > self._worst_condition:
-            self._worst_condition = output.condition
         self._singularity.see(_singularity_of(output), now, lasting=True)
         self._limits.see(self._limits_of(output), now, lasting=True)
         return self.level_changed(now)
@@ -156,18 +164,25 @@ class Diagnostics:
         return self._current_levels(now) != self._levels
 
     def report(self, now: float) -> tuple[Status, ...]:
-        """Return the statuses; rate and processing time are of the time since the last report."""
+        """Return the statuses; rate and processing time are of the last one or two seconds."""
         self._levels = self._current_levels(now)
         statuses = (self._report_setpoints(now), self._report_singularity(now),
                     self._report_limits(now), self._report_timing(now))
-        self._answered_before = (now, self._answered)
-        self._worst_condition = self._output.condition if self._output else 1.0
-        self._processing = []
+        # Reports come at changes of level as well, and may be much less than a second apart.
+        if now - self._second.begin >= 1.0:
+            self._second_before, self._second = self._second, _Second(now)
         return statuses
 
     def _current_levels(self, now: float) -> tuple[int, ...]:
         return (self._setpoint_level(now).level, self._singularity.at(now).level,
                 self._limits.at(now).level, self._timing.at(now).level)
+
+    @property
+    def _processing(self) -> list[float]:
+        """Return the processing times of the last one or two seconds."""
+        if self._second is self._second_before:
+            return self._second.processing
+        return self._second_before.processing + self._second.processing
 
     def _limits_of(self, output: Output) -> Level:
         if output.excesses:
@@ -200,8 +215,8 @@ class Diagnostics:
 
     def _report_setpoints(self, now: float) -> Status:
         level, message, _ = self._setpoint_level(now)
-        before, answered = self._answered_before
-        rate = (self._answered - answered) / (now - before) if now > before else 0.0
+        seconds = now - self._second_before.begin
+        rate = len(self._processing) / seconds if seconds > 0.0 else 0.0
         values = [('setpoints answered', str(self._answered)), ('rate (Hz)', f'{rate:.1f}')]
         if self._answered:
             values.append(('age of the last (s)', f'{now - self._answered_at:.3f}'))
@@ -220,13 +235,15 @@ class Diagnostics:
         forces = output.unit_load_forces
         worst = max(range(6), key=forces.__getitem__)
         crossing = output.singularity.time_to_crossing
-        return Status('singularity', level, message or 'clear', (
+        worst_condition = max(output.condition, self._second.worst_condition,
+                              self._second_before.worst_condition)
+        return Status('singularity', level, (message or 'clear') + self._age(now), (
             ('det(J) (m^3)', f'{output.determinant:.9g}'),
             ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
             ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
             ('crossings', str(output.singularity.crossings)),
             ('condition number', f'{output.condition:.6g}'),
-            ('worst condition number since the last report', f'{self._worst_condition:.6g}'),
+            ('worst condition number of the last second', f'{worst_condition:.6g}'),
             ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
             ('its leg', self.parameters['joints'][worst])))
 
@@ -242,19 +259,26 @@ class Diagnostics:
         if output.demanded_forces is not None:
             values += [(f'{leg}: force (N)', f'{force:.6g}') for leg, force in
                        zip(self.parameters['joints'], output.demanded_forces, strict=True)]
-        return Status('limits', level, message or 'all held', tuple(values))
+        return Status('limits', level, (message or 'all held') + self._age(now), tuple(values))
 
     def _report_timing(self, now: float) -> Status:
         level, message, _ = self._timing.at(now)
         values = []
-        if self._processing:
-            values = [('processing time, median (us)', f'{median(self._processing) * 1e6:.0f}'),
-                      ('processing time, largest (us)', f'{max(self._processing) * 1e6:.0f}')]
+        if times := self._processing:
+            values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
+                      ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
         for key, reason in (('passed over', PASSED_OVER), ('incomplete', NOT_JOINED)):
             values.append((key, str(sum(n for refusal, n in self._refusals.items()
                                         if refusal.reason == reason))))
-        return Status('timing', level, message or (
-            'on time' if self._answered else 'no setpoint yet'), tuple(values))
+        return Status('timing', level, (message or (
+            'on time' if self._answered else 'no setpoint yet')) + self._age(now), tuple(values))
+
+    def _age(self, now: float) -> str:
+        """Return how old the last setpoint is where that is all there is to speak of."""
+        age = now - self._answered_at
+        if not self._answered or age <= self.parameters['setpoint.timeout']:
+            return ''
+        return f' (of the last setpoint, {age:.1f} s ago)'
 
     def _words(self, excess: Excess) -> str:
         quantity, unit = _QUANTITIES[excess.limit]

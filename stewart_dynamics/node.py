@@ -32,6 +32,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.logging import get_logger
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
@@ -90,6 +91,9 @@ class DynamicsNode(LifecycleNode):
         self._close_io: list[Callable[[], Any]] = []
         self._series = Series()
         self.add_on_set_parameters_callback(self._on_set_parameters)
+        # A steady clock: ROS time may stand still or jump.
+        self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._answer_impossible_transitions()
         self._set_parameters_together()
         if compiled.HINT:
@@ -121,7 +125,7 @@ class DynamicsNode(LifecycleNode):
         self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
         self._restarting = False  # the last one was a restart and could not be answered
-        self._reported = now
+        self._reported = self._answered_at = now
         self._busy = False
         self._logged: dict[str, int] = {}
         self._active = True
@@ -130,7 +134,6 @@ class DynamicsNode(LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._active = False
-        self._say_last(math.inf)
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -141,9 +144,16 @@ class DynamicsNode(LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more and close the topics."""
         self._active = False
-        self._say_last(math.inf)
         self._close()
         return TransitionCallbackReturn.SUCCESS
+
+    def destroy_node(self) -> None:
+        """Say what is left to say, and end."""
+        # Its own logger would complain that /rosout is gone where a signal has ended ROS.
+        logger = get_logger(f'{self.get_name()}.last')
+        for line in self._series.over(math.inf):
+            logger.warning(line)
+        super().destroy_node()
 
     def _configure(self) -> None:
         self._step = Step(self._settings)
@@ -169,10 +179,6 @@ class DynamicsNode(LifecycleNode):
         self._subscribe(inputs.WRENCH, self._on_wrench)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
-        # A steady clock: ROS time may stand still or jump.
-        watch = self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
-                                  clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._close_io.append(partial(self.destroy_timer, watch))
         self._configured = True
         # What is there now stays: the collector would look at all of it again and again, for
         # 50 ms and more, while a setpoint waits.
@@ -305,9 +311,9 @@ class DynamicsNode(LifecycleNode):
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
             self._last = output
-            now = time.monotonic()
-            if (self._diagnostics.answered(output, came, now)
-                    or now - self._reported >= _REPORT_SECONDS):
+            self._answered_at = time.monotonic()
+            if (self._diagnostics.answered(output, came, self._answered_at)
+                    or self._answered_at - self._reported >= _REPORT_SECONDS):
                 self._report()
         executor: Any = self.executor
         executor.create_task(self._answer_task)
@@ -329,7 +335,9 @@ class DynamicsNode(LifecycleNode):
         a task first, and would answer one setpoint after the other, however late.
         """
         came = True
-        while came:
+        for _ in range(_QUEUE):
+            if not came:
+                return
             came = False
             for topic, subscription in self._inputs.items():
                 with subscription.handle:
@@ -352,18 +360,16 @@ class DynamicsNode(LifecycleNode):
         if (line := self._series.add(kind, text, time.monotonic())) is not None:
             self.get_logger().warning(line)
 
-    def _say_last(self, now: float) -> None:
+    def _on_watch(self) -> None:
+        now = time.monotonic()
         for line in self._series.over(now):
             self.get_logger().warning(line)
-
-    def _on_watch(self) -> None:
         if not self._active:
             return
-        now = time.monotonic()
-        self._say_last(now)
         # While setpoints are answered it is done behind an answer, when time is left for it.
-        overdue = now - self._reported >= _REPORT_SECONDS + _WATCH_SECONDS
-        if overdue or self._diagnostics.level_changed(now):
+        due = (now - self._answered_at >= _WATCH_SECONDS
+               and now - self._reported >= _REPORT_SECONDS - 0.5 * _WATCH_SECONDS)
+        if due or self._diagnostics.level_changed(now):
             self._report()
 
     def _report(self) -> None:

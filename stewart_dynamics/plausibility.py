@@ -72,14 +72,14 @@ _TILT = math.radians(15.0)
 
 
 class _Shape(NamedTuple):
-    """A machine's joints, and what follows from them."""
+    """A machine's joints in axes of which the third is the normal of the base joints' plane."""
 
     base: Array
     """From their center (6, 3) [m]."""
     platform: Array
-    """From their center (6, 3) [m]."""
-    axis: int
-    """The base frame's axis that is nearest to the normal of the base joints' plane."""
+    """From their center (6, 3) [m], while the axes of both frames are parallel."""
+    axes: Array
+    """Those axes in the base frame (3, 3), row by row."""
     base_radius: float
     platform_radius: float
 
@@ -93,9 +93,10 @@ def doubts(parameters: Parameters) -> tuple[str, ...]:
     """
     Return what can hardly be meant, each in one line: parameter, value, what is suspected.
 
-    Home is the level pose, the axes parallel and the platform joints' center above that of the
-    base joints, at the height where the mean leg is halfway between the limits of its length;
-    without them it has the zero length, and without that several heights stand for home.
+    Home is the pose with parallel axes, the platform joints' center above that of the base
+    joints along the normal of their plane, at the height where the mean leg is halfway between
+    the limits of its length; without them it has the zero length, and without that several
+    heights stand for home.
     """
     # Numbers near the end of what a double holds overflow here: that is no doubt of its own.
     with np.errstate(all='ignore'):
@@ -110,12 +111,23 @@ def doubts(parameters: Parameters) -> tuple[str, ...]:
 def _shape(p: Parameters) -> _Shape:
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
     around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
-    moments = around.T @ around
-    # The normal of a plane is the direction in which its points spread least.
-    normal = (np.linalg.eigh(moments)[1][:, 0] if np.isfinite(moments).all()
-              else np.array([0.0, 0.0, 1.0]))
-    return _Shape(around, carried, int(np.argmax(np.abs(normal))), _mean_norm(around),
+    axes = _level_axes(around)
+    return _Shape(around @ axes.T, carried @ axes.T, axes, _mean_norm(around),
                   _mean_norm(carried))
+
+
+def _level_axes(around: Array) -> Array:
+    """Return two axes in the plane of points, and its normal, (3, 3)."""
+    moments = around.T @ around
+    if not np.isfinite(moments).all():
+        return np.eye(3)
+    # The normal of a plane is the direction in which its points spread least.
+    normal = np.linalg.eigh(moments)[1][:, 0]
+    nearest = int(np.argmax(np.abs(normal)))
+    normal = normal * np.sign(normal[nearest])
+    first = np.cross(np.eye(3)[(nearest + 2) % 3], normal)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first), normal])
 
 
 def _mean_norm(vectors: Array) -> float:
@@ -189,10 +201,10 @@ def _reach(p: Parameters, shape: _Shape) -> _Reach:
     shortest, longest = p['limits.length_min'], p['limits.length_max']
     low = np.zeros(6) if shortest is None else shortest
     high = np.full(6, np.inf) if longest is None else longest
-    turned = _about(shape.axis, _YAWS) @ shape.platform.T  # (yaws, 3, 6)
+    turned = _about(2, _YAWS) @ shape.platform.T  # (yaws, 3, 6)
     offset = turned.swapaxes(-1, -2) - shape.base
-    along = offset[..., shape.axis]
-    across = np.linalg.norm(np.delete(offset, shape.axis, axis=-1), axis=-1)
+    along = offset[..., 2]
+    across = np.linalg.norm(offset[..., :2], axis=-1)
     reached = np.zeros(len(_YAWS), dtype=bool)
     for side in (1.0, -1.0):  # above the base, and below it
         # A leg's height is that of the platform and its own share of it.
@@ -237,8 +249,8 @@ def _singular(p: Parameters, shape: _Shape, reach: _Reach) -> Iterator[str]:
              for height in _HEIGHTS for side in (1.0, -1.0)
              for yaw in (0.0, 20.0, -20.0, 45.0, -45.0) for tilt in (0.0, _TILT, -_TILT)]
     heights, angles, tilts = np.array(tried).T
-    anywhere = _conditions(p, shape, heights, _about(shape.axis, angles) @ _about(
-        (shape.axis + 1) % 3, tilts) @ _about((shape.axis + 2) % 3, 0.5 * tilts))
+    anywhere = _conditions(
+        p, shape, heights, _about(2, angles) @ _about(0, tilts) @ _about(1, 0.5 * tilts))
     stop = p['singularity.stop_condition']
     best = float(anywhere.min())
     if best >= stop:
@@ -248,7 +260,7 @@ def _singular(p: Parameters, shape: _Shape, reach: _Reach) -> Iterator[str]:
                'another order?')
         return
     heights, where = _home(p, shape, reach)
-    turned = _about(shape.axis, np.full(len(heights), reach.yaw or 0.0))
+    turned = _about(2, np.full(len(heights), reach.yaw or 0.0))
     home = float(_conditions(p, shape, heights, turned).min())
     if home >= stop:
         yield (f'geometry: {_kind(home)} at home ({where}): the condition number is {home:.3g}, '
@@ -287,16 +299,17 @@ def _height(shape: _Shape, side: float, yaw: float, length: float) -> float:
 
 
 def _mean_length(shape: _Shape, height: float, yaw: float) -> float:
-    offset = shape.platform @ _about(shape.axis, np.array([yaw]))[0].T - shape.base
-    offset[:, shape.axis] += height
+    offset = shape.platform @ _about(2, np.array([yaw]))[0].T - shape.base
+    offset[:, 2] += height
     return _mean_norm(offset)
 
 
 def _conditions(p: Parameters, shape: _Shape, heights: Array, rotations: Array) -> Array:
-    """Return condition numbers (N,) where the platform joints' center is so high above."""
+    """Return condition numbers (N,) at these heights and turns, both in the shape's axes."""
     middle = p['geometry.platform_joints'].mean(axis=0)
-    positions = (p['geometry.base_joints'].mean(axis=0) - rotations @ middle)
-    positions[:, shape.axis] += heights
+    rotations = shape.axes.T @ rotations @ shape.axes
+    positions = (p['geometry.base_joints'].mean(axis=0) - rotations @ middle
+                 + heights[:, None] * shape.axes[2])
     if not np.isfinite(positions).all():
         return np.full(len(heights), 1.0)
     matrices = StewartPlatform(p).jacobian(positions, rotations)
@@ -311,7 +324,7 @@ def _conditions(p: Parameters, shape: _Shape, heights: Array, rotations: Array) 
 
 
 def _about(axis: int, angles: Array) -> Array:
-    """Return rotations about an axis of the base frame, (N, 3, 3)."""
+    """Return rotations about one of the axes, (N, 3, 3)."""
     euler = np.zeros((len(angles), 3))
     euler[:, axis] = angles
     return from_euler(euler)

@@ -240,7 +240,7 @@ class Setpoints:
                 self.refuse(topic, MALFORMED, str(exc))
                 return None
             if frame not in self._frames:
-                self.refuse(topic, WRONG_FRAME, f'{frame.decode(errors="replace")!r}, must '
+                self.refuse(topic, WRONG_FRAME, f'{frame[:60].decode(errors="replace")!r}, must '
                             f'be {max(self._frames).decode()!r} or empty')
                 return None
             self._learn(topic, data)

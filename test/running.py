@@ -92,7 +92,7 @@ SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
 # What a program may say on stderr: lines of ROS's log. Fast DDS complains there of what other
 # programs, killed ones, have left in shared memory.
-LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[\w+\]: \S|.*\[RTPS_')
+LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RTPS_')
 
 _DOMAINS = range(1, 101)
 

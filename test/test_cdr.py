@@ -120,7 +120,7 @@ def valid(kind: str, little_endian: bool = True, frame: str = 'base') -> bytes:
 def test_what_rclpy_writes_is_read(kind: str, data: st.DataObject) -> None:
     stamp, frame = data.draw(stamps), data.draw(texts)
     values = data.draw(st.tuples(*[st.floats()] * LENGTHS[kind]))
-    names = data.draw(st.lists(texts, max_size=4))
+    names = data.draw(st.lists(texts, max_size=1))
     written = serialize_message(message(kind, stamp, frame, values, names))
     for order in (written, in_order(written, kind, True), in_order(written, kind, False)):
         read = READERS[kind](order)
@@ -142,14 +142,15 @@ def test_every_length_of_frame_id_is_read(kind: str, little_endian: bool, letter
 
 
 @ENDIAN
-def test_joint_names_of_every_length_and_number_are_passed(little_endian: bool) -> None:
+def test_a_joint_name_of_any_length_or_none_is_passed(little_endian: bool) -> None:
     kind = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
     values = [1.5 + n for n in range(19)]
-    for number in range(9):
-        for length in range(9):
-            names = ['é' * (length + n) for n in range(number)]
-            data = serialize_message(message(kind, 5, 'base', values, names))
-            assert cdr.combined(in_order(data, kind, little_endian)).values == tuple(values)
+    for names in ([], *(['é' * length] for length in range(17))):
+        data = serialize_message(message(kind, 5, 'base', values, names))
+        assert cdr.combined(in_order(data, kind, little_endian)).values == tuple(values)
+    data = serialize_message(message(kind, 5, 'base', values, ['platform', 'other']))
+    with pytest.raises(cdr.MalformedError, match='2 joint_names'):
+        cdr.combined(in_order(data, kind, little_endian))
 
 
 def test_a_pose_written_by_hand_is_read_in_both_orders() -> None:
@@ -274,7 +275,7 @@ def test_huge_counts_cost_no_time() -> None:
 @given(st.data())
 def test_what_has_the_layout_of_another_is_read_alike(kind: str, data: st.DataObject) -> None:
     frame = data.draw(texts)
-    names = data.draw(st.lists(texts, max_size=3))
+    names = data.draw(st.lists(texts, max_size=1))
     first, second = (serialize_message(message(
         kind, data.draw(stamps), frame, data.draw(st.tuples(*[st.floats()] * LENGTHS[kind])),
         names)) for _ in range(2))

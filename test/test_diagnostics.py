@@ -131,18 +131,35 @@ def test_the_timeout_is_that_of_the_parameters() -> None:
     assert status(diagnostics, 'setpoints', BEGIN + 5.1).level == STALE
 
 
-def test_the_rate_is_that_since_the_last_report() -> None:
+def test_the_rate_is_that_of_the_last_seconds() -> None:
     diagnostics = begun()
     for n in range(100):
         answered(diagnostics, BEGIN + 0.01 * n)
     values = dict(status(diagnostics, 'setpoints', BEGIN + 1.0).values)
     assert (values['setpoints answered'], values['rate (Hz)']) == ('100', '100.0')
-    for n in range(20):
-        answered(diagnostics, BEGIN + 1.0 + 0.1 * n)
-    values = dict(status(diagnostics, 'setpoints', BEGIN + 3.0).values)
-    assert (values['setpoints answered'], values['rate (Hz)']) == ('120', '10.0')
-    # no time has passed: no division by it
-    assert dict(status(diagnostics, 'setpoints', BEGIN + 3.0).values)['rate (Hz)'] == '0.0'
+    for second in range(1, 4):
+        for n in range(10):
+            answered(diagnostics, BEGIN + second + 0.1 * n)
+        values = dict(status(diagnostics, 'setpoints', BEGIN + second + 1.0).values)
+    assert (values['setpoints answered'], values['rate (Hz)']) == ('130', '10.0')
+
+
+def test_no_rate_is_of_no_time() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN)
+    assert dict(status(diagnostics, 'setpoints', BEGIN).values)['rate (Hz)'] == '0.0'
+
+
+def test_reports_that_come_often_do_not_tear_the_rate_apart() -> None:
+    diagnostics = begun()
+    rates = []
+    for n in range(300):  # 5 Hz, reported at 10 Hz as levels change
+        now = BEGIN + 0.1 * n
+        if n % 2 == 0:
+            answered(diagnostics, now)
+        rates.append(float(dict(status(diagnostics, 'setpoints', now).values)['rate (Hz)']))
+    assert 4.5 <= min(rates[20:])
+    assert max(rates[20:]) <= 6.0
 
 
 # Refusals and writers
@@ -206,7 +223,7 @@ def test_where_all_is_refused_silence_is_not_said_to_be_of_stamps() -> None:
 
 # Timing
 
-def test_processing_times_are_those_since_the_last_report() -> None:
+def test_processing_times_are_those_of_the_last_seconds() -> None:
     diagnostics = begun()
     assert status(diagnostics, 'timing', BEGIN)[1:] == (
         OK, 'no setpoint yet', (('passed over', '0'), ('incomplete', '0')))
@@ -216,11 +233,13 @@ def test_processing_times_are_those_since_the_last_report() -> None:
     assert (of.level, of.message) == (OK, 'on time')
     assert of.values[:2] == (
         ('processing time, median (us)', '200'), ('processing time, largest (us)', '900'))
-    answered(diagnostics, BEGIN, took=50e-6)
-    assert dict(status(diagnostics, 'timing', BEGIN).values)[
-        'processing time, largest (us)'] == '50'
-    assert 'processing time, median (us)' not in dict(
-        status(diagnostics, 'timing', BEGIN).values)
+    for second in (1.0, 2.0, 3.0):
+        answered(diagnostics, BEGIN + second, took=50e-6)
+        of = status(diagnostics, 'timing', BEGIN + second)
+    assert dict(of.values)['processing time, largest (us)'] == '50'
+    for second in (4.0, 5.0, 6.0):
+        of = status(diagnostics, 'timing', BEGIN + second)
+    assert 'processing time, median (us)' not in dict(of.values)
 
 
 def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> None:
@@ -229,12 +248,23 @@ def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> No
         diagnostics.refused(Refusal('setpoint', PASSED_OVER), f'stamp {n} ns', BEGIN)
     diagnostics.refused(Refusal(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
     diagnostics.refused(Refusal(POSE, TWICE), 'stamp 4 ns', BEGIN)
-    answered(diagnostics, BEGIN)
+    answered(diagnostics, BEGIN + 0.5)
     of = status(diagnostics, 'timing', BEGIN + 0.5)
     assert (of.level, of.message) == (WARN, f'setpoint: {PASSED_OVER} (stamp 2 ns)')
+    answered(diagnostics, BEGIN + 1.5)
     of = status(diagnostics, 'timing', BEGIN + 1.5)
     assert (of.level, of.message) == (OK, 'on time')
-    assert of.values == (('passed over', '3'), ('incomplete', '1'))
+    assert of.values[-2:] == (('passed over', '3'), ('incomplete', '1'))
+
+
+def test_what_is_said_of_the_last_setpoint_says_how_old_it_is() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN, output_of(QUARTER))
+    for name in ('singularity', 'limits', 'timing'):
+        assert 'ago' not in status(diagnostics, name, BEGIN + 0.1).message
+        of = status(diagnostics, name, BEGIN + 7.0)
+        assert of.message.endswith(' (of the last setpoint, 7.0 s ago)')
+        assert of.level == (ERROR if name == 'singularity' else OK)
 
 
 # Singularity
@@ -286,14 +316,15 @@ def test_inside_the_stop_condition_is_an_error(suppressed: bool) -> None:
     assert ('suppressed' in of.message) == suppressed
 
 
-def test_the_worst_condition_is_kept_until_it_is_reported() -> None:
+def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
     diagnostics = begun()
-    key = 'worst condition number since the last report'
+    key = 'worst condition number of the last second'
     for condition in (3.0, 40.0, 5.0):
         answered(diagnostics, BEGIN, CLEAR._replace(condition=condition))
     assert dict(status(diagnostics, 'singularity', BEGIN).values)[key] == '40'
-    answered(diagnostics, BEGIN, CLEAR._replace(condition=4.0))
-    assert dict(status(diagnostics, 'singularity', BEGIN).values)[key] == '5'
+    for second, worst in ((1.0, '40'), (2.0, '40'), (3.0, '4')):
+        answered(diagnostics, BEGIN + second, CLEAR._replace(condition=4.0))
+        assert dict(status(diagnostics, 'singularity', BEGIN + second).values)[key] == worst
 
 
 # Limits
@@ -370,10 +401,11 @@ def test_a_crossing_is_said_for_a_second_whatever_comes_after_it() -> None:
     diagnostics = begun()
     for n, cause in enumerate((Cause.FORETOLD, Cause.CROSSED, Cause.CONDITION, Cause.CONDITION)):
         answered(diagnostics, BEGIN + 0.001 * n, CLEAR._replace(singularity=Singularity(cause)))
-    of = status(diagnostics, 'singularity', BEGIN + 0.9)
-    assert (of.level, of.message) == (WARN, Cause.CROSSED.value)
-    of = status(diagnostics, 'singularity', BEGIN + 1.1)
-    assert (of.level, of.message) == (WARN, Cause.CONDITION.value)
+    for after, message in ((0.9, Cause.CROSSED.value), (1.1, Cause.CONDITION.value)):
+        answered(diagnostics, BEGIN + after,
+                 CLEAR._replace(singularity=Singularity(Cause.CONDITION)))
+        of = status(diagnostics, 'singularity', BEGIN + after)
+        assert (of.level, of.message) == (WARN, message)
 
 
 def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
@@ -398,7 +430,7 @@ def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
 
 UNIT = re.compile(r'\((m|m/s|N|s|us|s ago|Hz|m\^3|m\^3/s)\)$')
 PLAIN = re.compile(
-    r'setpoints answered|crossings|condition number|worst condition number since the last report'
+    r'setpoints answered|crossings|condition number|worst condition number of the last second'
     r'|largest leg force under a unit load|its leg|refused, .*|.*: writers|passed over|incomplete')
 
 

@@ -371,6 +371,18 @@ def test_of_a_series_of_refusals_the_first_and_the_last_are_logged(
     assert last.endswith('(the last of 50)')
 
 
+def test_at_the_end_the_last_of_a_series_is_logged(start: Start) -> None:
+    node = start()
+    node.until_active()
+    for _ in range(20):
+        node.publish('wrench', raw(wrench_message((1.0,) * 6))[:20])
+        node.refuses('wrench', 'malformed')
+    node.until_counted()
+    node.at_work()
+    node.stop()
+    assert '(the last of 20)' in node.program.stderr.splitlines()[-1]
+
+
 # Publishers
 
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
