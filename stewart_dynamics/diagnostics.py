@@ -257,7 +257,7 @@ class Diagnostics:
         values += [(f'{leg}: rate (m/s)', f'{rate:.6g}') for leg, rate in
                    zip(self.parameters['joints'], output.rates, strict=True)]
         if output.demanded_forces is not None:
-            values += [(f'{leg}: force (N)', f'{force:.6g}') for leg, force in
+            values += [(f'{leg}: force demanded (N)', f'{force:.6g}') for leg, force in
                        zip(self.parameters['joints'], output.demanded_forces, strict=True)]
         return Status('limits', level, (message or 'all held') + self._age(now), tuple(values))
 

@@ -350,7 +350,8 @@ class DynamicsNode(LifecycleNode):
 
     def _on_refusal(self, refusal: Refusal, details: str) -> None:
         self._diagnostics.refused(refusal, details, time.monotonic())
-        self._say(refusal, f'{refusal.topic} refused: {refusal.reason}: {details}')
+        how = '' if refusal.reason.startswith('passed over') else 'refused: '
+        self._say(refusal, f'{refusal.topic} {how}{refusal.reason}: {details}')
 
     def _on_notice(self, text: str) -> None:
         # Two writers whose clocks differ restart with every setpoint.
@@ -415,18 +416,31 @@ class DynamicsNode(LifecycleNode):
                 if fixed:
                     raise ParameterError(
                         f'{", ".join(fixed)}: only changed while the node is unconfigured: its '
-                        'topics, or the machine that the last setpoint was answered for, depend '
-                        'on it; deactivate and clean up first')
+                        'topics and its machine are made of it; deactivate and clean up first')
             parameters = self._settings.replaced(ours)
             step = Step(parameters)
         except ParameterError as exc:
-            return SetParametersResult(successful=False, reason=str(exc))
+            return SetParametersResult(
+                successful=False, reason=str(exc).removeprefix('parameters: '))
+        self._tell_changes(parameters)
         self._settings = parameters
         if self._configured:
             self._step = step
         if self._active:
             self._diagnostics.parameters = parameters
         return SetParametersResult(successful=True)
+
+    def _tell_changes(self, parameters: Parameters) -> None:
+        """Log what becomes another value, and what can hardly be meant by it."""
+        changes = [f'{name}: {self._settings.given.get(name)} -> {value}'
+                   for name, value in parameters.given.items()
+                   if value != self._settings.given.get(name)]
+        if changes:
+            self.get_logger().info('; '.join(changes))
+        before = doubts(self._settings, geometry=False)
+        for doubt in doubts(parameters, geometry=False):
+            if doubt not in before:
+                self.get_logger().warning(doubt)
 
 
 def main() -> int:

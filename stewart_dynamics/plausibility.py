@@ -89,20 +89,23 @@ class _Shape(NamedTuple):
         return max(self.base_radius, self.platform_radius)
 
 
-def doubts(parameters: Parameters) -> tuple[str, ...]:
+def doubts(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
     Return what can hardly be meant, each in one line: parameter, value, what is suspected.
 
     Home is the pose with parallel axes, the platform joints' center above that of the base
     joints along the normal of their plane, at the height where the mean leg is halfway between
     the limits of its length; without them it has the zero length, and without that several
-    heights stand for home.
+    heights stand for home. Without ``geometry`` legs and poses are left out, which takes ten
+    times as long as the rest.
     """
     # Numbers near the end of what a double holds overflow here: that is no doubt of its own.
     with np.errstate(all='ignore'):
         shape = _shape(parameters)
         found = [*_sizes(parameters, shape), *_inertia(parameters, shape),
                  *_others(parameters, shape)]
+        if not geometry:
+            return tuple(found)
         reach = _reach(parameters, shape)
         found += [*_legs(parameters, shape, reach), *_singular(parameters, shape, reach)]
     return tuple(found)
@@ -183,6 +186,10 @@ def _others(p: Parameters, shape: _Shape) -> Iterator[str]:
         yield f'gravity: {gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'
     if math.isclose(gravity, 1.0, rel_tol=1e-3):
         yield f'gravity: {gravity:.6g} m/s^2: in g? The earth has 9.80665'
+    weight, most = p['platform.mass'] * gravity, p['limits.force_max']
+    if most is not None and gravity <= _LARGEST_GRAVITY and weight > most.sum():
+        yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
+               f'platform, {weight:.3g} N: in kN?')
     fastest = p['limits.velocity_max']
     if fastest is not None and fastest.max() > _FASTEST:
         yield f'limits.velocity_max: {fastest.max():.3g} m/s: in mm/s?'

@@ -248,11 +248,13 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
             kind.check_file(path)
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
-        check_environment(sys.argv)
+        warning = check_environment(sys.argv)
         rclpy.node.TimeSource = _TimeSource  # type: ignore[misc]
         rclpy.init()
         with without_security_libraries():
             node = make_node()
+        if warning:
+            node.get_logger().warning(warning)
         executor = _executor()
         executor.add_node(node)
         starting = False

@@ -38,12 +38,17 @@ _KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
 _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTILINE)
 
 
-def check_environment(arguments: Sequence[str]) -> None:
-    """Raise StewartError, naming the variable, where security that is asked for would not be."""
-    _check_dds_security(arguments)
+def check_environment(arguments: Sequence[str]) -> str:
+    """
+    Return what to warn of, nothing where all is well.
+
+    Raises StewartError, naming the variable, where security that is asked for would not be.
+    """
+    permissive = _check_dds_security(arguments)
     rmw = os.environ.get('RMW_IMPLEMENTATION') or 'rmw_fastrtps_cpp'
     if os.environ.get(_PROFILE) and 'fastrtps' in rmw:
         _check_profile(Path(os.environ[_PROFILE]))
+    return permissive
 
 
 @contextmanager
@@ -62,16 +67,17 @@ def without_security_libraries() -> Iterator[None]:
                 'that of the wheels from PyPI is; that of a ROS 2 installation has it') from exc
 
 
-def _check_dds_security(arguments: Sequence[str]) -> None:
+def _check_dds_security(arguments: Sequence[str]) -> str:
     enable = os.environ.get('ROS_SECURITY_ENABLE', '')
     if enable in ('', 'false'):
-        return
+        return ''
     if enable != 'true':
         raise StewartError(f"ROS_SECURITY_ENABLE: '{enable}': must be true or false: ROS takes "
                            'all but true for false')
     strategy = os.environ.get('ROS_SECURITY_STRATEGY', '')
     if strategy == 'Permissive':
-        return  # asked for in so many words: without keys it is open
+        return ('ROS_SECURITY_STRATEGY is Permissive: where ROS finds no keys it runs without '
+                'security')
     if strategy != 'Enforce':
         raise StewartError(f"ROS_SECURITY_STRATEGY: '{strategy}': must be Enforce where "
                            'ROS_SECURITY_ENABLE is true, or Permissive, with which ROS starts '
@@ -80,9 +86,12 @@ def _check_dds_security(arguments: Sequence[str]) -> None:
     named = [value for option, value in zip(arguments, arguments[1:], strict=False)
              if option in ('-e', '--enclave')]
     enclave = os.environ.get('ROS_SECURITY_ENCLAVE_OVERRIDE') or (named or ['/'])[-1]
-    if not keystore or not (Path(keystore) / 'enclaves' / enclave.lstrip('/')).is_dir():
+    if not keystore:
+        raise StewartError('ROS_SECURITY_KEYSTORE: not set, and ROS_SECURITY_ENABLE is true')
+    if not (Path(keystore) / 'enclaves' / enclave.lstrip('/')).is_dir():
         raise StewartError(f"ROS_SECURITY_KEYSTORE: '{keystore}': holds no enclave '{enclave}'; "
                            'another one is named with --ros-args --enclave NAME')
+    return ''
 
 
 def _check_profile(path: Path) -> None:

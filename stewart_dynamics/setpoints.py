@@ -110,7 +110,7 @@ TWICE = 'same stamp twice'
 NOT_JOINED = 'passed over: not all topics had its stamp'
 OUT_OF_RANGE = 'out of range: the numbers overflow'
 NOT_EXCLUSIVE = 'more than one writer'
-PASSED_OVER = 'passed over: the node had fallen behind'
+PASSED_OVER = 'passed over: more came at once than can be answered'
 
 
 class Setpoints:

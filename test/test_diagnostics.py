@@ -338,7 +338,7 @@ def test_held_limits_are_ok() -> None:
     for leg, name in enumerate(PARAMETERS['joints']):
         assert values[f'{name}: length (m)'] == f'{CLEAR.lengths[leg]:.6g}'
         assert values[f'{name}: rate (m/s)'] == f'{CLEAR.rates[leg]:.6g}'
-        assert values[f'{name}: force (N)'] == f'{CLEAR.demanded_forces[leg]:.6g}'
+        assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[leg]:.6g}'
 
 
 @pytest.mark.parametrize(('excess', 'words'), [
@@ -366,7 +366,7 @@ def test_a_clipped_force_is_said_as_the_leg_would_need_it() -> None:
     assert of.level == ERROR
     for leg, name in enumerate(PARAMETERS['joints']):
         force = output.demanded_forces[leg]
-        assert dict(of.values)[f'{name}: force (N)'] == f'{force:.6g}'
+        assert dict(of.values)[f'{name}: force demanded (N)'] == f'{force:.6g}'
         assert (f'{name}: force {force:.6g} N is {abs(force) - 100.0:.6g} N beyond '
                 'limits.force_max, clipped') in of.message
 

@@ -420,7 +420,8 @@ def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: Dynam
     worst = int(np.argmax(result.forces))
     assert (f'leg_{worst + 1}: force {result.forces[worst]:.6g} N is '
             f'{result.forces[worst] - 6000.0:.6g} N beyond limits.force_max, clipped') in message
-    assert node.values('limits')[f'leg_{worst + 1}: force (N)'] == f'{result.forces[worst]:.6g}'
+    key = f'leg_{worst + 1}: force demanded (N)'
+    assert node.values('limits')[key] == f'{result.forces[worst]:.6g}'
     node.answer(MOVING)
     node.until_status('limits', OK, '')
 
@@ -502,7 +503,7 @@ def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
     node = start(command=WITHOUT_EVENTS if executor == 'single-threaded' else None,
                  NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
     node.until_active()
-    key = 'refused, setpoint: passed over: the node had fallen behind'
+    key = 'refused, setpoint: passed over: more came at once than can be answered'
     sent = passed = 0
     while not passed:
         stamps = [node.stamp() for _ in range(500)]
@@ -723,6 +724,10 @@ def test_a_payload_is_picked_up_while_active(as_before: DynamicsNode) -> None:
     assert ask(mass=150.0) == [True]
     lighter = StewartPlatform(laden.parameters.replaced({'platform.mass': 150.0}))
     node.answer(MOVING, platform=lighter)
+    # Each change is logged, and what can hardly be meant.
+    assert 'platform.mass: 210.0 -> 150.0' in node.program.stderr
+    assert ask(mass=150000.0) == [True]
+    node.until(lambda: 'cannot carry the platform' in node.program.stderr, 'it is doubted')
 
 
 def test_thresholds_change_while_active(as_before: DynamicsNode) -> None:

@@ -148,6 +148,8 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
             'no level pose has all legs within; the base joints are 0.9 m']),
     'a longest leg in dm': ({'limits.length_min': (), 'limits.length_max': 0.165}, [
         'limits.length_max: [0.165] m: no level pose has all legs within']),
+    'forces in kN': ({'limits.force_max': 0.2}, [
+        'limits.force_max: [0.2] N: six such legs cannot carry the platform, 1.47e+03 N: in kN?']),
     'the zero length in mm': ({'geometry.zero_length': 950.0}, [
         'geometry.zero_length: 950 m, but the joints are 0.9 m from their center: in mm?']),
     'the zero length in mm, no limits': ({'geometry.zero_length': 950.0, **NO_LIMITS}, [
@@ -275,3 +277,11 @@ def test_of_whatever_passes_the_rules_there_are_words(
     for doubt in doubts(parameters):
         assert doubt.isprintable()
         assert len(doubt) < 500
+
+
+def test_of_a_payload_what_is_said_is_what_is_said_of_the_machine() -> None:
+    p = PLATFORM.replaced({'platform.inertia': [1e9, 0.0, 0.0, 1e9, 0.0, 1e9],
+                           'limits.length_max': 0.165, 'limits.length_min': ()})
+    said, of_payload = doubts(p), doubts(p, geometry=False)
+    assert len(said) > len(of_payload) == 1
+    assert said[:1] == of_payload
