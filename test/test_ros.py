@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import gc
 import math
 import sys
 from typing import Any
@@ -85,6 +86,10 @@ def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
         for node in nodes:
             node.destroy_node()
     context.try_shutdown()
+    # Others see the nodes until the last that refers to them is gone.
+    made.clear()
+    context.destroy()
+    gc.collect()
 
 
 SERVICES = {'describe_parameters': DescribeParameters, 'set_parameters': SetParameters}
