@@ -34,14 +34,12 @@ from typing import Any
 from geometry_msgs.msg import AccelStamped, PoseStamped, Transform, Twist, TwistStamped
 from lifecycle_msgs.srv import GetState
 import numpy as np
+from pass_through import spin, TOPICS
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParametersAtomically
 import rclpy
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
-from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
@@ -50,9 +48,6 @@ from stewart_dynamics.rotation import to_quaternion
 from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
 
 QOS = QoSProfile(depth=2000)
-TOPICS: dict[str, dict[str, Any]] = {
-    'separate': {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped},
-    'combined': {'combined': MultiDOFJointTrajectory}}
 PERIOD = 1_000_000  # [ns]
 FIRST_STAMP = 1_700_000_000_000_000_000
 DISCOVERY_SECONDS = 60.0
@@ -200,19 +195,6 @@ def wait_for(condition: Any, what: str) -> None:
         if time.monotonic() > end:
             raise SystemExit(f'not within {DISCOVERY_SECONDS:g} s: {what}')
         time.sleep(0.05)
-
-
-def spin(node: Any) -> None:
-    """Spin until a signal."""
-    executor = EventsExecutor()
-    executor.add_node(node)
-    try:
-        while rclpy.ok():
-            executor.spin_until_future_complete(Future(), 10.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        executor.shutdown()
 
 
 def main() -> None:

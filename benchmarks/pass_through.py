@@ -38,8 +38,9 @@ from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 QOS = QoSProfile(depth=1000)
-SEPARATE = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
-COMBINED = {'combined': MultiDOFJointTrajectory}
+TOPICS: dict[str, dict[str, Any]] = {
+    'separate': {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped},
+    'combined': {'combined': MultiDOFJointTrajectory}}
 WAITING = 100  # samples of a topic, before the oldest is dropped
 
 
@@ -73,7 +74,7 @@ class PassThrough(Node):
             self.create_publisher(kind, f'~/{topic}', 10) for kind, topic in (
                 (JointState, 'leg_states'), (Float64MultiArray, 'leg_lengths'),
                 (Float64MultiArray, 'leg_forces'), (Float64, 'jacobian_determinant')))
-        topics = SEPARATE if source == 'separate' else COMBINED
+        topics = TOPICS[source]
         self._topics = len(topics)
         for topic, kind in topics.items():
             self.create_subscription(
@@ -110,12 +111,10 @@ class PassThrough(Node):
         self._determinant.publish(self._one_bytes)
 
 
-def main() -> None:
-    """Run it until a signal: name, source, typed or serialized."""
-    name, source, how = sys.argv[1:4]
-    rclpy.init(args=[])
+def spin(node: Node) -> None:
+    """Spin until a signal."""
     executor = EventsExecutor()
-    executor.add_node(PassThrough(name, source, how == 'serialized'))
+    executor.add_node(node)
     try:
         while rclpy.ok():
             executor.spin_until_future_complete(Future(), 10.0)
@@ -123,7 +122,14 @@ def main() -> None:
         pass
     finally:
         executor.shutdown()
-        rclpy.try_shutdown()
+
+
+def main() -> None:
+    """Run it until a signal: name, source, typed or serialized."""
+    name, source, how = sys.argv[1:4]
+    rclpy.init(args=[])
+    spin(PassThrough(name, source, how == 'serialized'))
+    rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

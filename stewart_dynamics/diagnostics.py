@@ -129,7 +129,7 @@ class Diagnostics:
         self._answered = 0
         self._answered_at = now
         self._output: Output | None = None
-        self._second = self._second_before = _Second(now)
+        self._second, self._second_before = _Second(now), _Second(now)
         self._refused, self._singularity, self._limits, self._timing = (
             _Held(), _Held(), _Held(), _Held())
         self._levels: tuple[int, ...] = ()
@@ -180,8 +180,6 @@ class Diagnostics:
     @property
     def _processing(self) -> list[float]:
         """Return the processing times of the last one or two seconds."""
-        if self._second is self._second_before:
-            return self._second.processing
         return self._second_before.processing + self._second.processing
 
     def _limits_of(self, output: Output) -> Level:
