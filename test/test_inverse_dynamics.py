@@ -494,7 +494,7 @@ def test_no_samples_give_no_results() -> None:
 
 
 @pytest.mark.parametrize(('wrench', 'text'), [
-    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'must broadcast'),
+    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'do not fit'),
     ('push', 'not an array of numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
 ])
 def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
