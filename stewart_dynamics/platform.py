@@ -197,9 +197,9 @@ class StewartPlatform:
         Raises
         ------
         PoseError
-            The lengths belong to no pose that can be reached from the guess.
+            The lengths belong to no pose on the guess's side of singularities.
         SingularityError
-            A pose on the way from the guess is singular, or lies beyond a singularity.
+            The guess is singular, or a pose on the way from it.
         MotionError
             What is given does not fit or is not finite.
 
@@ -217,10 +217,11 @@ class StewartPlatform:
             where = (f'sample {at}: lengths {wanted[at].tolist()} m: from the guess '
                      f'{rows[at, :3].tolist()} m')
             if codes[at] == forward_kinematics.SINGULAR:
-                raise SingularityError(f'{where} the way leads through a singularity: give a '
-                                       'guess on the side that is meant')
-            raise PoseError(f'{where} no pose is found: after {steps[at]} steps a length is '
-                            f'{residuals[at]:.3g} m off, must be {forward_kinematics.RESIDUAL:g}')
+                raise SingularityError(f'{where} the way leads to a singular pose, in '
+                                       f'{steps[at]} steps: give a guess clear of it')
+            raise PoseError(
+                f'{where} no pose is found that has them: after {steps[at]} steps a length is '
+                f'{residuals[at]:.3g} m off, must be {forward_kinematics.RESIDUAL:g}')
         return Pose(rows[:, :3].reshape(*shape, 3).copy(),
                     rows[:, 3:12].reshape(*shape, 3, 3).copy())
 
