@@ -21,9 +21,10 @@ from pathlib import Path
 import re
 import xml.etree.ElementTree as ElementTree
 
+import numpy as np
 import pytest
 
-from stewart_dynamics import setpoints, step
+from stewart_dynamics import plant, setpoints, step
 from stewart_dynamics.parameters import PARAMETERS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -40,19 +41,23 @@ def test_tables_of_parameters_are_those_of_the_code(monkeypatch: pytest.MonkeyPa
 
 
 def test_topics_are_those_of_the_code() -> None:
-    for topic, kind in {**setpoints.INPUT_TYPES, **step.OUTPUT_TYPES}.items():
+    for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
+                        *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
 
 
-def test_the_example_runs(
+def test_the_examples_run(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     blocks = re.findall(r'```python\n(.*?)```', README, flags=re.DOTALL)
-    assert len(blocks) == 1
+    assert len(blocks) == 2
     monkeypatch.chdir(ROOT)
-    exec(compile(blocks[0], 'README.md', 'exec'), {})
+    exec(compile(''.join(blocks), 'README.md', 'exec'), {})
     printed = capsys.readouterr().out.split('\n')
     assert len(printed[0].strip('[] ').split()) == 6
     assert 1.0 < float(printed[1]) < 20.0
+    assert float(printed[2]) < 1e-12
+    assert float(printed[3].strip('[] ').split()[2]) == pytest.approx(1.1, abs=1e-3)
+    assert float(printed[4].strip('[] ').split()[2]) == pytest.approx(-0.1 * np.pi, abs=1e-3)
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
