@@ -49,14 +49,13 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from tqdm import tqdm
-from trajectory_msgs.msg import MultiDOFJointTrajectory
 import yaml
 
 from stewart_dynamics import cdr, Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.rotation import from_quaternion
-from stewart_dynamics.trajectory import motion_at, sample_count, TrajectoryParameters
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -129,8 +128,7 @@ class Recorder(Node):
 
     def __init__(self) -> None:
         super().__init__('recorder')
-        self._active = False
-        self.setpoints = self._kept(MultiDOFJointTrajectory, f'{NODE}/setpoint/combined')
+        self._readers = 0
         self.desired = self._kept(JointState, f'{NODE}/leg_states')
         self.measured = self._kept(JointState, f'{SIMULATOR}/leg_states')
         self.poses = self._kept(PoseStamped, f'{SIMULATOR}/pose')
@@ -142,43 +140,45 @@ class Recorder(Node):
         return messages
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        self._active = True  # the node reports as soon as it is
+        for status in message.status:
+            for pair in status.values:
+                if pair.key == 'leg_states: readers':
+                    self._readers = int(pair.value)
 
     def ready(self) -> bool:
-        """Return whether node, simulator and controller are there."""
-        return (self._active and len(self.measured) > 0
-                # the controller beside this one
-                and self.count_subscribers(f'{NODE}/leg_states') > 1
-                and self.count_subscribers(f'{SIMULATOR}/leg_states') > 1
-                and self.count_publishers(f'{SIMULATOR}/commands') > 0)
+        """
+        Return whether node and simulator are there, and the node's answers are heard.
+
+        Each answer comes once: the node itself must know this one and the controller. All else
+        is said again, or waited for, until it is heard.
+        """
+        return self._readers > 1 and len(self.measured) > 0 and len(self.poses) > 0
 
     def complete(self, setpoints: int) -> bool:
         """Return whether all has come of so many setpoints."""
-        return (min(len(self.setpoints), len(self.desired)) >= setpoints
+        return (len(self.desired) >= setpoints
                 and min(_stamp(self.measured[-1]), _stamp(self.poses[-1]))
                 >= _stamp(self.desired[-1]))
 
-    def errors(self) -> Errors:
-        """Return the errors; Failure where something was not measured or not desired."""
+    def errors(self, wanted: Motion) -> Errors:
+        """Return the errors of a motion (N,); Failure where something has not come."""
         desired, measured = _lengths(self.desired), _lengths(self.measured)
-        wanted, found = ({stamp: numbers[:7] for stamp, _, numbers in map(read, messages)}
-                         for read, messages in ((cdr.combined, self.setpoints),
-                                                (cdr.pose, self.poses)))
-        stamps = sorted(wanted)
-        missing = [stamp for stamp in stamps
-                   if not all(stamp in each for each in (desired, measured, found))]
-        if missing:
-            raise Failure(f'{len(missing)} of {len(stamps)} setpoints cannot be compared, the '
-                          f'first that of {missing[0] * 1e-9:.3f} s')
-        poses, true = (np.array([each[stamp] for stamp in stamps]) for each in (wanted, found))
-        turned = _rotations(poses).swapaxes(1, 2) @ _rotations(true)
+        poses = {stamp: numbers for stamp, _, numbers in map(cdr.pose, self.poses)}
+        stamps = sorted(desired)
+        missing = sum(stamp not in measured or stamp not in poses for stamp in stamps)
+        if missing or len(stamps) != len(wanted.rows):
+            raise Failure(f'of {len(wanted.rows)} setpoints {len(stamps)} were answered, and '
+                          f'{missing} of these were not measured')
+        true = np.array([poses[stamp] for stamp in stamps])
+        rotation = np.moveaxis(np.reshape(from_quaternion(*true[:, 3:].T), (3, 3, -1)), -1, 0)
+        turned = wanted.rotation.swapaxes(1, 2) @ rotation
         # By the sine: no angle below 1e-8 is seen in the cosine.
         sine = 0.5 * np.linalg.norm(turned[:, [2, 0, 1], [1, 2, 0]]
                                     - turned[:, [1, 2, 0], [2, 0, 1]], axis=1)
         return Errors(
             (np.array(stamps) - stamps[0]) * 1e-9,
             1e6 * np.array([measured[stamp] - desired[stamp] for stamp in stamps]),
-            1e6 * np.linalg.norm(true[:, :3] - poses[:, :3], axis=1),
+            1e6 * np.linalg.norm(true[:, :3] - wanted.position, axis=1),
             1e6 * np.arcsin(np.minimum(sine, 1.0)))
 
 
@@ -192,11 +192,6 @@ def _lengths(messages: Sequence[bytes]) -> dict[int, Array]:
     """Return the legs' positions (6,) [m] by their stamp."""
     return {_stamp(data): np.array(deserialize_message(data, JointState).position)
             for data in messages}
-
-
-def _rotations(poses: Array) -> Array:
-    """Return (N, 3, 3) of rows of position and quaternion."""
-    return np.moveaxis(np.reshape(from_quaternion(*poses[:, 3:].T), (3, 3, -1)), -1, 0)
 
 
 class Program:
@@ -256,7 +251,8 @@ class Loop:
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
                       'motion.duration': seconds}
         settings = TrajectoryParameters.from_yaml(motion).replaced(trajectory, str(motion))
-        self.setpoints = sample_count(settings)
+        self._motion = motion_at(settings, sample_times(settings) * 1e-9)
+        self.setpoints = len(self._motion.rows)
         start = motion_at(settings, 0.0)
         if np.abs([start.linear_velocity, start.angular_velocity]).max() > 1e-9:
             raise Failure(f'{motion}: must begin at rest, as the simulator does')
@@ -324,7 +320,7 @@ class Loop:
                 executor.shutdown()
                 recorder.destroy_node()
         tell(self.setpoints)
-        return Run(feed_forward, payload, recorder.errors())
+        return Run(feed_forward, payload, recorder.errors(self._motion))
 
 
 def leg_mass(platform: StewartPlatform, motion: Motion) -> float:

@@ -69,6 +69,9 @@ _TYPES: dict[str, Any] = {
 _QUEUE = 1000
 _BACKLOG = 100
 
+# What controllers read; in the diagnostics stands how many do.
+_READ = ('leg_states', 'leg_forces')
+
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0
 
@@ -379,6 +382,8 @@ class DynamicsNode(LifecycleNode):
         full_name = self.get_fully_qualified_name()
         self._diagnostics.writers = {topic: self.count_publishers(name)
                                      for topic, name in self._topic_names.items()}
+        self._diagnostics.readers = {
+            topic: self._publishers_of[topic].get_subscription_count() for topic in _READ}
         self._diagnostics.namesakes = full_name, self.get_node_names_and_namespaces().count(
             (self.get_name(), self.get_namespace()))
         name = full_name.lstrip('/')
