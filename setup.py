@@ -88,6 +88,7 @@ setup(
         *[(f'{share}/{bag}', sorted(glob(f'{bag}/*'))) for bag in sorted(glob('bags/*/'))
           if not bag.startswith('bags/__')],
         (f'{share}/config', sorted(glob('config/*.yaml'))),
+        (f'{share}/examples', sorted(glob('examples/*.py'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),
         (f'{share}/security', sorted(glob('security/*'))),

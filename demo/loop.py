@@ -65,6 +65,7 @@ Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent
 NODE, SIMULATOR = '/stewart_dynamics', '/stewart_simulator'
 QOS = QoSProfile(depth=1000)
+BEGIN = 1_000_000_000  # of simulated time [ns]
 RATE = 1000.0  # of setpoints, states and commands [Hz]
 HEAVIER = 1.3
 # Nothing takes so long on a computer at rest, though two programs compile first [s].
@@ -124,13 +125,12 @@ class Run(NamedTuple):
 
 
 class Recorder(Node):
-    """Keeps what is desired and what is measured, as it comes."""
+    """Keeps what is measured, as it comes."""
 
     def __init__(self) -> None:
         super().__init__('recorder')
         self._readers = 0
-        self.desired = self._kept(JointState, f'{NODE}/leg_states')
-        self.measured = self._kept(JointState, f'{SIMULATOR}/leg_states')
+        self.states = self._kept(JointState, f'{SIMULATOR}/leg_states')
         self.poses = self._kept(PoseStamped, f'{SIMULATOR}/pose')
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
 
@@ -147,28 +147,28 @@ class Recorder(Node):
 
     def ready(self) -> bool:
         """
-        Return whether node and simulator are there, and the node's answers are heard.
+        Return whether the simulator is heard and the controller hears the node.
 
-        Each answer comes once: the node itself must know this one and the controller. All else
-        is said again, or waited for, until it is heard.
+        The node answers each setpoint once, so it must know the controller before the first. All
+        else is said again, or waited for, until it is heard.
         """
-        return self._readers > 1 and len(self.measured) > 0 and len(self.poses) > 0
+        return self._readers > 0 and bool(self.states) and bool(self.poses)
 
-    def complete(self, setpoints: int) -> bool:
-        """Return whether all has come of so many setpoints."""
-        return (len(self.desired) >= setpoints
-                and min(_stamp(self.measured[-1]), _stamp(self.poses[-1]))
-                >= _stamp(self.desired[-1]))
+    @property
+    def time(self) -> int:
+        """How far simulated time has come since it began [ns]."""
+        last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
+        return max(last - BEGIN, 0)
 
-    def errors(self, wanted: Motion) -> Errors:
-        """Return the errors of a motion (N,); Failure where something has not come."""
-        desired, measured = _lengths(self.desired), _lengths(self.measured)
+    def errors(self, times: NDArray[np.int64], lengths: Array, wanted: Motion) -> Errors:
+        """Return how far this is from a motion (N,) and its leg positions (N, 6) by its times."""
+        states = {_stamp(data): np.array(deserialize_message(data, JointState).position)
+                  for data in self.states}
         poses = {stamp: numbers for stamp, _, numbers in map(cdr.pose, self.poses)}
-        stamps = sorted(desired)
-        missing = sum(stamp not in measured or stamp not in poses for stamp in stamps)
-        if missing or len(stamps) != len(wanted.rows):
-            raise Failure(f'of {len(wanted.rows)} setpoints {len(stamps)} were answered, and '
-                          f'{missing} of these were not measured')
+        stamps = (BEGIN + times).tolist()
+        missing = sum(stamp not in states or stamp not in poses for stamp in stamps)
+        if missing:
+            raise Failure(f'{missing} of {len(stamps)} states have not come')
         true = np.array([poses[stamp] for stamp in stamps])
         rotation = np.moveaxis(np.reshape(from_quaternion(*true[:, 3:].T), (3, 3, -1)), -1, 0)
         turned = wanted.rotation.swapaxes(1, 2) @ rotation
@@ -176,8 +176,7 @@ class Recorder(Node):
         sine = 0.5 * np.linalg.norm(turned[:, [2, 0, 1], [1, 2, 0]]
                                     - turned[:, [1, 2, 0], [2, 0, 1]], axis=1)
         return Errors(
-            (np.array(stamps) - stamps[0]) * 1e-9,
-            1e6 * np.array([measured[stamp] - desired[stamp] for stamp in stamps]),
+            times * 1e-9, 1e6 * (np.array([states[stamp] for stamp in stamps]) - lengths),
             1e6 * np.linalg.norm(true[:, :3] - wanted.position, axis=1),
             1e6 * np.arcsin(np.minimum(sine, 1.0)))
 
@@ -186,12 +185,6 @@ def _stamp(message: bytes) -> int:
     """Return the stamp of any message with a header, from this computer [ns]."""
     sec, nanosec = struct.unpack_from('<iI', message, 4)
     return int(sec) * 1_000_000_000 + int(nanosec)
-
-
-def _lengths(messages: Sequence[bytes]) -> dict[int, Array]:
-    """Return the legs' positions (6,) [m] by their stamp."""
-    return {_stamp(data): np.array(deserialize_message(data, JointState).position)
-            for data in messages}
 
 
 class Program:
@@ -242,7 +235,7 @@ class Loop:
         Natural frequency [Hz] of a leg under PD control, with a damping ratio of 1, and with the
         mass that it moves at the start while the other five hold still.
 
-    Raises Failure for a motion that does not begin at rest.
+    Raises Failure for a motion that does not begin at rest, and no bandwidth.
 
     """
 
@@ -251,12 +244,17 @@ class Loop:
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
                       'motion.duration': seconds}
         settings = TrajectoryParameters.from_yaml(motion).replaced(trajectory, str(motion))
-        self._motion = motion_at(settings, sample_times(settings) * 1e-9)
-        self.setpoints = len(self._motion.rows)
+        platform = StewartPlatform(parameters)
+        self.times = sample_times(settings)
+        self._motion = motion_at(settings, self.times * 1e-9)
+        self._lengths = platform.inverse_kinematics(
+            self._motion.position, self._motion.rotation) - parameters['geometry.zero_length']
+        if not 0.0 < bandwidth < math.inf:
+            raise Failure(f'bandwidth: {bandwidth} Hz: must be more than 0')
         start = motion_at(settings, 0.0)
         if np.abs([start.linear_velocity, start.angular_velocity]).max() > 1e-9:
             raise Failure(f'{motion}: must begin at rest, as the simulator does')
-        self.bandwidth, self.leg_mass = bandwidth, leg_mass(StewartPlatform(parameters), start)
+        self.bandwidth, self.leg_mass = bandwidth, leg_mass(platform, start)
         omega = 2.0 * math.pi * bandwidth
         self.gains = {'proportional_gain': self.leg_mass * omega ** 2,
                       'derivative_gain': 2.0 * self.leg_mass * omega}
@@ -272,7 +270,7 @@ class Loop:
             'stewart_trajectory': {'use_sim_time': True, **trajectory}}
 
     def run(self, feed_forward: bool, payload: float, tell: Callable[[int], object]) -> Run:
-        """Run the four programs, telling how many setpoints are done, and return the errors."""
+        """Run the four programs, telling how far time is [ns], and return the errors."""
         mass, inertia = self._machine
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
         given['leg_controller']['ros__parameters']['feed_forward'] = feed_forward
@@ -284,7 +282,7 @@ class Loop:
         programs: list[Program] = []
 
         def until(done: Callable[[], bool]) -> None:
-            many, since, looked = 0, time.monotonic(), 0.0
+            reached, since, looked = 0, time.monotonic(), 0.0
             while not done():
                 executor.spin_once(timeout_sec=LOOK)
                 now = time.monotonic()
@@ -293,13 +291,12 @@ class Loop:
                 looked = now
                 for program in programs:
                     program.check()
-                if many != (many := len(recorder.desired)):
+                if reached != (reached := recorder.time):
                     since = now
-                    tell(many)
+                    tell(reached)
                 if now - since > PATIENCE:
-                    raise Failure(f'nothing has come for {PATIENCE:g} s, {many} of '
-                                  f'{self.setpoints} setpoints are done; ' + '; '.join(
-                                      f'{each.name}: {each.last_line}' for each in programs))
+                    raise Failure(f'stands still at {reached * 1e-9:.3f} s; ' + '; '.join(
+                        f'{each.name}: {each.last_line}' for each in programs))
 
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / 'given.yaml'
@@ -311,7 +308,7 @@ class Loop:
                     arguments = [part for path in (*self._files.get(name, ()), file)
                                  for part in ('--params-file', path)]
                     programs.append(Program(name, ['--ros-args', *arguments], Path(folder)))
-                until(lambda: recorder.complete(self.setpoints))
+                until(lambda: recorder.time >= self.times[-1])
             finally:
                 for program in programs:
                     program.stop()
@@ -319,8 +316,9 @@ class Loop:
                     program.wait()
                 executor.shutdown()
                 recorder.destroy_node()
-        tell(self.setpoints)
-        return Run(feed_forward, payload, recorder.errors(self._motion))
+        tell(int(self.times[-1]))
+        return Run(feed_forward, payload, recorder.errors(
+            self.times, self._lengths, self._motion))
 
 
 def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
@@ -374,7 +372,7 @@ def draw(path: Path, runs: Sequence[Run]) -> None:
 
 def summary(loop: Loop, runs: Sequence[Run]) -> dict[str, Any]:
     """Return the figures of all runs."""
-    return {'setpoints': loop.setpoints, 'rate [Hz]': RATE, 'bandwidth [Hz]': loop.bandwidth,
+    return {'setpoints': len(loop.times), 'rate [Hz]': RATE, 'bandwidth [Hz]': loop.bandwidth,
             'leg mass [kg]': loop.leg_mass, **loop.gains, 'units': UNITS,
             'runs': [{'feed_forward': run.feed_forward, 'payload': run.payload, 'rms': run.rms,
                       'peak': run.peak} for run in runs]}
@@ -411,8 +409,9 @@ def main() -> None:
                     progress.set_description_str(
                         f'{"PD + forces" if feed_forward else "PD alone"}, {machine(payload)}')
                     before = len(runs) * options.seconds
-                    runs.append(loop.run(feed_forward, payload, lambda many, before=before: (
-                        progress.update(before + min(many / RATE, options.seconds) - progress.n))))
+                    runs.append(loop.run(feed_forward, payload, lambda reached, before=before: (
+                        progress.update(before + min(reached * 1e-9, options.seconds)
+                                        - progress.n))))
         print(f'\n{table(runs)}\n')
         draw(options.output / 'loop.png', runs)
         (options.output / 'loop.json').write_text(
