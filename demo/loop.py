@@ -335,7 +335,8 @@ def _angles(r: Array) -> list[float]:
 
 def machine(payload: float) -> str:
     """Return in words what the simulator's machine is to the node."""
-    return 'as the node believes' if payload == 1.0 else f'payload {payload - 1.0:+.0%}'
+    more = 100.0 * (payload - 1.0)
+    return f'payload {more:+.0f} %' if more else 'as the node believes'
 
 
 def table(runs: Sequence[Run]) -> str:

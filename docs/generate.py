@@ -105,13 +105,18 @@ def loop_table(figures: dict[str, Any]) -> str:
     runs = figures['runs']
     for pd, forward in zip(runs[::2], runs[1::2], strict=True):
         payload = pd['payload'] - 1.0
-        line = f'| payload {payload:+.0%} |' if payload else '| as the node believes |'
+        line = f'| payload {100.0 * payload:+.0f} % |' if payload else '| as the node believes |'
         for name in ('all legs', 'position'):
             for run in (pd, forward):
-                line += f' {run["rms"][name]:.3g} ({run["peak"][name]:.3g}) |'
+                line += f' {_figure(run["rms"][name])} ({_figure(run["peak"][name])}) |'
             line += f' 1/{pd["rms"][name] / forward["rms"][name]:.0f} |'
         lines.append(line)
     return '\n'.join(lines)
+
+
+def _figure(number: float) -> str:
+    """Return three digits of a number, or all before its point."""
+    return f'{number:.0f}' if number >= 100.0 else f'{number:.3g}'
 
 
 class Recorded(NamedTuple):
