@@ -159,7 +159,28 @@ def _sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[i
     return number, begin + 4
 
 
+def float64_values(data: bytes) -> tuple[float, ...]:
+    """Read a std_msgs/Float64MultiArray: its numbers, whatever layout it claims."""
+    try:
+        order = data[1]
+        count = _COUNT[order]
+        dimensions, at = _sequence(data, 4, count, [])
+        for _ in range(dimensions):
+            size, at = _sequence(data, at, count, [])
+            at = (at + size + 3 & ~3) + 8
+        # data_offset comes before the numbers
+        number, at = _sequence(data, (at + 3 & ~3) + 4, count, [])
+        values: tuple[float, ...] = Struct(f'{"<" if order else ">"}{number}d').unpack_from(
+            data, _aligned8(at) if number else at)
+    except (IndexError, KeyError, StructError) as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    if data[0] != 0:
+        raise MalformedError(f'encapsulation {data[:2].hex()} is not plain CDR')
+    return values
+
+
 _FLOAT64 = Struct('<4sd')
+_CLOCK = Struct('<4siI')
 _BOOL = Struct('<4s?')
 # an empty layout's two numbers, the number of entries, and what aligns them
 _FLOAT64_ARRAY = Struct('<4sIII4x6d')
@@ -174,6 +195,11 @@ def float64(value: float) -> bytes:
 def boolean(value: bool) -> bytes:
     """Write a std_msgs/Bool."""
     return _BOOL.pack(LITTLE_ENDIAN, value)
+
+
+def clock(stamp: int) -> bytes:
+    """Write a rosgraph_msgs/Clock of a time [ns]."""
+    return _CLOCK.pack(LITTLE_ENDIAN, *divmod(stamp, 1_000_000_000))
 
 
 def float64_array(values: Sequence[float]) -> bytes:
@@ -217,6 +243,21 @@ def _put_text(body: bytearray, text: str) -> None:
     encoded = text.encode() + b'\x00'
     _put_count(body, len(encoded))
     body += encoded
+
+
+class Numbers:
+    """Writes PoseStamped (7 numbers), TwistStamped or AccelStamped (6) of geometry_msgs."""
+
+    def __init__(self, frame: str, number: int) -> None:
+        self._frame = frame.encode() + b'\x00'
+        size = len(self._frame)
+        self._whole = Struct(f'<4siII{size}s{_aligned8(16 + size) - 16 - size}x{number}d')
+
+    def write(self, stamp: int, values: Sequence[float]) -> bytes:
+        """Return the message."""
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        return self._whole.pack(
+            LITTLE_ENDIAN, sec, nanosec, len(self._frame), self._frame, *values)
 
 
 class JointState:
