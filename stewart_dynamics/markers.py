@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from stewart_dynamics.cdr import LITTLE_ENDIAN
 from stewart_dynamics.diagnostics import ERROR, OK, singularity_level, WARN
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.plausibility import level_axes
 from stewart_dynamics.rotation import quaternion_of
 from stewart_dynamics.step import Output, Six
 
@@ -90,6 +91,8 @@ class Markers:
 
     """
 
+    # Near the end of what a double holds sizes overflow: nothing is answered there, nor drawn.
+    @np.errstate(all='ignore')
     def __init__(self, parameters: Parameters) -> None:
         self._names = parameters['joints']
         self._base = parameters['geometry.base_joints']
@@ -111,7 +114,7 @@ class Markers:
         axes[[1, 3, 5], [0, 1, 2]] = _AXIS * size
         self._stamps: list[int] = []
         self._body = bytearray(LITTLE_ENDIAN)
-        self._put(4, 'I', 24)
+        self._put(4, 'I', 0)  # how many there are
         self._marker('base', 0, _TRIANGLE_LIST, _BASE, points=_plate(self._base, thickness))
         self._marker('base', 1, _SPHERE_LIST, _JOINT, ball, self._base)
         outside = self._base + _NAME_OUTSIDE * (self._base - self._base.mean(axis=0))
@@ -126,6 +129,7 @@ class Markers:
         self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, _CYLINDER,
                                      NO_FORCE) for n in range(12)]
         self._text = self._marker('singularity', 0, _TEXT, _WHITE, text_size)
+        _COUNT.pack_into(self._body, len(LITTLE_ENDIAN), len(self._stamps))
         # Its text is of any length: what stands before it is kept, and what behind it.
         self._end = bytes(self._body[-_BEHIND_TEXT:])
         del self._body[-_BEHIND_TEXT - 8:]
@@ -270,11 +274,10 @@ def _between(first: Color, last: Color, share: float) -> Color:
 def _plate(joints: Array, thickness: float) -> Array:
     """Return the corners (72, 3) of the triangles of a plate through joints (6, 3), outside up."""
     center = joints.mean(axis=0)
-    u, v, normal = np.linalg.svd(joints - center)[2]
-    normal = np.cross(u, v)  # of a right-handed frame: counterclockwise as seen from outside
-    around = np.argsort(np.arctan2((joints - center) @ v, (joints - center) @ u))
+    first, second, normal = level_axes(joints - center)
+    around = np.argsort(np.arctan2((joints - center) @ second, (joints - center) @ first))
     up = 0.5 * thickness * normal
-    rim = joints[around]
+    rim = joints[around]  # counterclockwise as seen from the normal's end
     triangles = []
     for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
         triangles += [center + up, a + up, b + up, center - up, b - up, a - up,

@@ -369,6 +369,19 @@ def test_whatever_is_answered_the_picture_has_only_numbers() -> None:
     assert drawn > 100
 
 
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('size', [1e-150, 1e-20, 1e20, 1e150, 1e160, 1e307])
+@pytest.mark.parametrize('joints', [
+    MACHINE['geometry.base_joints'], np.zeros((6, 3)), np.outer(np.arange(6.0), [1.0, 2.0, 3.0])],
+    ids=['as they are', 'one point', 'a line'])
+def test_no_machine_is_too_strange_to_be_drawn(joints: Array, size: float) -> None:
+    with np.errstate(all='ignore'):
+        parameters = MACHINE.replaced({
+            'geometry.base_joints': size * joints,
+            'geometry.platform_joints': size * MACHINE['geometry.platform_joints']})
+    Markers(parameters)
+
+
 # The node
 
 def _look(node: DynamicsNode) -> list[Any]:
