@@ -388,8 +388,8 @@ class DynamicsNode(LifecycleNode):
             self.get_logger().warning(line)
         if not self._active:
             return
+        self._draw(now)  # the last answer before a silence
         # While setpoints are answered it is done behind an answer, when time is left for it.
-        self._draw(now)
         due = (now - self._answered_at >= _WATCH_SECONDS
                and now - self._reported >= _REPORT_SECONDS - 0.5 * _WATCH_SECONDS)
         if due or self._diagnostics.level_changed(now):
