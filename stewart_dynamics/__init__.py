@@ -16,11 +16,12 @@
 
 from stewart_dynamics.causes import CAUSES, ForceCauses
 from stewart_dynamics.errors import (
-    BagError, MotionError, ParameterError, SingularityError, StewartError)
+    BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
 from stewart_dynamics.motion import Motion
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.platform import InverseDynamics, StewartPlatform
+from stewart_dynamics.platform import InverseDynamics, Pose, StewartPlatform
 
 __all__ = [
     'BagError', 'CAUSES', 'ForceCauses', 'InverseDynamics', 'Motion', 'MotionError',
-    'ParameterError', 'Parameters', 'SingularityError', 'StewartError', 'StewartPlatform']
+    'ParameterError', 'Parameters', 'Pose', 'PoseError', 'SingularityError', 'StewartError',
+    'StewartPlatform']

@@ -32,6 +32,10 @@ class MotionError(StewartError):
     """A motion's arrays do not fit each other, or hold what is no pose, twist or acceleration."""
 
 
+class PoseError(StewartError):
+    """Leg lengths that belong to no pose near the one guessed."""
+
+
 class SingularityError(StewartError):
     """A pose in which no leg forces balance the load."""
 

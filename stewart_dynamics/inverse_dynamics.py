@@ -78,7 +78,33 @@ _MOST_STEPS = 64
 
 
 @inlined
-def _leg(
+def leg_line(
+        machine: Array, leg: int, position: Vector3, rotation: Matrix3,
+) -> tuple[Vector3, float, float, Vector3]:
+    """Return a leg's a = R p, its length, one by its length (0 where it has none), s: (1), (2)."""
+    o = BODY + leg * LEG
+    base_joint = machine[o], machine[o + 1], machine[o + 2]
+    a = rotate(rotation, (machine[o + 3], machine[o + 4], machine[o + 5]))
+    leg_vector = subtract(add(position, a), base_joint)
+    length = math.sqrt(dot(leg_vector, leg_vector))
+    inverse_length = 1.0 / length if length > 0.0 else 0.0
+    return a, length, inverse_length, scale(inverse_length, leg_vector)
+
+
+@inlined
+def leg_inertia(
+        machine: Array, leg: int, length: float, inverse_length: float) -> tuple[float, float]:
+    """Return m2 c2, c2 = L - S2 [kg m], and what resists motion across a leg, I_e/L^2 + m_ce."""
+    o = BODY + leg * LEG
+    piston_mass, piston_com, joint_inertia = machine[o + 6], machine[o + 7], machine[o + 9]
+    piston_distance = length - piston_com
+    piston_moment = piston_mass * piston_distance
+    return piston_moment, ((joint_inertia + piston_moment * piston_distance)
+                           * inverse_length * inverse_length)
+
+
+@inlined
+def leg_dynamics(
         machine: Array, leg: int, position: Vector3, rotation: Matrix3, velocity: Vector3,
         omega: Vector3, acceleration: Vector3, alpha: Vector3, gravity: Vector3,
         inverse_size: float,
@@ -90,18 +116,10 @@ def _leg(
     length, and that row's time derivative. Equation numbers are the paper's.
     """
     o = BODY + leg * LEG
-    base_joint = machine[o], machine[o + 1], machine[o + 2]
-    platform_joint = machine[o + 3], machine[o + 4], machine[o + 5]
-    piston_mass, piston_com, cylinder_moment, joint_inertia = (
-        machine[o + 6], machine[o + 7], machine[o + 8], machine[o + 9])
+    piston_mass, piston_com, cylinder_moment = machine[o + 6], machine[o + 7], machine[o + 8]
     reflected_mass, viscous, coulomb = machine[o + 10], machine[o + 11], machine[o + 12]
 
-    # (1), (2): the leg, its length and direction
-    a = rotate(rotation, platform_joint)
-    leg_vector = subtract(add(position, a), base_joint)
-    length = math.sqrt(dot(leg_vector, leg_vector))
-    inverse_length = 1.0 / length if length > 0.0 else 0.0
-    s = scale(inverse_length, leg_vector)
+    a, length, inverse_length, s = leg_line(machine, leg, position, rotation)
 
     # the platform joint's velocity and acceleration (x_i', x_i''), along and across the leg
     a_rate = cross(omega, a)
@@ -116,10 +134,7 @@ def _leg(
     across_gravity = subtract(gravity, scale(along_gravity, s))
 
     # M_i, C_i, G_i as model.md has them, with c2 = L - S2; skew(s)^2 y is -(y across the leg)
-    piston_distance = length - piston_com
-    piston_moment = piston_mass * piston_distance
-    inertia = ((joint_inertia + piston_moment * piston_distance)
-               * inverse_length * inverse_length)
+    piston_moment, inertia = leg_inertia(machine, leg, length, inverse_length)
     gravity_mass = (cylinder_moment + piston_moment) * inverse_length
     coriolis_mass = piston_moment * inverse_length - inertia
     force = add(
@@ -143,7 +158,7 @@ def _leg(
 
 
 @inlined
-def _platform(
+def platform_dynamics(
         machine: Array, rotation: Matrix3, omega: Vector3, acceleration: Vector3,
         alpha: Vector3, gravity: Vector3,
 ) -> tuple[Vector3, Vector3]:
@@ -212,21 +227,27 @@ def _dynamics(machine: Array, tile: Array, k: int) -> None:
     acceleration = _vector3(tile, k + 18 * LANES)
     alpha = _vector3(tile, k + 21 * LANES)
 
-    force, moment = _platform(machine, rotation, omega, acceleration, alpha, gravity)
+    force, moment = platform_dynamics(machine, rotation, omega, acceleration, alpha, gravity)
     force = subtract(force, _vector3(tile, k + _WRENCH))
     moment = subtract(moment, _vector3(tile, k + _WRENCH + 3 * LANES))
-    l0, v0, f0, m0, a0, r0, d0 = _leg(machine, 0, position, rotation, velocity, omega,
-                                      acceleration, alpha, gravity, inverse_size)
-    l1, v1, f1, m1, a1, r1, d1 = _leg(machine, 1, position, rotation, velocity, omega,
-                                      acceleration, alpha, gravity, inverse_size)
-    l2, v2, f2, m2, a2, r2, d2 = _leg(machine, 2, position, rotation, velocity, omega,
-                                      acceleration, alpha, gravity, inverse_size)
-    l3, v3, f3, m3, a3, r3, d3 = _leg(machine, 3, position, rotation, velocity, omega,
-                                      acceleration, alpha, gravity, inverse_size)
-    l4, v4, f4, m4, a4, r4, d4 = _leg(machine, 4, position, rotation, velocity, omega,
-                                      acceleration, alpha, gravity, inverse_size)
-    l5, v5, f5, m5, a5, r5, d5 = _leg(machine, 5, position, rotation, velocity, omega,
-                                      acceleration, alpha, gravity, inverse_size)
+    l0, v0, f0, m0, a0, r0, d0 = leg_dynamics(
+        machine, 0, position, rotation, velocity, omega, acceleration, alpha, gravity,
+        inverse_size)
+    l1, v1, f1, m1, a1, r1, d1 = leg_dynamics(
+        machine, 1, position, rotation, velocity, omega, acceleration, alpha, gravity,
+        inverse_size)
+    l2, v2, f2, m2, a2, r2, d2 = leg_dynamics(
+        machine, 2, position, rotation, velocity, omega, acceleration, alpha, gravity,
+        inverse_size)
+    l3, v3, f3, m3, a3, r3, d3 = leg_dynamics(
+        machine, 3, position, rotation, velocity, omega, acceleration, alpha, gravity,
+        inverse_size)
+    l4, v4, f4, m4, a4, r4, d4 = leg_dynamics(
+        machine, 4, position, rotation, velocity, omega, acceleration, alpha, gravity,
+        inverse_size)
+    l5, v5, f5, m5, a5, r5, d5 = leg_dynamics(
+        machine, 5, position, rotation, velocity, omega, acceleration, alpha, gravity,
+        inverse_size)
     force = add(add(add(add(add(add(force, f0), f1), f2), f3), f4), f5)
     moment = scale(inverse_size, add(add(add(add(add(add(moment, m0), m1), m2), m3), m4), m5))
     wrench = force[0], force[1], force[2], moment[0], moment[1], moment[2]

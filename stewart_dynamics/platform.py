@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 import os
 from pathlib import Path
@@ -24,11 +25,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stewart_dynamics import forward_dynamics, forward_kinematics, lagrange
 from stewart_dynamics import inverse_dynamics as runtime
-from stewart_dynamics import lagrange
 from stewart_dynamics.compiled import COMPILED
-from stewart_dynamics.errors import MotionError, SingularityError
-from stewart_dynamics.motion import as_array, Motion
+from stewart_dynamics.errors import MotionError, PoseError, SingularityError
+from stewart_dynamics.motion import as_array, common_shape, Motion
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.singularity import time_to_crossing, UNSOLVABLE_CONDITION
 
@@ -70,6 +71,15 @@ class InverseDynamics(NamedTuple):
     def time_to_crossing(self) -> Array:
         """Time after which det(J) is zero if it goes on as it does, (...) [s]; inf: never."""
         return time_to_crossing(self.determinant, self.determinant_rate)
+
+
+class Pose(NamedTuple):
+    """Where the platform is; (...) is the leading shape."""
+
+    position: Array
+    """Origin of the platform frame in the base frame, (..., 3) [m]."""
+    rotation: Array
+    """Platform axes to base axes, (..., 3, 3)."""
 
 
 class StewartPlatform:
@@ -115,19 +125,8 @@ class StewartPlatform:
         """
         rows, wrenches, shape = self._rows(motion, wrench)
         results = self.solve(rows, wrenches)
-        finite = np.isfinite(results)
-        if not finite.all():
-            at = int(np.argmin(finite.all(axis=-1)))
-            raise MotionError(f'sample {at}: out of range, the numbers overflow; position '
-                              f'{rows[at, :3].tolist()} m')
-        condition = results[:, runtime.CONDITION]
-        unsolvable = condition >= UNSOLVABLE_CONDITION
-        if unsolvable.any():
-            at = int(np.argmax(unsolvable))
-            raise SingularityError(
-                f'sample {at}: J_inv cannot be solved: its condition number is '
-                f'{condition[at]:.3g}, must be under {UNSOLVABLE_CONDITION:g}; position '
-                f'{rows[at, :3].tolist()} m')
+        _check_finite(rows, results)
+        _check_solvable(rows, results)
         return self._named(results.reshape(*shape, runtime.RESULT))
 
     def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
@@ -141,21 +140,103 @@ class StewartPlatform:
         rows = _compiled_for(rows)
         wrenches = self._no_wrench if wrenches is None else _compiled_for(wrenches)
         results = np.empty((len(rows), runtime.RESULT))
-        threads = min(_CPUS, len(rows) // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
-        if threads < 2:
-            runtime.solve(self.machine, rows, wrenches, results)
-            return results
-        # More parts than threads: a thread that is held up leaves more to the others.
-        edges = np.linspace(0, len(rows), _PARTS_OF_A_THREAD * threads + 1).astype(int)
-
-        def part(first: int, end: int) -> None:
-            runtime.solve(self.machine, rows[first:end],
-                          wrenches if len(wrenches) == 1 else wrenches[first:end],
-                          results[first:end])
-
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(part, edges[:-1], edges[1:]))
+        _in_parts(len(rows), lambda part: runtime.solve(
+            self.machine, rows[part], wrenches if len(wrenches) == 1 else wrenches[part],
+            results[part]))
         return results
+
+    def forward_dynamics(
+            self, motion: Motion, forces: ArrayLike, wrench: ArrayLike | None = None) -> Motion:
+        """
+        Return a motion with the accelerations that leg forces give it.
+
+        ``inverse_dynamics`` of what is returned gives the forces back.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of any leading shape (...); its own accelerations are not looked at.
+        forces : (..., 6)
+            Of the actuators [N], + pushes. What friction takes is taken off them.
+        wrench : (..., 6), optional
+            Load on the platform, as in ``inverse_dynamics``.
+
+        Raises MotionError for what does not fit, is not finite or overflows. No pose is singular
+        here: J_inv is not inverted.
+
+        """
+        pushes = as_array('forces', forces, (6,))
+        load = as_array('wrench', wrench, (runtime.WRENCH,))
+        shape = common_shape(motion=motion.shape, forces=pushes.shape[:-1],
+                             wrench=load.shape[:-1])
+        rows = _copies(motion.rows, shape)
+        pushes, load = _copies(pushes, shape), _copies(load, shape)
+        _in_parts(len(rows), lambda part: forward_dynamics.solve(
+            self.machine, rows[part], pushes[part], load[part]))
+        _check_finite(rows, rows)
+        return Motion.of_rows(rows.reshape(*shape, runtime.MOTION))
+
+    def forward_kinematics(
+            self, lengths: ArrayLike, guess: Motion | Pose | tuple[ArrayLike, ArrayLike]) -> Pose:
+        """
+        Return the pose that six leg lengths belong to, on the guess's side of singularities.
+
+        Parameters
+        ----------
+        lengths : (..., 6)
+            [m]
+        guess : Motion, Pose or (position, rotation)
+            Where to begin: the last pose, or the one commanded. From 20 % of the machine's
+            height and 0.2 rad away it is found from nearly everywhere (benchmarks/README.md).
+
+        The leading shapes of lengths and guess broadcast against each other. Lengths of the
+        pose returned differ by less than 1e-12 m from those given.
+
+        Raises
+        ------
+        PoseError
+            The lengths belong to no pose on the guess's side of singularities.
+        SingularityError
+            The guess is singular, or a pose on the way from it.
+        MotionError
+            What is given does not fit or is not finite.
+
+        """
+        wanted = as_array('lengths', lengths, (6,))
+        begin = guess if isinstance(guess, Motion) else Motion(*guess)
+        shape = common_shape(lengths=wanted.shape[:-1], guess=begin.shape)
+        wanted, rows = _copies(wanted, shape), _copies(begin.rows, shape)
+        codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
+        residuals = np.empty(len(rows))
+        _in_parts(len(rows), lambda part: forward_kinematics.poses(
+            self.machine, wanted[part], rows[part], codes[part], steps[part], residuals[part]))
+        if codes.any():
+            at = int(np.argmax(codes > 0))
+            where = (f'sample {at}: lengths {wanted[at].tolist()} m: from the guess '
+                     f'{rows[at, :3].tolist()} m')
+            if codes[at] == forward_kinematics.SINGULAR:
+                raise SingularityError(f'{where} the way leads to a singular pose, in '
+                                       f'{steps[at]} steps: give a guess clear of it')
+            raise PoseError(
+                f'{where} no pose is found that has them: after {steps[at]} steps a length is '
+                f'{residuals[at]:.3g} m off, must be {forward_kinematics.RESIDUAL:g}')
+        return Pose(rows[:, :3].reshape(*shape, 3).copy(),
+                    rows[:, 3:12].reshape(*shape, 3, 3).copy())
+
+    def twist(self, position: ArrayLike, rotation: ArrayLike, rates: ArrayLike) -> Array:
+        """
+        Return the twist [v; w] (..., 6) of leg rates (..., 6) [m/s] at a pose, base axes.
+
+        Raises SingularityError where J_inv cannot be solved, MotionError for what does not fit.
+        """
+        motion = Motion(position, rotation)
+        given = as_array('rates', rates, (6,))
+        shape = common_shape(pose=motion.shape, rates=given.shape[:-1])
+        given, rows = _copies(given, shape), _copies(motion.rows, shape)
+        _check_solvable(rows, self.solve(rows))
+        forward_kinematics.twists(self.machine, given, rows)
+        _check_finite(rows, rows)
+        return rows[:, 12:18].reshape(*shape, 6).copy()
 
     def inverse_kinematics(self, position: ArrayLike, rotation: ArrayLike) -> Array:
         """Return the six leg lengths at a pose, (..., 6) [m]; MotionError for what is none."""
@@ -209,19 +290,13 @@ class StewartPlatform:
     def _rows(self, motion: Motion, wrench: ArrayLike | None,
               ) -> tuple[Array, Array, tuple[int, ...]]:
         """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
-        rows = motion.rows
         if wrench is None:
-            return rows.reshape(-1, runtime.MOTION), self._no_wrench, motion.shape
+            return motion.rows.reshape(-1, runtime.MOTION), self._no_wrench, motion.shape
         load = as_array('wrench', wrench, (runtime.WRENCH,))
-        try:
-            shape = np.broadcast_shapes(motion.shape, load.shape[:-1])
-        except ValueError as exc:
-            raise MotionError(f'wrench: shape {load.shape}: must broadcast against the '
-                              f"motion's {motion.shape}") from exc
-        if shape != motion.shape:
-            rows = np.array(np.broadcast_to(rows, (*shape, runtime.MOTION)), order='C')
-        loads = np.array(np.broadcast_to(load, (*shape, runtime.WRENCH)), order='C')
-        return rows.reshape(-1, runtime.MOTION), loads.reshape(-1, runtime.WRENCH), shape
+        shape = common_shape(motion=motion.shape, wrench=load.shape[:-1])
+        rows = (_copies(motion.rows, shape) if shape != motion.shape
+                else motion.rows.reshape(-1, runtime.MOTION))
+        return rows, _copies(load, shape), shape
 
     @staticmethod
     def _named(results: Array) -> InverseDynamics:
@@ -233,6 +308,47 @@ class StewartPlatform:
             # [()] makes a number of an array without a shape
             results[..., runtime.DETERMINANT][()], results[..., runtime.DETERMINANT_RATE][()],
             results[..., runtime.CONDITION][()])
+
+
+def _in_parts(many: int, do: Callable[[slice], None]) -> None:
+    """Do so many samples in parts, large batches on all processors."""
+    threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+    if threads < 2:
+        do(slice(0, many))
+        return
+    # More parts than threads: a thread that is held up leaves more to the others.
+    edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(do, map(slice, edges[:-1], edges[1:])))
+
+
+def _copies(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return rows (N, ...) of their own of an array that is broadcast to a leading shape."""
+    last = array.shape[-1]
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, last))
+    return np.array(array, order='C').reshape(-1, last)
+
+
+def _check_finite(rows: Array, results: Array) -> None:
+    """Raise MotionError where the results (N, ...) of rows of motion are not finite."""
+    finite = np.isfinite(results).all(axis=-1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise MotionError(f'sample {at}: out of range, the numbers overflow; position '
+                          f'{rows[at, :3].tolist()} m')
+
+
+def _check_solvable(rows: Array, results: Array) -> None:
+    """Raise SingularityError where the results of rows of motion say that J_inv is singular."""
+    condition = results[:, runtime.CONDITION]
+    unsolvable = condition >= UNSOLVABLE_CONDITION
+    if unsolvable.any():
+        at = int(np.argmax(unsolvable))
+        raise SingularityError(
+            f'sample {at}: J_inv cannot be solved: its condition number is '
+            f'{condition[at]:.3g}, must be under {UNSOLVABLE_CONDITION:g}; position '
+            f'{rows[at, :3].tolist()} m')
 
 
 def _compiled_for(array: Array) -> Array:

@@ -494,13 +494,14 @@ def test_no_samples_give_no_results() -> None:
 
 
 @pytest.mark.parametrize(('wrench', 'text'), [
-    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'must broadcast'),
+    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'do not fit'),
     ('push', 'not an array of numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
 ])
 def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
     platform = StewartPlatform(symmetric_parameters())
-    with pytest.raises(MotionError, match=f'wrench.*{text}'):
+    with pytest.raises(MotionError, match=text) as error:
         platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
+    assert 'wrench' in str(error.value)
 
 
 def test_many_loads_on_one_pose_are_many_samples() -> None:
