@@ -155,8 +155,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'restart', 's', 0.1, minimum=0.0, above=True),
     Parameter('setpoint.exclusive', 'bool',
               'refuse setpoints while a topic has more than one writer', default=False),
-    Parameter('visualization_rate', 'double', 'most markers in a second, 0: none; markers are '
-              'not published yet', 'Hz', 30.0, minimum=0.0),
+    Parameter('visualization_rate', 'double', 'most pictures (~/markers) in a second, 0: none',
+              'Hz', 30.0, minimum=0.0),
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
 )})
 
