@@ -48,7 +48,7 @@ from stewart_dynamics.parameters import inertia_matrix, Parameter, PARAMETERS, P
 from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.step import Six
-from stewart_dynamics.vectors import add, cross, dot, Matrix3, scale, subtract, Vector3
+from stewart_dynamics.vectors import add, cross, dot, Matrix3, scale, Vector3
 
 Array = NDArray[np.float64]
 
@@ -109,9 +109,9 @@ _SHORTEST, _LONGEST, _STIFFNESS, _DAMPING, _STRONGEST, _LEGS = range(0, 36, 6)
 # themselves; within 1 their error is small as well, and there is room for what is not linear.
 _REACH = 1.0
 _MOST_SUBSTEPS = 1000
-# By more than this [rad] neither the platform nor a leg may turn within a step: the step would
-# be blind to what happens in between.
-_LARGEST_TURN = 0.5
+# The platform may turn by no more than this [rad] in a step, and a platform joint move by no more
+# than this part of its leg's length: the step would be blind to what happens in between.
+_LARGEST_MOVE = 0.5
 
 _REST: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -212,7 +212,7 @@ def _slope(machine: Array, legs: Array, state: Array, loads: Array, motion: Arra
 
 @compiled
 def _legs_of(machine: Array, state: Array, result: Array) -> float:
-    """Write lengths and rates, and return how fast a leg or the platform turns [rad/s]."""
+    """Write lengths and rates, and return the fastest turning, or move beside a leg's length."""
     position, velocity, omega = (
         _vector3(state, 0), _vector3(state, _TWIST), _vector3(state, _TWIST + 3))
     rotation = _rotation(state)
@@ -220,12 +220,10 @@ def _legs_of(machine: Array, state: Array, result: Array) -> float:
     for leg in range(6):
         a, length, inverse_length, s = leg_line(machine, leg, position, rotation)
         joint_velocity = add(velocity, cross(omega, a))
-        rate = dot(s, joint_velocity)
-        across = subtract(joint_velocity, scale(rate, s))
-        turning = inverse_length * math.sqrt(dot(across, across))
+        moving = inverse_length * math.sqrt(dot(joint_velocity, joint_velocity))
         result[leg] = length
-        result[_RATES + leg] = rate
-        fastest = max(fastest, turning) if 0.0 < length < math.inf else math.inf
+        result[_RATES + leg] = dot(s, joint_velocity)
+        fastest = max(fastest, moving) if 0.0 < length < math.inf else math.inf
     return fastest
 
 
@@ -260,7 +258,7 @@ def _entry_point(source: str) -> Callable[..., None]:
             most = legs[_STRONGEST + leg]
             loads[leg] = min(max(loads[leg], -most), most)
             result[_FORCES + leg] = loads[leg]
-        sound = True
+        sound = h * _legs_of(machine, state, result) <= _LARGEST_MOVE
         for _step in range(steps):
             _slope(machine, legs, state, loads, motion, forces, work, slope)
             for n in range(_STATE):
@@ -282,7 +280,7 @@ def _entry_point(source: str) -> Callable[..., None]:
                 square += stage[n] * stage[n] if _QUATERNION <= n < _TWIST else 0.0
             for n in range(_QUATERNION, _TWIST):
                 stage[n] /= math.sqrt(square)
-            sound = sound and h * _legs_of(machine, stage, result) <= _LARGEST_TURN
+            sound = sound and h * _legs_of(machine, stage, result) <= _LARGEST_MOVE
             if not sound:
                 break
             for n in range(_STATE):
@@ -310,8 +308,8 @@ class Plant:
     The machine of given parameters, in motion from its initial pose, held there at first.
 
     Where a step cannot be computed, because numbers overflow or a leg has so little length that
-    it turns round at once, the machine is held at rest in the last pose that could be, for good:
-    ``fault`` says so.
+    one step could turn it round, the machine is held at rest in the last pose that could be, for
+    good: ``fault`` says so.
 
     Steps are divided until none is too long for what friction and end stops do, the fastest by
     far of what happens here. Beside them a machine is ``M x'' + J^T D J x' + J^T K J x = 0``,
@@ -403,9 +401,9 @@ class Plant:
         if not result[_SOUND]:
             self.fault = (
                 f'held at rest, for good: beyond the pose at {list(numbers[:_QUATERNION])} m its '
-                'motion cannot be computed: numbers overflow, or a leg or the platform turns by '
-                f'more than {_LARGEST_TURN} rad in a step of {self._step:g} s; shortest leg '
-                f'{min(result[:_RATES]):.3g} m')
+                f'motion cannot be computed: numbers overflow, or in a step of {self._step:.3g} s '
+                f'it turns by more than {_LARGEST_MOVE} rad or moves by more than that part of '
+                f'a leg; shortest leg {min(result[:_RATES]):.3g} m')
         return State(
             result[:_RATES], result[_RATES:_FORCES], result[_FORCES:_ACCELERATION],
             numbers[:_TWIST], numbers[_TWIST:_STATE], result[_ACCELERATION:_SOUND])
@@ -413,6 +411,9 @@ class Plant:
     def _check_lengths(self) -> None:
         """Raise ParameterError where the machine does not fit between its end stops."""
         pose = self.parameters['initial_pose'].tolist()
+        if self.fault:
+            raise ParameterError(f'initial_pose: {pose}: a leg would have no length there, or one '
+                                 'that overflows')
         for leg, length in enumerate(self.state.lengths):
             name = self.parameters['joints'][leg]
             for limit, at, sign in (('limits.length_min', _SHORTEST, -1.0),
@@ -421,8 +422,6 @@ class Plant:
                 if sign * (length - bound) > 0.0:
                     raise ParameterError(f'initial_pose: {pose}: {name} would have a length of '
                                          f'{length:.6g} m, beyond {limit}, {bound:g} m')
-        if self.fault:
-            raise ParameterError(f'initial_pose: {pose}: {self.fault}')
 
 
 def _of_legs(p: SimulatorParameters) -> Array:
@@ -476,11 +475,14 @@ def _substeps(p: SimulatorParameters) -> int:
         parts = float(p['step'] * fastest / _REACH)
         if parts <= _MOST_SUBSTEPS:
             return max(1, math.ceil(parts))
+        # At most critical, the damping is in proportion to the frequency.
+        ratio = p['end_stops.damping_ratio']
         of_each = {
             'actuator.viscous_friction': _largest(p, viscous),
             'actuator.coulomb_friction': _largest(p, coulomb),
-            'end_stops.damping_ratio': _largest(p, damping),
-            'end_stops.frequency': math.sqrt(_largest(p, stiffness))}
+            'end_stops.frequency': math.sqrt(_largest(p, stiffness)),
+            'end_stops.damping_ratio' if ratio > 1.0 else 'end_stops.frequency':
+                _largest(p, damping)}
     name = max(of_each, key=lambda each: of_each[each])
     value = p[name].tolist() if isinstance(p[name], np.ndarray) else p[name]
     raise ParameterError(
