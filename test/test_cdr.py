@@ -332,9 +332,11 @@ def test_the_numbers_of_an_array_are_read_whatever_its_layout(
     of.layout.dim = [MultiArrayDimension(label=label, size=size, stride=stride)
                      for label, size, stride in dimensions]
     data = serialize_message(of)
-    for order in (data, *(in_order(data, 'std_msgs/msg/Float64MultiArray', little)
-                          for little in (True, False))):
-        assert same(cdr.float64_values(order), values)
+    assert same(cdr.float64_values(data), values)
+    if values:  # rosbags refuses what rclpy leaves behind an empty array
+        for little_endian in (True, False):
+            again = in_order(data, 'std_msgs/msg/Float64MultiArray', little_endian)
+            assert same(cdr.float64_values(again), values)
 
 
 @moderately
