@@ -100,6 +100,7 @@ setup(
         'console_scripts': [
             'stewart_dynamics = stewart_dynamics.node:main',
             'stewart_replay = stewart_dynamics.replay:main',
+            'stewart_simulator = stewart_dynamics.simulator_node:main',
             'stewart_trajectory = stewart_dynamics.trajectory_node:main',
         ],
     },

@@ -159,6 +159,26 @@ def _sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[i
     return number, begin + 4
 
 
+def float64_values(data: bytes) -> tuple[float, ...]:
+    """Read a std_msgs/Float64MultiArray: its numbers, whatever layout it claims."""
+    try:
+        order = data[1]
+        count = _COUNT[order]
+        dimensions, at = _sequence(data, 4, count, [])
+        for _ in range(dimensions):
+            size, at = _sequence(data, at, count, [])
+            at = (at + size + 3 & ~3) + 8
+        # data_offset comes before the numbers
+        number, at = _sequence(data, (at + 3 & ~3) + 4, count, [])
+        values: tuple[float, ...] = Struct(f'{"<" if order else ">"}{number}d').unpack_from(
+            data, _aligned8(at) if number else at)
+    except (IndexError, KeyError, StructError) as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    if data[0] != 0:
+        raise MalformedError(f'encapsulation {data[:2].hex()} is not plain CDR')
+    return values
+
+
 class JointStateFields(NamedTuple):
     """Stamp and names of a sensor_msgs/JointState, and where its numbers stand in its bytes."""
 
@@ -200,6 +220,7 @@ def joint_state_fields(data: bytes) -> JointStateFields:
 
 
 _FLOAT64 = Struct('<4sd')
+_CLOCK = Struct('<4siI')
 _BOOL = Struct('<4s?')
 # an empty layout's two numbers, the number of entries, and what aligns them
 _FLOAT64_ARRAY = Struct('<4sIII4x6d')
@@ -214,6 +235,11 @@ def float64(value: float) -> bytes:
 def boolean(value: bool) -> bytes:
     """Write a std_msgs/Bool."""
     return _BOOL.pack(LITTLE_ENDIAN, value)
+
+
+def clock(stamp: int) -> bytes:
+    """Write a rosgraph_msgs/Clock of a time [ns]."""
+    return _CLOCK.pack(LITTLE_ENDIAN, *divmod(stamp, 1_000_000_000))
 
 
 def float64_array(values: Sequence[float]) -> bytes:

@@ -1,0 +1,549 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The plant: balances and closed forms, which it does not know, over the motions that it gives."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from typing import Any
+
+from messages import STORE
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    energies, friction, random_parameters, relative, rng, ROOT, rotation_about, size_of,
+    smooth_motion)
+
+from stewart_dynamics import Motion, ParameterError, StewartPlatform
+from stewart_dynamics.parameters import Parameters, read_yaml
+from stewart_dynamics.plant import (
+    _largest, OUTPUT_TYPES, Plant, SimulatorParameters, State)
+from stewart_dynamics.rotation import from_quaternion
+
+Array = NDArray[np.float64]
+Six = tuple[float, float, float, float, float, float]
+
+MACHINE = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')
+HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
+ZERO: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+FRICTIONLESS = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
+UNLIMITED = dict.fromkeys(
+    ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max'), None)
+MASSLESS = {f'legs.{part}.{what}': 0.0 for part in ('cylinder', 'piston')
+            for what in ('mass', 'center_of_mass', 'inertia')} | {'actuator.reflected_mass': 0.0}
+
+
+def simulated(**changes: Any) -> SimulatorParameters:
+    """Return the machine of config/platform.yaml; ``__`` in a name for a point."""
+    return SimulatorParameters({**MACHINE, 'initial_pose': HOME, **{
+        name.replace('__', '.'): value for name, value in changes.items()}})
+
+
+def random_simulated(seed: int, **changes: Any) -> SimulatorParameters:
+    """Return a machine with nothing special about it, at rest in its middle."""
+    given = random_parameters(rng(seed)).given
+    size = size_of(Parameters(given))
+    return SimulatorParameters({**given, 'initial_pose': [0.0, 0.0, size, 0.0, 0.0, 0.0], **{
+        name.replace('__', '.'): value for name, value in changes.items()}})
+
+
+def set_moving(plant: Plant, twist: Any) -> None:
+    """Give it a twist, as if the brakes had let go of it in motion."""
+    plant._state[7:13] = twist
+
+
+def motion_of(state: State) -> Motion:
+    """Return a state as a motion."""
+    rotation = np.reshape(from_quaternion(*state.pose[3:]), (3, 3))
+    return Motion(state.pose[:3], rotation, state.twist[:3], state.twist[3:],
+                  state.acceleration[:3], state.acceleration[3:])
+
+
+def energy_of(plant: Plant) -> float:
+    """Return kinetic and potential energy [J]."""
+    return float(sum(energies(plant.parameters, motion_of(plant.state))))
+
+
+def worked(plant: Plant, periods: int, seed: int) -> tuple[float, float, float]:
+    """
+    Let a smooth motion be followed; return change of energy, work of the legs, their exchange.
+
+    Its forces and a feedback that keeps it bounded are held within each period, so that the
+    work of a leg is its force times the change of its length. The exchange sums the amounts.
+    """
+    p = plant.parameters
+    times = np.arange(periods) / p['rate']
+    wanted = StewartPlatform(p).inverse_dynamics(smooth_motion(p, rng(seed))(times))
+    carried = p['platform.mass'] / 6.0 + p['actuator.reflected_mass']
+    stiff, damped = 400.0 * carried, 30.0 * carried
+    before = energy_of(plant)
+    work = np.empty((periods, 6))
+    state = plant.state
+    for n in range(periods):
+        lengths = np.array(state.lengths)
+        force = (wanted.forces[n] + stiff * (wanted.lengths[n] - lengths)
+                 + damped * (wanted.rates[n] - state.rates))
+        state = plant.advance(tuple(force.tolist()), ZERO)
+        work[n] = force * (state.lengths - lengths)
+    assert not plant.fault
+    assert np.max(np.abs(np.subtract(state.lengths, wanted.lengths[-1]))) < 0.05 * size_of(p)
+    return energy_of(plant) - before, float(np.sum(work)), float(np.sum(np.abs(work)))
+
+
+# Energy
+
+@pytest.mark.parametrize('machine', ['config', 'random'])
+def test_over_a_minute_without_friction_work_is_the_change_of_energy(machine: str) -> None:
+    parameters = (simulated(rate=1000.0, **{**FRICTIONLESS, **UNLIMITED}) if machine == 'config'
+                  else random_simulated(4, rate=1000.0, **FRICTIONLESS))
+    change, work, exchanged = worked(Plant(parameters), 60_000, 5)
+    assert abs(change - work) < 1e-6 * exchanged
+
+
+def test_the_error_falls_with_the_fourth_power_of_the_step() -> None:
+    # A violent motion, under loads that do not depend on the step.
+    ends = []
+    for step in (1e-3, 5e-4, 2.5e-4, 1.25e-4):
+        plant = Plant(random_simulated(6, rate=100.0, step=step, **FRICTIONLESS))
+        set_moving(plant, [2.0, -1.0, 3.0, 8.0, -5.0, 12.0])
+        for n in range(20):
+            load = 3e3 * np.sin(0.7 * n + np.arange(6.0))
+            plant.advance(tuple(load.tolist()), tuple((0.3 * load).tolist()))
+        assert not plant.fault
+        ends.append(np.array(plant.state.pose + plant.state.twist))
+    errors = [float(np.linalg.norm(one - finer)) for one, finer in zip(ends, ends[1:],
+                                                                       strict=False)]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert errors[0] > 1e-9  # else it is rounding that is compared
+    assert np.all(np.abs(orders - 4.0) < 0.3)
+
+
+def test_friction_takes_what_is_lost() -> None:
+    """In free motion the energy falls all the time, by what friction times rate amount to."""
+    plant = Plant(random_simulated(7, rate=1000.0))
+    set_moving(plant, [0.5, -0.3, 0.2, 0.4, 0.5, -0.6])
+    plant.state = plant._run(0)
+    last, lost = energy_of(plant), 0.0
+    power = friction(plant.parameters, np.array(plant.state.rates)) @ plant.state.rates
+    for _ in range(300):
+        state = plant.advance(ZERO, ZERO)
+        now = energy_of(plant)
+        assert now < last
+        power_now = friction(plant.parameters, np.array(state.rates)) @ state.rates
+        lost += last - now - 0.5e-3 * (power + power_now)  # the trapezoidal rule
+        last, power = now, power_now
+    # Its error is that of the rule, where a leg changes its direction.
+    taken = energy_of(Plant(plant.parameters)) - last
+    assert abs(lost) < 1e-3 * abs(taken)
+
+
+# Against what needs no integration
+
+def top(step: float, omega: list[float]) -> tuple[Plant, Array]:
+    """Return a symmetrical body on legs without mass, spinning, and its inertia."""
+    inertia = np.diag([10.0, 10.0, 16.0])
+    plant = Plant(simulated(
+        step=step, rate=1000.0, platform__inertia=[10.0, 0.0, 0.0, 10.0, 0.0, 16.0],
+        platform__center_of_mass=[0.0, 0.0, 0.0], initial_pose=[0.0, 0.0, 9.0, 0.3, -0.2, 0.5],
+        **{**FRICTIONLESS, **UNLIMITED, **MASSLESS}))
+    set_moving(plant, [0.3, -0.2, 1.0, *omega])
+    return plant, inertia
+
+
+def test_a_free_symmetrical_body_falls_on_a_parabola_and_precesses() -> None:
+    """
+    With legs that have no mass and give no force, it is Euler's top in free fall.
+
+    Its angular momentum h is constant; it turns about h at |h| / I_1, and about its own axis at
+    (1 - I_3 / I_1) times its spin (Goldstein, Classical Mechanics, 3rd ed., 5.6).
+    """
+    errors = []
+    for step in (1e-3, 5e-4, 2.5e-4, 1.25e-4):
+        plant, inertia = top(step, [30.0, -20.0, 25.0])
+        first = motion_of(plant.state).rotation
+        omega = np.array([30.0, -20.0, 25.0])
+        h = first @ inertia @ first.T @ omega
+        spin = float(first[:, 2] @ omega) * (1.0 - 16.0 / 10.0)
+        for _ in range(1000):
+            state = plant.advance(ZERO, ZERO)
+        assert not plant.fault
+        np.testing.assert_allclose(
+            state.pose[:3], [0.3, -0.2, 9.0 + 1.0 - 0.5 * 9.80665], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(state.acceleration[:3], [0.0, 0.0, -9.80665], atol=1e-9)
+        rate = float(np.linalg.norm(h)) / 10.0
+        turned = (rotation_about(h / np.linalg.norm(h), rate) @ first
+                  @ rotation_about(np.array([0.0, 0.0, 1.0]), spin))
+        errors.append(float(np.linalg.norm(motion_of(state).rotation - turned)))
+    assert errors[0] < 1e-6
+    # Terms of the fourth and fifth order have different signs here, so only over all steps.
+    assert abs(math.log2(errors[0] / errors[-1]) / 3.0 - 4.0) < 0.3
+
+
+def test_a_free_body_of_any_shape_keeps_energy_and_angular_momentum() -> None:
+    plant = Plant(simulated(initial_pose=[0.0, 0.0, 9.0, 0.0, 0.0, 0.0], rate=1000.0,
+                            gravity=[0.0, 0.0, 0.0], **{**FRICTIONLESS, **UNLIMITED, **MASSLESS}))
+    set_moving(plant, [0.1, 0.0, 0.2, 3.0, -2.0, 4.0])
+    plant.state = plant._run(0)
+    xx, xy, xz, yy, yz, zz = plant.parameters['platform.inertia']
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def momentum() -> Array:
+        r = motion_of(plant.state).rotation
+        h: Array = r @ inertia @ r.T @ plant.state.twist[3:]
+        return h
+
+    energy, h = energy_of(plant), momentum()
+    for _ in range(2000):
+        plant.advance(ZERO, ZERO)
+    assert abs(energy_of(plant) - energy) < 1e-9 * energy
+    assert relative(momentum(), h) < 1e-9
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_the_accelerations_ask_for_the_forces_that_acted(seed: int) -> None:
+    random = rng(seed)
+    plant = Plant(random_simulated(seed))
+    set_moving(plant, random.uniform(-0.3, 0.3, 6))
+    commands = random.uniform(-500.0, 500.0, 6)
+    wrench = random.uniform(-300.0, 300.0, 6)
+    for _ in range(3):
+        state = plant.advance(tuple(commands.tolist()), tuple(wrench.tolist()))
+    result = StewartPlatform(plant.parameters).inverse_dynamics(motion_of(state), wrench)
+    assert relative(result.forces, commands) < 1e-9
+    assert relative(state.lengths, result.lengths) < 1e-13
+    assert relative(state.rates, result.rates) < 1e-12
+    assert state.forces == tuple(commands.tolist())
+
+
+def test_a_rotation_stays_one() -> None:
+    plant, _ = top(1e-3, [30.0, -20.0, 25.0])
+    for _ in range(5000):
+        state = plant.advance(ZERO, ZERO)
+        if plant.fault:
+            break
+        assert abs(math.hypot(*state.pose[3:]) - 1.0) < 1e-15
+
+
+# End stops and what saturates
+
+def test_end_stops_hold_a_machine_that_falls_on_them() -> None:
+    parameters = simulated()
+    plant = Plant(parameters)
+    platform = StewartPlatform(parameters)
+    fallen = energy_of(plant)
+    deepest = 0.0
+    for _ in range(2000):
+        state = plant.advance(ZERO, ZERO)
+        deepest = max(deepest, 0.95 - min(state.lengths))
+    assert max(map(abs, state.twist)) < 1e-9
+    carried = (150.0 + 6 * 6.0) / 6.0 + 30.0
+    stiffness = carried * (2.0 * math.pi * 30.0) ** 2
+    # At rest the springs carry the machine, as its gravity vector has it without them.
+    motion = motion_of(state)
+    held = np.linalg.solve(platform.jacobian(motion.position, motion.rotation).T,
+                           platform.gravity_vector(motion.position, motion.rotation))
+    assert relative(stiffness * (0.95 - np.array(state.lengths)), held) < 1e-9
+    # No leg went deeper than all that fell would have pressed its spring together.
+    assert 0.0 < deepest < math.sqrt(2.0 * (fallen - energy_of(plant)) / stiffness)
+    assert deepest < 0.02
+
+
+def test_end_stops_hold_against_actuators_that_push_out_and_then_let_go() -> None:
+    plant = Plant(simulated())
+    for _ in range(2000):
+        state = plant.advance((6000.0,) * 6, ZERO)
+    too_long = np.array(state.lengths) - 1.65
+    stiffness = 61.0 * (2.0 * math.pi * 30.0) ** 2
+    assert np.all(too_long > 0.0)
+    motion = motion_of(state)
+    held = np.linalg.solve(
+        StewartPlatform(plant.parameters).jacobian(motion.position, motion.rotation).T,
+        StewartPlatform(plant.parameters).gravity_vector(motion.position, motion.rotation))
+    assert relative(6000.0 - stiffness * too_long, held) < 1e-6
+    for _ in range(100):
+        state = plant.advance(ZERO, ZERO)
+    assert max(state.lengths) < 1.65
+
+
+@pytest.mark.parametrize('ratio', [0.0, 0.3, 1.0, 3.0])
+def test_end_stops_only_push_back_and_give_no_energy(ratio: float) -> None:
+    """Their force is what the balance of forces leaves: outward where short, never inward."""
+    parameters = simulated(end_stops__damping_ratio=ratio, rate=1000.0, **FRICTIONLESS)
+    plant, platform = Plant(parameters), StewartPlatform(parameters)
+    before = energy_of(plant)
+    met = 0
+    for _ in range(1000):
+        state = plant.advance(ZERO, ZERO)
+        stops = platform.inverse_dynamics(motion_of(state)).forces
+        inside = np.array(state.lengths) > 0.95
+        assert np.all(np.abs(stops[inside]) < 1e-7)
+        assert np.all(stops > -1e-7)
+        met += int(np.any(~inside))
+        stored = np.sum(np.maximum(0.95 - np.array(state.lengths), 0.0) ** 2)
+        assert energy_of(plant) + 0.5 * 61.0 * (2.0 * math.pi * 30.0) ** 2 * stored < (
+            before * (1.0 + 1e-4))
+    assert met
+
+
+def test_actuators_saturate() -> None:
+    plant = Plant(simulated())
+    state = plant.advance((7000.0, -8000.0, 5000.0, 6000.0, -6000.0, 6000.0001), ZERO)
+    assert state.forces == (6000.0, -6000.0, 5000.0, 6000.0, -6000.0, 6000.0)
+    other = Plant(simulated())
+    assert other.advance((6000.0, -6000.0, 5000.0, 6000.0, -6000.0, 6000.0), ZERO) == state
+
+
+# Stiff machines
+
+@pytest.mark.parametrize('seed', range(20))
+def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
+    random = rng(seed)
+    reflected = random.uniform(0.0, 30.0, 6) * (seed % 2)
+    p = random_simulated(seed, actuator__reflected_mass=reflected.tolist())
+    platform = StewartPlatform(p)
+    for kind in range(3):
+        has = random.uniform(0.0, 1e5, 6) * (random.uniform(size=6) < (1.0, 0.5, 0.2)[kind])
+        bound = _largest(p, has)
+        worst = 0.0
+        for _ in range(50):
+            position = size_of(p) * random.uniform([-1, -1, 0.2], [1, 1, 2], 3)
+            turn = rotation_about(np.array([0.6, 0.0, 0.8]), random.uniform(-1.0, 1.0))
+            jacobian = platform.jacobian(position, turn)
+            mobility = jacobian @ np.linalg.solve(
+                platform.mass_matrix(position, turn), jacobian.T)
+            root = np.sqrt(has)
+            worst = max(worst, float(np.linalg.eigvalsh(root[:, None] * mobility * root)[-1]))
+        assert worst <= bound * (1.0 + 1e-12)
+        assert bound == 0.0 or worst > 0.05 * bound  # not for nothing
+
+
+@pytest.mark.parametrize('changes', [
+    {'actuator.coulomb_friction': 500.0}, {'actuator.viscous_friction': 1e5},
+    {'actuator.coulomb_friction': 2000.0, 'actuator.viscous_friction': 2e4},
+    {'end_stops.frequency': 500.0}, {'end_stops.damping_ratio': 20.0},
+    {'actuator.coulomb_friction': 500.0, 'actuator.reflected_mass': 0.0, 'step': 2e-4}],
+    ids=str)
+def test_a_stiff_machine_is_integrated_without_trembling(changes: dict[str, Any]) -> None:
+    """Pushed, let go and come to rest by friction alone: rates die away, without a sign of h."""
+    plant = Plant(simulated(**changes))
+    assert plant.substeps > 1 or changes.get('step')
+    up = StewartPlatform(plant.parameters).inverse_dynamics(motion_of(plant.state)).forces
+    for _ in range(100):
+        plant.advance(tuple((up + 100.0).tolist()), (50.0, 20.0, 0.0, 5.0, 0.0, 3.0))
+    for _ in range(1500):
+        state = plant.advance(ZERO, ZERO)
+        assert max(map(abs, state.rates)) < 3.0
+    last = np.array(state.rates)
+    for _ in range(100):
+        state = plant.advance(ZERO, ZERO)
+        assert np.max(np.abs(state.rates)) <= np.max(np.abs(last)) + 1e-3
+        last = np.array(state.rates)
+    assert not plant.fault
+
+
+@pytest.mark.parametrize(('changes', 'named'), [
+    ({'actuator.coulomb_friction': 1e8}, 'actuator.coulomb_friction'),
+    ({'actuator.viscous_friction': 1e12}, 'actuator.viscous_friction'),
+    ({'actuator.viscous_friction': 1e308}, 'actuator.viscous_friction'),
+    ({'end_stops.frequency': 1e6}, 'end_stops.frequency'),
+    ({'end_stops.damping_ratio': 1e7}, 'end_stops.damping_ratio')], ids=str)
+def test_what_would_need_too_short_steps_is_refused_by_name(
+        changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(ParameterError, match=f'^{named}: .* too large for a platform of 150 kg'):
+        Plant(simulated(actuator__reflected_mass=0.0, **changes))
+
+
+# What cannot be computed
+
+def finite(state: State) -> bool:
+    """Return whether all numbers of a state are."""
+    return all(map(math.isfinite, (number for part in state for number in part)))
+
+
+@pytest.mark.parametrize('commands', [(1e300,) * 6, (1e15, -1e15) * 3, (1.7e308,) * 6], ids=str)
+def test_numbers_that_overflow_hold_it_at_rest(commands: Six) -> None:
+    plant = Plant(simulated(**UNLIMITED))
+    plant.advance((400.0,) * 6, ZERO)
+    for _ in range(10):
+        state = plant.advance(commands, ZERO)
+        assert finite(state)
+    assert 'motion cannot be computed' in plant.fault
+    assert state.twist == state.acceleration == state.forces == state.rates == ZERO
+    assert plant.advance((400.0,) * 6, ZERO) is state
+    platform = StewartPlatform(plant.parameters)
+    motion = motion_of(state)
+    assert relative(state.lengths, platform.inverse_kinematics(
+        motion.position, motion.rotation)) < 1e-13
+
+
+def test_a_load_that_overflows_holds_it_at_rest() -> None:
+    plant = Plant(simulated())
+    state = plant.advance(ZERO, (1e300, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert plant.fault
+    assert finite(state)
+
+
+@pytest.mark.parametrize('massless', [False, True])
+def test_legs_that_lose_their_length_hold_it_at_rest(massless: bool) -> None:
+    """Base and platform joints are alike and it falls straight down, through itself."""
+    joints = MACHINE['geometry.base_joints']
+    plant = Plant(simulated(geometry__platform_joints=joints, **{
+        **UNLIMITED, **FRICTIONLESS, **(MASSLESS if massless else {}),
+        'platform.center_of_mass': [0.0, 0.0, 0.0],
+        'initial_pose': [1e-4, 0.0, 0.5, 0.0, 0.0, 0.0]}))
+    for _ in range(2000):
+        state = plant.advance(ZERO, ZERO)
+        assert finite(state)
+    assert 'motion cannot be computed' in plant.fault
+    assert abs(state.pose[2]) < 0.05
+
+
+def test_through_a_singularity_it_falls_as_any_body_does() -> None:
+    """Where det(J) is zero the legs hold no longer; nothing of the motion is singular."""
+    plant = Plant(simulated(**UNLIMITED))
+    dets = []
+    platform = StewartPlatform(plant.parameters)
+    for _ in range(600):
+        motion = motion_of(plant.advance(ZERO, ZERO))
+        dets.append(np.linalg.det(platform.jacobian(motion.position, motion.rotation)))
+    assert not plant.fault
+    assert min(dets) < 0.0 < max(dets)
+
+
+# Measured
+
+def decoded(messages: Any) -> dict[str, Any]:
+    """Return messages as rosbags reads them."""
+    return {topic: STORE.deserialize_cdr(data, OUTPUT_TYPES[topic]) for topic, data in messages}
+
+
+def test_messages_have_the_state() -> None:
+    plant = Plant(simulated(base_frame='ground', joints=list('abcdef'), geometry__zero_length=0.9))
+    state = plant.advance((500.0, 400.0, 300.0, 200.0, 100.0, 0.0), ZERO)
+    messages = list(plant.messages(12_000_000_034))
+    assert [topic for topic, _ in messages] == list(OUTPUT_TYPES)
+    of = decoded(messages)
+    for each in of.values():
+        assert (each.header.stamp.sec, each.header.stamp.nanosec) == (12, 34)
+    assert {of[topic].header.frame_id for topic in ('pose', 'twist', 'accel')} == {'ground'}
+    legs, pose = of['leg_states'], of['pose'].pose
+    assert legs.name == list('abcdef')
+    assert legs.position.tolist() == [length - 0.9 for length in state.lengths]
+    assert legs.velocity.tolist() == list(state.rates)
+    assert legs.effort.tolist() == [500.0, 400.0, 300.0, 200.0, 100.0, 0.0]
+    position, q = pose.position, pose.orientation
+    assert (position.x, position.y, position.z, q.x, q.y, q.z, q.w) == state.pose
+    for vectors, values in ((of['twist'].twist, state.twist),
+                            (of['accel'].accel, state.acceleration)):
+        assert values == tuple(getattr(vector, axis) for vector in (vectors.linear,
+                                                                    vectors.angular)
+                               for axis in 'xyz')
+
+
+def test_noise_has_its_deviations_and_is_on_the_leg_states_alone() -> None:
+    plant = Plant(simulated(noise__length=1e-4, noise__rate=2e-3, noise__force=5.0))
+    state = plant.state
+    many = 2000
+    rows = np.empty((many, 18))
+    for n in range(many):
+        of = decoded(plant.messages(n))
+        legs = of['leg_states']
+        rows[n] = np.concatenate([legs.position, legs.velocity, legs.effort])
+        assert of['pose'].pose.position.z == 1.1
+        assert of['twist'].twist.linear.x == of['accel'].accel.linear.x == 0.0
+    truth = np.array([*np.subtract(state.lengths, 0.95), *state.rates, *state.forces])
+    deviations = np.repeat([1e-4, 2e-3, 5.0], 6)
+    noise = (rows - truth) / deviations
+    # Five standard errors of a mean, of a deviation and of a correlation.
+    assert np.max(np.abs(noise.mean(axis=0))) < 5.0 / math.sqrt(many)
+    assert np.max(np.abs(noise.std(axis=0) - 1.0)) < 5.0 / math.sqrt(2.0 * many)
+    assert np.max(np.abs(np.corrcoef(noise.T) - np.eye(18))) < 5.0 / math.sqrt(many)
+    assert np.max(np.abs(np.mean(noise[1:] * noise[:-1], axis=0))) < 5.0 / math.sqrt(many)
+
+
+def test_noise_is_the_same_for_the_same_seed() -> None:
+    seen = [[data for n in range(3) for _, data in plant.messages(n)] for plant in (
+        Plant(simulated(noise__length=1e-4, noise__seed=seed)) for seed in (1.0, 1.0, 2.0))]
+    assert seen[0] == seen[1]
+    assert seen[0] != seen[2]
+
+
+# The same bits
+
+CODE = """
+from test_plant import *
+plant = Plant(simulated(actuator__coulomb_friction=300.0))
+for n in range(30):
+    state = plant.advance((900.0, 800.0, 700.0, 600.0, 500.0, 9e3), (1.0, 2.0, 3.0, 0.0, 0.0, n))
+print([number.hex() for part in state for number in part])
+plant = Plant(simulated(initial_pose=[0.0, 0.0, 0.79, 0.0, 0.0, 0.0]))
+for n in range(60):
+    state = plant.advance((-100.0, 0.0, 0.0, 0.0, 0.0, 9.0), ZERO)
+print([number.hex() for part in state for number in part])
+"""
+
+
+def test_compiled_and_not_gives_the_same_bits() -> None:
+    printed = {subprocess.run(
+        [sys.executable, '-c', CODE], check=True, stdout=subprocess.PIPE, text=True,
+        cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': off}).stdout
+        for off in ('0', '1')}
+    assert len(printed) == 1
+    assert len(printed.pop()) > 1000
+
+
+# Parameters
+
+@pytest.mark.parametrize(('changes', 'said'), [
+    ({'rate': 300.0}, 'rate: 300.0 Hz: a period must be a whole number of steps of 0.001 s, not '
+     '3.33333'),
+    ({'rate': 2000.0}, 'rate: 2000.0 Hz: a period must be a whole number of steps'),
+    ({'step': 2e-3}, 'step: 0.002 s: must be at least 1e-05, at most 0.001'),
+    ({'initial_pose': [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]}, 'leg_1 would have a length of 2.07'),
+    ({'initial_pose': [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]}, 'beyond limits.length_min, 0.95 m'),
+    ({'initial_pose': [1e300, 0.0, 0.5, 0.0, 0.0, 0.0], **UNLIMITED}, 'one that overflows'),
+    ({'initial_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], **UNLIMITED,
+      'geometry.platform_joints': MACHINE['geometry.base_joints']},
+     'a leg would have no length there'),
+    ({'platform.mass': -1.0}, 'platform.mass: -1.0 kg: must be more than 0'),
+    ({'noise.length': -1.0}, 'noise.length: -1.0 m: must be at least 0')], ids=str)
+def test_a_broken_rule_is_named(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError) as info:
+        Plant(simulated(**changes))
+    assert said in str(info.value)
+    assert '\n' not in str(info.value)
+
+
+def test_a_pose_is_missed() -> None:
+    with pytest.raises(ParameterError, match='initial_pose: missing'):
+        SimulatorParameters(MACHINE)
+
+
+@pytest.mark.parametrize('rate', [1.0, 40.0, 500.0, 1000.0, 10_000.0])
+def test_a_period_is_a_whole_number_of_steps(rate: float) -> None:
+    plant = Plant(simulated(rate=rate, step=min(1e-3, 1.0 / rate)))
+    assert plant.steps * plant._step == pytest.approx(1.0 / rate, rel=1e-15)
+    assert plant._step <= 1e-3 * (1.0 + 1e-12)
+
+
+def test_the_files_of_the_package_go_together() -> None:
+    given = {**MACHINE, **read_yaml(ROOT / 'config' / 'simulator.yaml', 'stewart_simulator')}
+    plant = Plant(SimulatorParameters(given))
+    assert plant.substeps == 1
+    assert plant.steps == 2
