@@ -61,6 +61,7 @@ demo: $(INSTALLED)
 
 bench: $(INSTALLED)
 	.venv/bin/python benchmarks/inverse_dynamics.py --write
+	.venv/bin/python benchmarks/forward.py --write
 
 bench-node: $(INSTALLED)
 	.venv/bin/python benchmarks/node.py --write

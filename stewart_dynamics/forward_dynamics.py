@@ -90,7 +90,10 @@ def _solve(work: Array) -> None:
             rest = work[6 * n + k]
             for m in range(k):
                 rest -= work[6 * n + m] * work[6 * k + m]
-            work[6 * n + k] = math.sqrt(rest) if n == k else rest / work[7 * k]
+            if n > k:
+                work[6 * n + k] = rest / work[7 * k]
+            else:  # zero where masses underflow: what comes of it is not finite
+                work[7 * n] = math.sqrt(rest) if rest > 0.0 else 0.0
         rest = work[_RIGHT + n]
         for m in range(n):
             rest -= work[6 * n + m] * work[_RIGHT + m]

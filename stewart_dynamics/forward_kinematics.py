@@ -18,8 +18,8 @@ Forward kinematics: the pose that belongs to six leg lengths, and the twist to s
 Up to forty poses have the same six lengths (Dietmaier, The Stewart-Gough platform of general
 geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess says which
 one is meant: the last pose, or the one that is commanded. Newton's method on ``L(X) = L``
-with the exact J_inv goes from it to the pose; the sign of det(J) must not change on the way,
-for only a singularity separates one assembly from another.
+with the exact J_inv goes from it to the pose, and never to where det(J) has the other sign:
+another assembly lies beyond a singularity.
 """
 
 from __future__ import annotations
@@ -45,9 +45,13 @@ RESIDUAL = 1e-12
 # What became of a guess.
 FOUND, NO_POSE, SINGULAR = range(3)
 
-# Newton's method takes 6 steps at most from nearly everywhere (benchmarks/README.md); what has
-# not arrived after this many never does.
-MOST_STEPS = 20
+# Newton's method takes 6 steps at most from nearly everywhere (benchmarks/README.md). A step to
+# the other side of a singularity is halved, and one that leads away by this (of the sum of
+# squares: a first step from afar may overshoot and yet be the fastest way). Where even so small a
+# part of one does, and after so many, there is no pose to be found.
+_FARTHER = 16.0
+_LEAST_PART = 1e-3
+MOST_STEPS = 50
 
 # From this condition number on a step goes anywhere; see singularity.UNSOLVABLE_CONDITION. The
 # bound is on the product of Frobenius norms, which is at most six times the condition number.
@@ -134,10 +138,12 @@ def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float
     rotation = _orthonormal(_orthonormal((
         motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9], motion[10],
         motion[11])))
-    size = machine[3]
+    per_size = 1.0 / machine[3]
     side = 0.0
-    residual = math.inf
-    for steps in range(MOST_STEPS + 1):
+    # The last pose that was good to go on from, by how much it missed, and the step from there.
+    from_position, from_rotation, before, residual = position, rotation, math.inf, math.inf
+    way, turn, part = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
+    for steps in range(MOST_STEPS):
         l0, r0 = _row(machine, 0, position, rotation)
         l1, r1 = _row(machine, 1, position, rotation)
         l2, r2 = _row(machine, 2, position, rotation)
@@ -146,22 +152,27 @@ def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float
         l5, r5 = _row(machine, 5, position, rotation)
         miss = (lengths[0] - l0, lengths[1] - l1, lengths[2] - l2, lengths[3] - l3,
                 lengths[4] - l4, lengths[5] - l5)
-        residual = max(abs(miss[0]), abs(miss[1]), abs(miss[2]), abs(miss[3]), abs(miss[4]),
-                       abs(miss[5]))
-        if not residual < math.inf:
-            return NO_POSE, steps, math.inf
-        inverse, determinant = inverse_and_determinant(r0, r1, r2, r3, r4, r5)
-        condition = math.sqrt(_squares((r0, r1, r2, r3, r4, r5)) * _squares(inverse))
-        if side == 0.0:
-            side = determinant
-        if not condition < _UNSOLVABLE or side * determinant <= 0.0:
-            return SINGULAR, steps, residual
-        i0, i1, i2, i3, i4, i5 = inverse
-        position = add(position, (dot6(i0, miss), dot6(i1, miss), dot6(i2, miss)))
-        rotation = _turned(scale(1.0 / size, (dot6(i3, miss), dot6(i4, miss), dot6(i5, miss))),
-                           rotation)
+        missed = dot6(miss, miss)
+        (i0, i1, i2, i3, i4, i5), determinant = inverse_and_determinant(r0, r1, r2, r3, r4, r5)
+        if missed < _FARTHER * before and side * determinant >= 0.0:
+            condition = math.sqrt(_squares((r0, r1, r2, r3, r4, r5))
+                                  * _squares((i0, i1, i2, i3, i4, i5)))
+            residual = max(abs(miss[0]), abs(miss[1]), abs(miss[2]), abs(miss[3]), abs(miss[4]),
+                           abs(miss[5]))
+            if not condition < _UNSOLVABLE:
+                return SINGULAR, steps, residual
+            from_position, from_rotation, before, side = position, rotation, missed, determinant
+            way = dot6(i0, miss), dot6(i1, miss), dot6(i2, miss)
+            turn = scale(per_size, (dot6(i3, miss), dot6(i4, miss), dot6(i5, miss)))
+            part = 1.0
+        elif residual > RESIDUAL:
+            part *= 0.5
+            if part < _LEAST_PART:
+                return NO_POSE, steps, residual
+        # With the last step, where it is near enough: what it then misses is rounding.
+        position = add(from_position, scale(part, way))
+        rotation = _turned(scale(part, turn), from_rotation)
         if residual <= RESIDUAL:
-            # With the step that is at hand: what is left of the miss is then rounding.
             for n in range(3):
                 motion[n] = position[n]
             for n in range(9):

@@ -29,6 +29,12 @@ Array = NDArray[np.float64]
 ORTHOGONALITY = 1e-6
 
 
+# Where they stand in a row.
+_PLACES = {'position': slice(0, 3), 'rotation': slice(3, 12), 'linear_velocity': slice(12, 15),
+           'angular_velocity': slice(15, 18), 'linear_acceleration': slice(18, 21),
+           'angular_acceleration': slice(21, 24)}
+
+
 class Motion:
     """
     Pose, twist and acceleration of the platform in one sample or any leading shape of samples.
@@ -60,34 +66,34 @@ class Motion:
         parts = {
             'position': as_array('position', position, (3,)),
             'rotation': as_array('rotation', rotation, (3, 3)),
-            'linear_velocity': as_array('linear_velocity', linear_velocity, (3,)),
-            'angular_velocity': as_array('angular_velocity', angular_velocity, (3,)),
-            'linear_acceleration': as_array('linear_acceleration', linear_acceleration, (3,)),
-            'angular_acceleration': as_array('angular_acceleration', angular_acceleration, (3,)),
-        }
-        leading = {name: part.shape[:-2] if name == 'rotation' else part.shape[:-1]
-                   for name, part in parts.items()}
-        try:
-            self.shape = np.broadcast_shapes(*leading.values())
-        except ValueError as exc:
-            raise MotionError(f'the leading shapes do not fit each other: {leading}') from exc
+            **{name: as_array(name, part, (3,)) for name, part in (
+                ('linear_velocity', linear_velocity), ('angular_velocity', angular_velocity),
+                ('linear_acceleration', linear_acceleration),
+                ('angular_acceleration', angular_acceleration)) if part is not None}}
+        self.shape = common_shape(**{
+            name: part.shape[:-2] if name == 'rotation' else part.shape[:-1]
+            for name, part in parts.items()})
         r = parts['rotation']
         with np.errstate(over='ignore', invalid='ignore'):
             error = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1))
-            bad = ~((error <= ORTHOGONALITY) & (np.linalg.det(r) > 0.0))
-        if np.any(bad):
-            at = tuple(map(int, np.argwhere(bad)[0]))
+            good = (error <= ORTHOGONALITY) & (np.linalg.det(r) > 0.0)
+        if not good.all():
+            at = tuple(map(int, np.argwhere(~good)[0]))
             raise MotionError(
                 f'rotation{list(at) if at else ""}: {r[at].tolist()}: not a rotation: '
                 f'R^T R is {error[at]:.3g} off the identity, at most {ORTHOGONALITY:g}, with a '
                 'determinant of +1')
-        self.rows = np.empty((*self.shape, MOTION))
-        self.rows[..., 0:3] = parts['position']
-        self.rows[..., 3:12] = r.reshape(*r.shape[:-2], 9)
-        self.rows[..., 12:15] = parts['linear_velocity']
-        self.rows[..., 15:18] = parts['angular_velocity']
-        self.rows[..., 18:21] = parts['linear_acceleration']
-        self.rows[..., 21:24] = parts['angular_acceleration']
+        parts['rotation'] = r.reshape(*r.shape[:-2], 9)
+        self.rows = np.zeros((*self.shape, MOTION))
+        for name, part in parts.items():
+            self.rows[..., _PLACES[name]] = part
+
+    @classmethod
+    def of_rows(cls, rows: Array) -> Motion:
+        """Return the motion that rows (..., MOTION) of checked numbers are; they are its own."""
+        motion = cls.__new__(cls)
+        motion.rows, motion.shape = rows, rows.shape[:-1]
+        return motion
 
     @classmethod
     def from_euler(
@@ -126,32 +132,32 @@ class Motion:
     @property
     def position(self) -> Array:
         """Origin of the platform frame in the base frame, (..., 3) [m]."""
-        return self._view(0, 3)
+        return self._view('position')
 
     @property
     def rotation(self) -> Array:
         """Platform axes to base axes, (..., 3, 3)."""
-        return self._view(3, 12).reshape(*self.shape, 3, 3)
+        return self._view('rotation').reshape(*self.shape, 3, 3)
 
     @property
     def linear_velocity(self) -> Array:
         """Velocity of the platform's origin, base axes, (..., 3) [m/s]."""
-        return self._view(12, 15)
+        return self._view('linear_velocity')
 
     @property
     def angular_velocity(self) -> Array:
         """Angular velocity, base axes, (..., 3) [rad/s]."""
-        return self._view(15, 18)
+        return self._view('angular_velocity')
 
     @property
     def linear_acceleration(self) -> Array:
         """Acceleration of the platform's origin, base axes, (..., 3) [m/s^2]."""
-        return self._view(18, 21)
+        return self._view('linear_acceleration')
 
     @property
     def angular_acceleration(self) -> Array:
         """Angular acceleration, base axes, (..., 3) [rad/s^2]."""
-        return self._view(21, 24)
+        return self._view('angular_acceleration')
 
     def __repr__(self) -> str:
         """Return the shape, and the numbers of a single sample."""
@@ -159,8 +165,8 @@ class Motion:
             return f'Motion of shape {self.shape}'
         return f'Motion(position={self.position.tolist()}, rotation={self.rotation.tolist()}, ...)'
 
-    def _view(self, first: int, end: int) -> Array:
-        view = self.rows[..., first:end]
+    def _view(self, name: str) -> Array:
+        view = self.rows[..., _PLACES[name]]
         view.setflags(write=False)
         return view
 
@@ -175,10 +181,18 @@ def as_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array
         raise MotionError(f'{name}: not an array of numbers: {exc}') from exc
     if array.shape[-len(tail):] != tail:
         raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         at = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
         raise MotionError(f'{name}{list(at)}: {array[at]}: must be finite')
     return array
+
+
+def common_shape(**shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the leading shape that all of these broadcast to; else MotionError names them."""
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError as exc:
+        raise MotionError(f'the leading shapes do not fit each other: {shapes}') from exc
 
 
 def _apply(matrix: Array, vector: Array) -> Array:

@@ -29,7 +29,7 @@ from stewart_dynamics import forward_dynamics, forward_kinematics, lagrange
 from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics.compiled import COMPILED
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.motion import as_array, Motion
+from stewart_dynamics.motion import as_array, common_shape, Motion
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.singularity import time_to_crossing, UNSOLVABLE_CONDITION
 
@@ -167,16 +167,14 @@ class StewartPlatform:
         """
         pushes = as_array('forces', forces, (6,))
         load = as_array('wrench', wrench, (runtime.WRENCH,))
-        shape = _common_shape(motion=motion.shape, forces=pushes.shape[:-1],
-                              wrench=load.shape[:-1])
+        shape = common_shape(motion=motion.shape, forces=pushes.shape[:-1],
+                             wrench=load.shape[:-1])
         rows = _copies(motion.rows, shape)
         pushes, load = _copies(pushes, shape), _copies(load, shape)
         _in_parts(len(rows), lambda part: forward_dynamics.solve(
             self.machine, rows[part], pushes[part], load[part]))
         _check_finite(rows, rows)
-        parts = np.split(rows.reshape(*shape, runtime.MOTION), [3, 12, 15, 18, 21], axis=-1)
-        parts[1] = parts[1].reshape(*shape, 3, 3)
-        return Motion(*parts)
+        return Motion.of_rows(rows.reshape(*shape, runtime.MOTION))
 
     def forward_kinematics(
             self, lengths: ArrayLike, guess: Motion | Pose | tuple[ArrayLike, ArrayLike]) -> Pose:
@@ -197,16 +195,16 @@ class StewartPlatform:
         Raises
         ------
         PoseError
-            The lengths belong to no pose that can be reached from the guess.
+            The lengths belong to no pose on the guess's side of singularities.
         SingularityError
-            A pose on the way from the guess is singular, or lies beyond a singularity.
+            The guess is singular, or a pose on the way from it.
         MotionError
             What is given does not fit or is not finite.
 
         """
         wanted = as_array('lengths', lengths, (6,))
         begin = guess if isinstance(guess, Motion) else Motion(*guess)
-        shape = _common_shape(lengths=wanted.shape[:-1], guess=begin.shape)
+        shape = common_shape(lengths=wanted.shape[:-1], guess=begin.shape)
         wanted, rows = _copies(wanted, shape), _copies(begin.rows, shape)
         codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
         residuals = np.empty(len(rows))
@@ -217,10 +215,11 @@ class StewartPlatform:
             where = (f'sample {at}: lengths {wanted[at].tolist()} m: from the guess '
                      f'{rows[at, :3].tolist()} m')
             if codes[at] == forward_kinematics.SINGULAR:
-                raise SingularityError(f'{where} the way leads through a singularity: give a '
-                                       'guess on the side that is meant')
-            raise PoseError(f'{where} no pose is found: after {steps[at]} steps a length is '
-                            f'{residuals[at]:.3g} m off, must be {forward_kinematics.RESIDUAL:g}')
+                raise SingularityError(f'{where} the way leads to a singular pose, in '
+                                       f'{steps[at]} steps: give a guess clear of it')
+            raise PoseError(
+                f'{where} no pose is found that has them: after {steps[at]} steps a length is '
+                f'{residuals[at]:.3g} m off, must be {forward_kinematics.RESIDUAL:g}')
         return Pose(rows[:, :3].reshape(*shape, 3).copy(),
                     rows[:, 3:12].reshape(*shape, 3, 3).copy())
 
@@ -232,7 +231,7 @@ class StewartPlatform:
         """
         motion = Motion(position, rotation)
         given = as_array('rates', rates, (6,))
-        shape = _common_shape(pose=motion.shape, rates=given.shape[:-1])
+        shape = common_shape(pose=motion.shape, rates=given.shape[:-1])
         given, rows = _copies(given, shape), _copies(motion.rows, shape)
         _check_solvable(rows, self.solve(rows))
         forward_kinematics.twists(self.machine, given, rows)
@@ -294,7 +293,7 @@ class StewartPlatform:
         if wrench is None:
             return motion.rows.reshape(-1, runtime.MOTION), self._no_wrench, motion.shape
         load = as_array('wrench', wrench, (runtime.WRENCH,))
-        shape = _common_shape(motion=motion.shape, wrench=load.shape[:-1])
+        shape = common_shape(motion=motion.shape, wrench=load.shape[:-1])
         rows = (_copies(motion.rows, shape) if shape != motion.shape
                 else motion.rows.reshape(-1, runtime.MOTION))
         return rows, _copies(load, shape), shape
@@ -315,7 +314,7 @@ def _in_parts(many: int, do: Callable[[slice], None]) -> None:
     """Do so many samples in parts, large batches on all processors."""
     threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
     if threads < 2:
-        do(slice(None))
+        do(slice(0, many))
         return
     # More parts than threads: a thread that is held up leaves more to the others.
     edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
@@ -323,18 +322,12 @@ def _in_parts(many: int, do: Callable[[slice], None]) -> None:
         list(pool.map(do, map(slice, edges[:-1], edges[1:])))
 
 
-def _common_shape(**shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the leading shape that all of these broadcast to; else MotionError names them."""
-    try:
-        return np.broadcast_shapes(*shapes.values())
-    except ValueError as exc:
-        raise MotionError(f'the leading shapes do not fit each other: {shapes}') from exc
-
-
 def _copies(array: Array, shape: tuple[int, ...]) -> Array:
     """Return rows (N, ...) of their own of an array that is broadcast to a leading shape."""
     last = array.shape[-1]
-    return np.array(np.broadcast_to(array, (*shape, last)), order='C').reshape(-1, last)
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, last))
+    return np.array(array, order='C').reshape(-1, last)
 
 
 def _check_finite(rows: Array, results: Array) -> None:

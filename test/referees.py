@@ -21,8 +21,12 @@ Nothing here uses the package's equations; only Parameters and Motion, which car
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+import os
 from pathlib import Path
+import subprocess
+import sys
+import tempfile
 from typing import Any
 
 import numpy as np
@@ -231,6 +235,22 @@ def friction(p: Parameters, rates: Array) -> Array:
     f: Array = (p['actuator.viscous_friction'] * rates
                 + p['actuator.coulomb_friction'] * np.clip(rates / 1e-3, -1.0, 1.0))
     return f
+
+
+def uncompiled(code: str, given: Mapping[str, Array]) -> dict[str, Array]:
+    """Return what becomes of arrays, the dict ``given``, where code runs with no compiler."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / 'arrays.npz'
+        np.savez(path, **given)
+        whole = (f'import numpy as np\ngiven = dict(np.load({str(path)!r}))\n'
+                 f'{code}np.savez({str(path)!r}, **given)\n')
+        done = subprocess.run([sys.executable, '-c', whole], cwd=ROOT, capture_output=True,
+                              text=True, check=False,
+                              env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == '', done.stderr
+        with np.load(path) as arrays:
+            return dict(arrays)
 
 
 class PinocchioReferee:

@@ -499,8 +499,9 @@ def test_no_samples_give_no_results() -> None:
 ])
 def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
     platform = StewartPlatform(symmetric_parameters())
-    with pytest.raises(MotionError, match=f'wrench.*{text}'):
+    with pytest.raises(MotionError, match=text) as error:
         platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
+    assert 'wrench' in str(error.value)
 
 
 def test_many_loads_on_one_pose_are_many_samples() -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 import re
 import xml.etree.ElementTree as ElementTree
 
+import numpy as np
 import pytest
 
 from stewart_dynamics import setpoints, step
@@ -44,15 +45,18 @@ def test_topics_are_those_of_the_code() -> None:
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
 
 
-def test_the_example_runs(
+def test_the_examples_run(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     blocks = re.findall(r'```python\n(.*?)```', README, flags=re.DOTALL)
-    assert len(blocks) == 1
+    assert len(blocks) == 2
     monkeypatch.chdir(ROOT)
-    exec(compile(blocks[0], 'README.md', 'exec'), {})
+    exec(compile(''.join(blocks), 'README.md', 'exec'), {})
     printed = capsys.readouterr().out.split('\n')
     assert len(printed[0].strip('[] ').split()) == 6
     assert 1.0 < float(printed[1]) < 20.0
+    assert float(printed[2]) < 1e-12
+    assert float(printed[3].strip('[] ').split()[2]) == pytest.approx(1.1, abs=1e-3)
+    assert float(printed[4].strip('[] ').split()[2]) == pytest.approx(-0.1 * np.pi, abs=1e-3)
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))

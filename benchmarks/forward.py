@@ -1,0 +1,181 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The way back, forces to accelerations and lengths to poses: how fast, and from how far away.
+
+Run by hand, ``make bench``; README.md beside this file says what is compared and how.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from inverse_dynamics import (
+    Contestant, example_machine, machine_measured_on, measure, once, random_motions, repeated,
+    ROUNDS, table, Tree, write)
+import numpy as np
+import pinocchio as pin
+from scipy.optimize import root
+
+from stewart_dynamics import (
+    forward_dynamics, forward_kinematics, Motion, Pose, StewartPlatform)
+from stewart_dynamics import inverse_dynamics as runtime
+from stewart_dynamics.forward_kinematics import FOUND
+from stewart_dynamics.rotation import from_euler
+
+BEGIN, END = '<!-- forward: begin -->', '<!-- forward: end -->'
+
+HOME = np.array([0.0, 0.0, 1.1])
+FAR, FAR_ANGLE = 0.2 * HOME[2], 0.2
+GUESSES = 1_000_000
+SAMPLES = 20_000
+ABA = '`pin.aba` alone'
+NEWTON = '`forward_kinematics.poses`, one row, from afar'
+
+
+def turns_about(axes: Any, angle: float) -> Any:
+    """Return rotations by an angle about axes (N, 3) of any length (Rodrigues)."""
+    k = np.cross(axes[:, None] / np.linalg.norm(axes, axis=-1)[:, None, None], np.eye(3))
+    k = np.swapaxes(k, -1, -2)
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+
+
+def legal_poses(platform: StewartPlatform, random: np.random.Generator, many: int) -> Motion:
+    """Return poses all over the workspace that README.md states."""
+    p, found = platform.parameters, []
+    while sum(map(len, found)) < many:
+        motion = Motion(
+            HOME + random.uniform(-0.6, 0.6, (many, 3)),
+            from_euler(random.uniform(-1.0, 1.0, (many, 3)) * np.radians([20.0, 20.0, 30.0])))
+        lengths = platform.inverse_kinematics(motion.position, motion.rotation)
+        legal = np.all((lengths >= p['limits.length_min'])
+                       & (lengths <= p['limits.length_max']), axis=-1)
+        found.append(motion.rows[legal])
+    rows = np.concatenate(found)[:many]
+    return Motion(rows[:, :3], rows[:, 3:12].reshape(-1, 3, 3))
+
+
+def far_from(motion: Motion, random: np.random.Generator) -> Motion:
+    """Return guesses as far from poses as Newton's method is asked to come from."""
+    way, axis = random.normal(size=(2, len(motion.rows), 3))
+    way *= FAR / np.linalg.norm(way, axis=-1, keepdims=True)
+    return Motion(motion.position + way, turns_about(axis, FAR_ANGLE) @ motion.rotation)
+
+
+def steps_table(platform: StewartPlatform) -> list[str]:
+    """Return the lines of a table of how many steps Newton's method takes, and where it fails."""
+    random = np.random.default_rng(20260103)
+    poses = legal_poses(platform, random, GUESSES)
+    guesses = far_from(poses, random)
+    lengths = platform.inverse_kinematics(poses.position, poses.rotation)
+    rows = guesses.rows.copy()
+    codes, steps = np.empty(GUESSES, dtype=np.int64), np.empty(GUESSES, dtype=np.int64)
+    residuals = np.empty(GUESSES)
+    forward_kinematics.poses(platform.machine, lengths, rows, codes, steps, residuals)
+    found = codes == FOUND
+    determinants = [platform.solve(each.rows)[:, runtime.DETERMINANT] for each in (poses, guesses)]
+    beyond = determinants[0] * determinants[1] <= 0.0
+    right = found & np.all(np.abs(rows[:, :12] - poses.rows[:, :12]) < 1e-9, axis=-1)
+    shares = [*((f'arrive in at most {most} steps', found & (steps <= most))
+                for most in (4, 5, 6, 10)),
+              ('lie beyond a singularity themselves', beyond),
+              ('do not, and arrive nowhere', ~found & ~beyond),
+              ('do not, and arrive at another pose', found & ~right & ~beyond)]
+    return ['| of a million guesses, 20 % of the height and 0.2 rad away | % |', '| --- | ---: |',
+            *(f'| {what} | {100.0 * np.mean(which):.3f} |' for what, which in shares),
+            '', f'Largest residual of a pose found: {residuals[found].max():.1e} m.']
+
+
+def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
+    """Return what is measured: forward dynamics, in batches as well, and forward kinematics."""
+    motion = random_motions(SAMPLES)
+    forces = platform.solve(motion.rows)[:, runtime.FORCES:runtime.FORCES + 6].copy()
+    one = Motion(motion.position[0], motion.rotation[0], motion.linear_velocity[0],
+                 motion.angular_velocity[0])
+    row, force, no_wrench = motion.rows[:1].copy(), forces[:1].copy(), np.zeros((1, 6))
+    tree = Tree(platform.parameters)
+    q, v, _, _ = tree.state(one)
+    dynamics = [
+        Contestant('`forward_dynamics.solve`, one row', repeated(
+            'solve(machine, rows, forces, wrenches)', solve=forward_dynamics.solve,
+            machine=platform.machine, rows=row, forces=force, wrenches=no_wrench), ABA),
+        Contestant(ABA, repeated(
+            'aba(model, data, q, v, tau)', aba=pin.aba, model=tree.model, data=tree.data, q=q,
+            v=v, tau=np.zeros(tree.model.nv)), ABA),
+        Contestant('`StewartPlatform.forward_dynamics`, one `Motion`', repeated(
+            'solve(motion, forces)', solve=platform.forward_dynamics, motion=one,
+            forces=forces[0]), ABA),
+        Contestant(f'`forward_dynamics.solve`, a sample of {SAMPLES:,}', once(
+            SAMPLES, forward_dynamics.solve, platform.machine, motion.rows.copy(), forces,
+            no_wrench), ABA)]
+
+    random = np.random.default_rng(20260103)
+    pose = legal_poses(platform, random, 1)
+    guess = far_from(pose, random)
+    lengths = platform.inverse_kinematics(pose.position, pose.rotation)
+    codes, steps, residuals = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64), np.empty(1)
+
+    def newton(begin: Any) -> Any:
+        return repeated(
+            'rows[:] = begin; poses(machine, lengths, rows, codes, steps, residuals)',
+            poses=forward_kinematics.poses, machine=platform.machine, lengths=lengths,
+            rows=begin.copy(), begin=begin, codes=codes, steps=steps, residuals=residuals)
+
+    near = pose.rows.copy()
+    near[0, :3] += [1e-4, -2e-4, 1e-4]  # 0.2 m/s at 1 kHz
+
+    def miss(x: Any) -> Any:
+        return platform.inverse_kinematics(x[:3], from_euler(x[3:])) - lengths[0]
+
+    start = np.concatenate([guess.position[0], np.zeros(3)])
+    assert np.max(np.abs(root(miss, start, tol=1e-12).fun)) < 1e-9
+    kinematics = [
+        Contestant(NEWTON, newton(guess.rows), NEWTON),
+        Contestant('the same from the pose of a millisecond before', newton(near), NEWTON),
+        *(Contestant(f'`StewartPlatform.forward_kinematics` from afar, guess a `{kind}`', repeated(
+            'find(lengths, guess)', find=platform.forward_kinematics, lengths=lengths[0],
+            guess=begin), NEWTON) for kind, begin in (
+                ('Motion', Motion(guess.position[0], guess.rotation[0])),
+                ('Pose', Pose(guess.position[0], guess.rotation[0])))),
+        Contestant('`scipy.optimize.root` on `inverse_kinematics`', repeated(
+            'root(miss, start, tol=1e-12)', root=root, miss=miss, start=start), NEWTON)]
+    return dynamics, kinematics
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
+    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    options = parser.parse_args()
+    if options.rounds < 1:
+        parser.error('--rounds must be at least 1')
+
+    platform = StewartPlatform(example_machine())
+    dynamics, kinematics = contestants(platform)
+    turns = measure(dynamics + kinematics, options.rounds)
+    lines = [
+        '', *table('forward dynamics', dynamics, turns),
+        '', *table('forward kinematics', kinematics, turns),
+        '', *steps_table(platform),
+        '', f'{machine_measured_on()} Medians of {options.rounds} rounds.', '']
+    print('\n'.join(lines))
+    if options.write:
+        write(lines, BEGIN, END)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,276 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Forward kinematics: the pose comes back from its lengths, and no other pose ever does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    QUARTER_TURN, random_motion, random_parameters, rng, ROOT, size_of, symmetric_parameters,
+    uncompiled)
+
+from stewart_dynamics import (
+    forward_kinematics, lagrange, Motion, MotionError, Parameters, Pose, PoseError,
+    SingularityError, StewartPlatform)
+from stewart_dynamics.compiled import COMPILED
+from stewart_dynamics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
+from stewart_dynamics.rotation import from_euler
+
+Array = NDArray[np.float64]
+
+HOME = (0.0, 0.0, 1.1)
+
+
+@pytest.fixture(scope='module')
+def machine() -> StewartPlatform:
+    """Return the machine in config/."""
+    return StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
+
+
+def independent_lengths(p: Parameters, position: Array, rotation: Array) -> Array:
+    """Return the leg lengths at poses, by numpy alone."""
+    arms = np.einsum('...jk,ik->...ij', rotation, p['geometry.platform_joints'])
+    lengths: Array = np.linalg.norm(
+        position[..., None, :] + arms - p['geometry.base_joints'], axis=-1)
+    return lengths
+
+
+def away(pose: Any, random: np.random.Generator, distance: float, angle: float) -> Pose:
+    """Return guesses so far from poses, in any direction and about any axis."""
+    way, axis = random.normal(size=(2, len(pose.position), 3))
+    way *= distance / np.linalg.norm(way, axis=-1, keepdims=True)
+    axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+    k = np.cross(axis[:, None], np.eye(3)).swapaxes(-1, -2)  # Rodrigues
+    turn = np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+    return Pose(pose.position + way, turn @ pose.rotation)
+
+
+def legal_poses(p: Parameters, random: np.random.Generator, many: int) -> Pose:
+    """Return poses all over the workspace: all lengths legal, turned by 20, 20, 30 deg at most."""
+    position = np.array(HOME) + random.uniform(-0.6, 0.6, (20 * many, 3))
+    rotation = from_euler(random.uniform(-1.0, 1.0, (20 * many, 3)) * np.radians([20, 20, 30]))
+    lengths = independent_lengths(p, position, rotation)
+    legal = np.flatnonzero(np.all(
+        (lengths >= p['limits.length_min']) & (lengths <= p['limits.length_max']), axis=-1))
+    assert len(legal) >= many
+    return Pose(position[legal[:many]], rotation[legal[:many]])
+
+
+@pytest.mark.parametrize('seed', range(50))
+def test_a_pose_comes_back_from_its_lengths_and_a_twist_from_its_rates(seed: int) -> None:
+    random = rng(seed)
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = random_motion(p, random, 20)
+    truth = platform.inverse_dynamics(motion)
+    found = platform.forward_kinematics(
+        truth.lengths, away(motion, random, 0.1 * size_of(p), 0.1))
+    assert np.max(np.abs(found.position - motion.position)) < 1e-12 * size_of(p)
+    assert np.max(np.abs(found.rotation - motion.rotation)) < 1e-12
+    assert np.max(np.abs(independent_lengths(p, *found) - truth.lengths)) < RESIDUAL
+    twist = platform.twist(*found, truth.rates)
+    assert twist == pytest.approx(motion.rows[:, 12:18], rel=1e-11, abs=1e-11 * size_of(p))
+    rates = np.einsum('nij,nj->ni', platform.jacobian(*found), twist)
+    assert rates == pytest.approx(truth.rates, rel=1e-12, abs=1e-12 * size_of(p))
+
+
+def test_from_far_it_takes_six_steps_at_most_and_never_ends_at_another_pose(
+        machine: StewartPlatform) -> None:
+    p, random, many = machine.parameters, rng(), 100_000
+    poses = legal_poses(p, random, many)
+    guess = away(poses, random, 0.2 * HOME[2], 0.2)
+    lengths = independent_lengths(p, *poses)
+    rows = Motion(*guess).rows.copy()
+    codes, steps, residuals = (np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64),
+                               np.empty(many))
+    forward_kinematics.poses(machine.machine, lengths, rows, codes, steps, residuals)
+    found = codes == FOUND
+    assert np.mean(found & (steps <= 6)) > 0.999
+    assert np.max(residuals[found]) <= RESIDUAL
+    assert np.max(np.abs(independent_lengths(
+        p, rows[found, :3], rows[found, 3:12].reshape(-1, 3, 3)) - lengths[found])) <= RESIDUAL
+    # A guess that lies itself beyond a singularity finds what assembly there is, if any.
+    same_side = (np.sign(np.linalg.det(machine.jacobian(*poses)))
+                 == np.sign(np.linalg.det(machine.jacobian(*guess))))
+    assert 0.999 < np.mean(same_side) < 1.0
+    assert np.all(found[same_side])
+    assert np.max(np.abs(rows[same_side, :12] - Motion(*poses).rows[same_side, :12])) < 1e-10
+    # What is not found is left as it was guessed.
+    assert np.array_equal(rows[~found], Motion(*guess).rows[~found])
+
+
+def test_the_assembly_of_the_guess_is_kept(machine: StewartPlatform) -> None:
+    # Base and platform joints of this machine lie in planes: mirrored in the base's, the pose
+    # has the same lengths, and its det(J) the other sign.
+    position, rotation = np.array([0.1, -0.05, 1.15]), from_euler([0.1, -0.2, 0.3])
+    mirror = np.diag([1.0, 1.0, -1.0])
+    below = Pose(mirror @ position, mirror @ rotation @ mirror)
+    lengths = machine.inverse_kinematics(position, rotation)
+    assert np.allclose(machine.inverse_kinematics(*below), lengths, atol=1e-15)
+    for pose in (Pose(position, rotation), below):
+        guess = (pose.position + [0.05, 0.05, -0.08], pose.rotation @ from_euler([0.1, 0.0, 0.1]))
+        found = machine.forward_kinematics(lengths, guess)
+        assert np.max(np.abs(found.position - pose.position)) < 1e-13
+        assert np.max(np.abs(found.rotation - pose.rotation)) < 1e-13
+
+
+def test_it_does_not_go_through_a_singularity() -> None:
+    # Turned by 90 degrees about its axis this machine is singular, and there the squares of the
+    # lengths of even and odd legs differ most.
+    platform = StewartPlatform(symmetric_parameters())
+
+    def turned(degrees: float) -> Pose:
+        return Pose(np.array([0.0, 0.0, 1.0]), from_euler([0.0, 0.0, np.radians(degrees)]))
+
+    lengths = platform.inverse_kinematics(*turned(100.0))
+    for guess in (91.0, 105.0, 120.0):
+        found = platform.forward_kinematics(lengths, turned(guess))
+        assert np.max(np.abs(found.rotation - turned(100.0).rotation)) < 1e-10
+    for guess in (89.0, 80.0, 60.0):  # another assembly has these lengths on this side
+        found = platform.forward_kinematics(lengths, turned(guess))
+        assert np.max(np.abs(found.rotation - turned(80.0).rotation)) < 1e-10
+        assert np.max(np.abs(platform.inverse_kinematics(*found) - lengths)) < RESIDUAL
+    squares = platform.inverse_kinematics(*turned(90.0)) ** 2
+    beyond = np.sqrt(squares + 0.01 * np.sign(squares - squares.mean()))
+    for guess in (85.0, 95.0):
+        with pytest.raises(PoseError):
+            platform.forward_kinematics(beyond, turned(guess))
+
+
+def test_a_singular_guess_is_refused() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    lengths = platform.inverse_kinematics([0.0, 0.0, 1.0], np.eye(3))
+    with pytest.raises(SingularityError):
+        platform.forward_kinematics(lengths, ([0.0, 0.0, 1.0], QUARTER_TURN))
+    with pytest.raises(SingularityError, match='condition number'):
+        platform.twist([0.0, 0.0, 1.0], QUARTER_TURN, np.ones(6))
+
+
+@pytest.mark.parametrize('lengths', [
+    [9.0, 1.0, 1.0, 1.0, 1.0, 1.0],  # two neighbouring legs cannot differ by more than a triangle
+    [0.0] * 6, [-1.2] * 6, [1e-300] * 6, [1e200] * 6, [5.0, 0.1, 5.0, 0.1, 5.0, 0.1]])
+def test_lengths_that_belong_to_no_pose_are_an_error(
+        machine: StewartPlatform, lengths: Any) -> None:
+    with pytest.raises(PoseError, match='sample 0: lengths'):
+        machine.forward_kinematics(lengths, (HOME, np.eye(3)))
+
+
+def test_of_many_lengths_those_of_no_pose_are_named(machine: StewartPlatform) -> None:
+    lengths = machine.inverse_kinematics(HOME, np.eye(3))
+    with pytest.raises(PoseError) as error:
+        machine.forward_kinematics(
+            [lengths, lengths + [0.9, -0.3, 0.0, 0.0, 0.0, 0.0]], (HOME, np.eye(3)))
+    assert str(error.value).startswith('sample 1: lengths [')
+    assert str(error.value).endswith('must be 1e-12')
+
+
+def test_following_a_motion_from_pose_to_pose_does_not_drift(machine: StewartPlatform) -> None:
+    times = np.linspace(0.0, 20.0, 20_000)[:, None]
+    motion = Motion.from_euler(
+        HOME + 0.1 * np.sin(times * [1.0, 1.3, 1.7]), 0.2 * np.sin(times * [1.1, 0.7, 0.9]))
+    lengths = independent_lengths(machine.parameters, motion.position, motion.rotation)
+    row = motion.rows[:1].copy()
+    code, steps, residual = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64), np.empty(1)
+    for n in range(len(times)):
+        forward_kinematics.poses(machine.machine, lengths[n:n + 1], row, code, steps, residual)
+        assert code[0] == FOUND
+        assert steps[0] <= 3
+        assert np.max(np.abs(row[0, :12] - motion.rows[n, :12])) < 2e-14
+
+
+def test_a_guess_is_a_motion_a_pose_or_a_pair(machine: StewartPlatform) -> None:
+    truth = Pose(np.array([0.1, 0.0, 1.2]), from_euler([0.1, 0.0, -0.1]))
+    lengths = machine.inverse_kinematics(*truth)
+    guess = Motion(HOME, np.eye(3))
+    found = [machine.forward_kinematics(lengths, each) for each in (
+        guess, Pose(guess.position, guess.rotation), (HOME, np.eye(3).tolist()))]
+    for pose in found:
+        assert np.array_equal(pose.position, found[0].position)
+        assert np.max(np.abs(pose.rotation - truth.rotation)) < 1e-14
+    assert np.max(np.abs(machine.forward_kinematics(lengths, found[0]).position
+                         - truth.position)) < 1e-15
+
+
+def test_leading_shapes_broadcast(machine: StewartPlatform) -> None:
+    poses = legal_poses(machine.parameters, rng(), 12)
+    lengths = machine.inverse_kinematics(*poses)
+    one_by_one = [machine.forward_kinematics(each, (HOME, np.eye(3))) for each in lengths]
+    shaped = machine.forward_kinematics(lengths.reshape(3, 4, 6), (HOME, np.eye(3)))
+    assert shaped.position.shape == (3, 4, 3)
+    assert shaped.rotation.shape == (3, 4, 3, 3)
+    assert np.array_equal(shaped.position.reshape(12, 3), [each.position for each in one_by_one])
+    guesses = (np.tile(HOME, (12, 1)), np.tile(np.eye(3), (12, 1, 1)))
+    assert machine.forward_kinematics(lengths[0], guesses).position.shape == (12, 3)
+    assert machine.twist(*shaped, np.ones(6)).shape == (3, 4, 6)
+    assert machine.twist(HOME, np.eye(3), np.ones((5, 6))).shape == (5, 6)
+    if COMPILED:
+        assert len(forward_kinematics.poses.signatures) == 1
+        assert len(forward_kinematics.twists.signatures) == 1
+
+
+@pytest.mark.parametrize(('lengths', 'guess', 'text'), [
+    (np.ones(5), (HOME, np.eye(3)), 'lengths: shape (5,)'),
+    ([np.nan] * 6, (HOME, np.eye(3)), 'lengths[0]: nan'),
+    (np.ones(6), (HOME, 2.0 * np.eye(3)), 'not a rotation'),
+    (np.ones((2, 6)), ([HOME] * 3, np.eye(3)), "'lengths': (2,), 'guess': (3,)")])
+def test_what_does_not_fit_is_refused(
+        machine: StewartPlatform, lengths: Any, guess: Any, text: str) -> None:
+    with pytest.raises(MotionError) as error:
+        machine.forward_kinematics(lengths, guess)
+    assert text in str(error.value)
+
+
+@pytest.mark.parametrize('rates', [np.ones(5), [np.inf] * 6, np.ones((3, 6))])
+def test_rates_that_do_not_fit_are_refused(machine: StewartPlatform, rates: Any) -> None:
+    with pytest.raises(MotionError, match='rates'):
+        machine.twist([HOME] * 2, np.eye(3), rates)
+
+
+def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
+    platform, random = StewartPlatform(symmetric_parameters()), rng()
+    motion = random_motion(platform.parameters, random, 10)
+    truth = platform.inverse_dynamics(motion)
+    lengths, rates = truth.lengths.copy(), truth.rates.copy()
+    lengths[3] = 0.01
+    rows = Motion(*away(motion, random, 0.1, 0.1)).rows.copy()
+    rows[4, 3:12] = QUARTER_TURN.ravel()
+    codes, steps, residuals = np.empty(10, dtype=int), np.empty(10, dtype=int), np.empty(10)
+    given = {'machine': platform.machine, 'lengths': lengths, 'rates': rates,
+             'rows': rows.copy(), 'codes': codes.copy(), 'steps': steps.copy(),
+             'residuals': residuals.copy()}
+    plain = uncompiled(
+        'from stewart_dynamics.forward_kinematics import poses, twists\n'
+        "poses(given['machine'], given['lengths'], given['rows'], given['codes'],\n"
+        "      given['steps'], given['residuals'])\n"
+        "twists(given['machine'], given['rates'], given['rows'])\n", given)
+    forward_kinematics.poses(platform.machine, lengths, rows, codes, steps, residuals)
+    forward_kinematics.twists(platform.machine, rates, rows)
+    assert codes[3] != FOUND
+    assert codes[4] == SINGULAR
+    for name, value in (('rows', rows), ('codes', codes), ('steps', steps),
+                        ('residuals', residuals)):
+        assert np.array_equal(plain[name], value), name
+
+
+def test_the_lengths_found_are_those_of_the_readable_reference(machine: StewartPlatform) -> None:
+    poses = legal_poses(machine.parameters, rng(), 200)
+    lengths = lagrange.legs(machine.parameters, *poses).lengths
+    found = machine.forward_kinematics(lengths, (HOME, np.eye(3)))
+    assert np.max(np.abs(
+        lagrange.legs(machine.parameters, *found).lengths - lengths)) < RESIDUAL
