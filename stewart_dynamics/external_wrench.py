@@ -26,10 +26,11 @@ base axes, the negative of the residual wrench in ``replay.measured``. All that 
 have is in it: a wrong payload or friction, a brake, an end stop.
 
 Pose and twist come from lengths and rates (``forward_kinematics``); the acceleration is the
-difference of two twists by the time between them, the mean over that time, which belongs to
-forces that are held, or averaged, over it. The difference quotient is rough, and passes through a
-low-pass filter of the first order, ``r' = 2 pi cutoff (w_touch - r)``, solved exactly for any time
-dt between two samples, over which w_touch is constant; it begins at zero. That makes r the
+difference of two twists by the time between them, its mean over that time. The forces are those
+that acted in that time, as a controller holds them, and all else is the mean of what it is at both
+ends (the trapezoidal rule, an error of second order). The difference quotient is rough, and passes
+through a low-pass filter of the first order, ``r' = 2 pi cutoff (w_touch - r)``, solved exactly
+for any time dt between two samples, over which w_touch is constant; it begins at zero. That is the
 generalized momentum observer of De Luca et al. (Collision detection and safe reaction with the
 DLR-III lightweight manipulator arm, IROS 2006, doi:10.1109/IROS.2006.282053) with the gain K =
 2 pi cutoff: of r' = K (p' - u - r), p the momentum, it takes the integral, r = K (p -
@@ -51,7 +52,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics import cdr, forward_kinematics
 from stewart_dynamics import inverse_dynamics as runtime
-from stewart_dynamics.compiled import entry_point, source_digest
+from stewart_dynamics.compiled import entry_point, inlined, source_digest
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import StewartPlatform
@@ -69,7 +70,8 @@ _OUT_OF_RANGE = 3
 
 # One measurement in numbers: machine, lengths, rates, forces, known load, filter before, gain of
 # the filter, time since the last one (0: there is none), motion of the last one or guess; then,
-# written, motion, filter after, measured - model forces, steps and residual of the pose, code.
+# written, motion (behind the last one: two rows for solve), filter after, measured - model forces,
+# steps and residual of the pose, code.
 _LENGTHS = runtime.MACHINE
 _RATES = _LENGTHS + 6
 _FORCES = _RATES + 6
@@ -134,6 +136,22 @@ class Estimate(NamedTuple):
         return math.hypot(*self.wrench[3:]) if self.wrench else 0.0
 
 
+@inlined
+def _add_end(numbers: Array, machine: Array, motion: Array, result: Array) -> None:
+    """Add what one end of the interval has of the wrench and of the differences: half of each."""
+    position = motion[0], motion[1], motion[2]
+    rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
+                motion[10], motion[11])
+    for leg in range(6):
+        a, _length, _inverse_length, s = runtime.leg_line(machine, leg, position, rotation)
+        m = cross(a, s)
+        half = 0.5 * (numbers[_FORCES + leg] - result[runtime.FORCES + leg])
+        numbers[_DIFFERENCES + leg] += half
+        for n in range(3):
+            numbers[_AFTER + n] -= half * s[n]
+            numbers[_AFTER + 3 + n] -= half * m[n]
+
+
 def _entry_point(source: str) -> Callable[[Array], None]:
     @entry_point
     def one(numbers: Array) -> None:
@@ -151,24 +169,16 @@ def _entry_point(source: str) -> Callable[[Array], None]:
         dt = numbers[_INTERVAL]
         for n in range(6):
             motion[18 + n] = (motion[12 + n] - numbers[_MOTION + 12 + n]) / dt if dt > 0.0 else 0.0
+            numbers[_MOTION + 18 + n] = motion[18 + n]
             numbers[_AFTER + n] = 0.0
             numbers[_DIFFERENCES + n] = 0.0
         if dt > 0.0:
-            result = np.empty((1, runtime.RESULT))
-            runtime.solve(machine, motion.reshape(1, runtime.MOTION),
-                          numbers[_KNOWN:_KNOWN + runtime.WRENCH].reshape(1, runtime.WRENCH),
-                          result)
-            position = motion[0], motion[1], motion[2]
-            rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8],
-                        motion[9], motion[10], motion[11])
-            for leg in range(6):
-                a, _length, _inverse_length, s = runtime.leg_line(machine, leg, position, rotation)
-                m = cross(a, s)
-                difference = numbers[_FORCES + leg] - result[0, runtime.FORCES + leg]
-                numbers[_DIFFERENCES + leg] = difference
-                for n in range(3):
-                    numbers[_AFTER + n] -= difference * s[n]
-                    numbers[_AFTER + 3 + n] -= difference * m[n]
+            motions = numbers[_MOTION:_MOTION_AFTER + runtime.MOTION].reshape(2, runtime.MOTION)
+            results = np.empty((2, runtime.RESULT))
+            runtime.solve(machine, motions, numbers[_KNOWN:_KNOWN + runtime.WRENCH].reshape(
+                1, runtime.WRENCH), results)
+            for end in range(2):
+                _add_end(numbers, machine, motions[end], results[end])
             for n in range(6):
                 before = numbers[_BEFORE + n]
                 numbers[_AFTER + n] = before + numbers[_GAIN] * (numbers[_AFTER + n] - before)
