@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-node bench-replay clean demo docs environment lint test
+.PHONY: bags bench bench-loop bench-node bench-replay clean demo docs environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -62,6 +62,9 @@ demo: $(INSTALLED)
 bench: $(INSTALLED)
 	.venv/bin/python benchmarks/inverse_dynamics.py --write
 	.venv/bin/python benchmarks/forward.py --write
+
+bench-loop: $(INSTALLED)
+	.venv/bin/python benchmarks/simulator.py --write
 
 bench-node: $(INSTALLED)
 	.venv/bin/python benchmarks/node.py --write

@@ -32,6 +32,7 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
+from stewart_dynamics.plant import SimulatorParameters
 from stewart_dynamics.replay.one import NODE, replay
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.setpoints import Setpoints
@@ -50,9 +51,11 @@ AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 
 
 def table(kind: type[ParameterSet]) -> str:
-    """Return a Markdown table of a node's parameters."""
+    """Return a Markdown table of a node's parameters, those of the machine once for all."""
     lines = ['| name | type | unit | default | meaning |', '| --- | --- | --- | --- | --- |']
     for parameter in kind.table.values():
+        if kind is SimulatorParameters and parameter.name in Parameters.table:
+            continue
         rule = f'; {parameter.rule}' if parameter.rule else ''
         lines.append(f'| `{parameter.name}` | {parameter.ros_type} | {parameter.unit} | '
                      f'{_default(parameter)} | {parameter.text}{rule} |')
@@ -79,7 +82,8 @@ def _default(parameter: Parameter) -> str:
 
 def readme(text: str) -> str:
     """Return the README with its tables made anew."""
-    for name, kind in (('node', Parameters), ('trajectory', TrajectoryParameters)):
+    for name, kind in (('node', Parameters), ('trajectory', TrajectoryParameters),
+                       ('simulator', SimulatorParameters)):
         begin, end = f'<!-- parameters of the {name} -->\n', f'<!-- end of {name} -->'
         before, _, rest = text.partition(begin)
         _, _, after = rest.partition(end)

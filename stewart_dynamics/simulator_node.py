@@ -97,7 +97,7 @@ class SimulatorNode(Node):
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
-            + f', {self._rate:g} periods in a second, {self._plant.steps} steps in each')
+            + f', {self._rate:g} periods in a second, steps in each: {self._plant.steps}')
         if self._stepped:
             self._clock_output = self.create_publisher(Clock, '/clock', qos)
             self._messages = self._messages_now()

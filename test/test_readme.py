@@ -24,7 +24,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from stewart_dynamics import setpoints, step
+from stewart_dynamics import plant, setpoints, step
 from stewart_dynamics.parameters import PARAMETERS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,7 +41,8 @@ def test_tables_of_parameters_are_those_of_the_code(monkeypatch: pytest.MonkeyPa
 
 
 def test_topics_are_those_of_the_code() -> None:
-    for topic, kind in {**setpoints.INPUT_TYPES, **step.OUTPUT_TYPES}.items():
+    for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
+                        *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
 
 

@@ -47,6 +47,7 @@ from running import (  # noqa: E402
     assert_only_log_lines, DEADLINE, DynamicsNode, executable, INPUTS, log_lines, NODE, OUTPUTS,
     Peer, PLATFORM, Program)
 
+from stewart_dynamics import plant  # noqa: E402
 from stewart_dynamics.errors import StewartError  # noqa: E402
 from stewart_dynamics.security import check_environment  # noqa: E402
 
@@ -168,6 +169,35 @@ def test_the_policy_is_what_the_source_does(domain: int, tmp_path: Path) -> None
         peer.until(lambda: name not in peer.node.get_node_names(), 'the source has gone')
     peer.close()
     assert union == granted('/stewart_trajectory')
+
+
+def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> None:
+    """The same for stewart_simulator, in real time and step by step."""
+    peer = Peer(domain)
+    union: dict[str, set[str]] = {}
+    name = 'stewart_simulator'
+    for number, stepped in enumerate(('false', 'true')):
+        program = Program(
+            [executable(name), '--ros-args', '--params-file', PLATFORM, '--params-file',
+             ROOT / 'config' / 'simulator.yaml', '-p', f'use_sim_time:={stepped}'],
+            domain, tmp_path / str(number))
+        peer.watched = program
+        try:
+            peer.until(lambda: name in peer.node.get_node_names(), 'the simulator is there')
+            # What it makes last: a subscription, and /clock where it has one.
+            peer.until(lambda number=number: f'/{name}/wrench' in done_by(peer, name).get(
+                'subscribe', ()) and len(done_by(peer, name)['publish']) == (6, 7)[number],
+                'its topics are known')
+            for right, names in done_by(peer, name).items():
+                union.setdefault(right, set()).update(names)
+        finally:
+            peer.watched = None
+            program.stop()
+        peer.until(lambda: name not in peer.node.get_node_names(), 'the simulator has gone')
+    peer.close()
+    assert union == granted('/stewart_simulator')
+    assert {f'/{name}/{topic}' for topic in plant.OUTPUT_TYPES} < union['publish']
+    assert {f'/{name}/{topic}' for topic in plant.INPUT_TYPES} < union['subscribe']
 
 
 # What would start with less security than is asked for does not start
