@@ -17,7 +17,7 @@ The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the machine; a caller asks
-for parameters and states meanwhile.
+for parameters and states meanwhile, a viewer takes the markers.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from visualization_msgs.msg import MarkerArray
 
 from stewart_dynamics import cdr
 from stewart_dynamics.rotation import to_quaternion
@@ -188,6 +189,18 @@ def call(name: str) -> None:
     print(len(answered), flush=True)
 
 
+def view(name: str) -> None:
+    """Take the markers of a node as bytes, until a signal, and say how many there were."""
+    node = rclpy.create_node('viewer')
+    seen: list[int] = []
+    node.create_subscription(MarkerArray, f'/{name}/markers', lambda data: seen.append(len(data)),
+                             QoSProfile(depth=1), raw=True)
+    wait_for(lambda: node.count_publishers(f'/{name}/markers'), 'the node is there')
+    print('ready', flush=True)
+    spin(node)
+    print(len(seen), flush=True)
+
+
 def wait_for(condition: Any, what: str) -> None:
     """Wait for discovery."""
     end = time.monotonic() + DISCOVERY_SECONDS
@@ -205,6 +218,8 @@ def main() -> None:
         publish(Path(arguments[0]), arguments[1:])
     elif role == 'listen':
         listen(Path(arguments[0]), arguments[1:])
+    elif role == 'view':
+        view(*arguments)
     else:
         call(*arguments)
     rclpy.try_shutdown()

@@ -169,7 +169,7 @@ class Diagnostics:
         if output.condition > self._second.worst_condition:
             self._second.worst_condition = output.condition
         self._output = output
-        self._singularity.see(_singularity_of(output), now, lasting=True)
+        self._singularity.see(singularity_level(output), now, lasting=True)
         self._limits.see(self._limits_of(output), now, lasting=True)
         return self.level_changed(now)
 
@@ -309,7 +309,8 @@ _SUPPRESSED = Level(ERROR, 'inside stop_condition: forces suppressed')
 _WARNINGS = {cause: Level(WARN, cause.value, cause is Cause.CROSSED) for cause in Cause}
 
 
-def _singularity_of(output: Output) -> Level:
+def singularity_level(output: Output) -> Level:
+    """Return how grave the singularity is that an output is near, and in which words."""
     if output.demanded_forces is None:
         return _UNSOLVABLE
     if output.singularity.stopped:

@@ -41,12 +41,14 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
 
 from stewart_dynamics import cdr, compiled
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
+from stewart_dynamics.markers import Markers
 from stewart_dynamics.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.parameters import is_of_ros, Parameters
 from stewart_dynamics.plausibility import doubts
@@ -133,6 +135,8 @@ class DynamicsNode(LifecycleNode):
         self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
         self._target: tuple[float, ...] | None = None  # the motion of the last one answered
+        self._undrawn: tuple[Setpoint, Output] | None = None
+        self._draw_at = now if self._settings['visualization_rate'] else math.inf
         self._restarting = False  # the last one was a restart and could not be answered
         self._reported = self._answered_at = now
         self._busy = False
@@ -186,6 +190,10 @@ class DynamicsNode(LifecycleNode):
             WrenchStamped, f'~/{EXTERNAL_WRENCH}', QoSProfile(depth=10))
         self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
+        if self._settings['visualization_rate']:
+            self._markers = Markers(self._settings)
+            self._markers_publisher = self._publisher(
+                MarkerArray, '~/markers', QoSProfile(depth=1))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
         self._exclusive = self._settings['setpoint.exclusive']
         self._answer_task = until_shutdown(self, self._answer)
@@ -341,12 +349,25 @@ class DynamicsNode(LifecycleNode):
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
             self._last, self._target = output, setpoint.motion
+            self._undrawn = setpoint, output
             self._answered_at = time.monotonic()
             if (self._diagnostics.answered(output, came, self._answered_at)
                     or self._answered_at - self._reported >= _REPORT_SECONDS):
                 self._report()
+        self._draw(self._answered_at)
         executor: Any = self.executor
         executor.create_task(self._answer_task)
+
+    def _draw(self, now: float) -> None:
+        """Publish the markers of the last answer if they are due and somebody looks."""
+        if self._undrawn is None or now < self._draw_at:
+            return
+        setpoint, output = self._undrawn
+        # Who looks only later gets no picture of what was long ago.
+        self._undrawn = None
+        self._draw_at = now + 1.0 / self._settings['visualization_rate']
+        if self._markers_publisher.get_subscription_count():
+            self._markers_publisher.publish(self._markers.write(setpoint.motion, output))
 
     def _pass_over(self) -> None:
         """Let nothing wait but the newest setpoint, and count the others."""
@@ -398,6 +419,7 @@ class DynamicsNode(LifecycleNode):
             self.get_logger().warning(line)
         if not self._active:
             return
+        self._draw(now)  # the last answer before a silence
         # While setpoints are answered it is done behind an answer, when time is left for it.
         due = (now - self._answered_at >= _WATCH_SECONDS
                and now - self._reported >= _REPORT_SECONDS - 0.5 * _WATCH_SECONDS)

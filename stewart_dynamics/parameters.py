@@ -164,8 +164,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('external_wrench.moment_max', 'double',
               "external moment at the platform's origin likewise; none: not checked", 'N m',
               minimum=0.0, above=True, while_active=True),
-    Parameter('visualization_rate', 'double', 'most markers in a second, 0: none; markers are '
-              'not published yet', 'Hz', 30.0, minimum=0.0),
+    Parameter('visualization_rate', 'double', 'most pictures (~/markers) in a second, 0: none',
+              'Hz', 30.0, minimum=0.0),
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
 )})
 

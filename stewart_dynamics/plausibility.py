@@ -129,12 +129,12 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
 def _shape(p: Parameters) -> _Shape:
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
     around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
-    axes = _level_axes(around)
+    axes = level_axes(around)
     return _Shape(around @ axes.T, carried @ axes.T, axes, _mean_norm(around),
                   _mean_norm(carried))
 
 
-def _level_axes(around: Array) -> Array:
+def level_axes(around: Array) -> Array:
     """Return two axes in the plane of points, and its normal, (3, 3)."""
     moments = around.T @ around
     if not np.isfinite(moments).all():

@@ -23,6 +23,7 @@ import math
 import os
 from pathlib import Path
 import re
+import signal
 import sys
 from typing import Any
 
@@ -652,6 +653,27 @@ def test_a_killed_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Pa
     feeder.end()
     node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
     node.until(lambda: node.peer.node.count_subscribers(forces) == 1, 'it is forgotten')
+
+
+def test_a_stopped_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+    """A viewer that hangs takes neither forces nor pictures; the node does not wait for it."""
+    node = at_work
+    viewer = Program([sys.executable, FEEDER], node.domain, tmp_path / 'viewer')
+    markers = f'{NODE}/markers'
+    node.until(lambda: node.peer.node.count_subscribers(markers) == 1, 'the viewer is there')
+    before = len(node.raw['leg_states'])
+    feeder = Feeder(node, tmp_path / 'feeder', 250, 750)
+    feeder.begin()
+    _until_answered(node, feeder)
+    viewer.process.send_signal(signal.SIGSTOP)
+    try:
+        node.until(lambda: feeder.ended, 'all are sent')
+        feeder.end()
+        node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
+    finally:
+        viewer.process.send_signal(signal.SIGCONT)
+        viewer.stop()
+    node.until(lambda: node.peer.node.count_subscribers(markers) == 0, 'it is gone')
 
 
 # Singularities

@@ -294,9 +294,13 @@ def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> 
     simulator.until(lambda: simulator.states('pose')[-1].pose.position.z > 1.12, 'it rises')
     simulator.until(lambda: len(simulator.raw('accel')) == len(simulator.raw('leg_states')),
                     'the last ones have come')
-    assert not simulator.said('WARN', ''), simulator.program.stderr
     stamps = simulator.stamps()
-    assert set(np.diff(stamps).tolist()) == {4_000_000}
+    assert min(np.diff(stamps)) == 4_000_000
+    # A machine that is busy with other things may hold it up; that is all it may say.
+    behind = simulator.said('WARN', 'fell behind by')
+    assert simulator.said('WARN', '') == behind
+    if not behind:
+        assert max(np.diff(stamps)) == 4_000_000
     assert all(simulator.stamps(topic) == stamps for topic in TYPES)
     assert abs(stamps[0] - time.time_ns()) < 1_000_000_000_000
     assert bits(simulator.states()[-1].effort) == bits(up)
