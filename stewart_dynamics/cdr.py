@@ -179,6 +179,46 @@ def float64_values(data: bytes) -> tuple[float, ...]:
     return values
 
 
+class JointStateFields(NamedTuple):
+    """Stamp and names of a sensor_msgs/JointState, and where its numbers stand in its bytes."""
+
+    stamp: int
+    """[ns]"""
+    names: list[str]
+    numbers: tuple[tuple[int, int], ...]
+    """Of position, velocity and effort: offset and count."""
+    gaps: tuple[slice, ...]
+    """Bytes that only align what follows, and those behind the message: they may be anything."""
+
+
+def joint_state_fields(data: bytes) -> JointStateFields:
+    """Read all of a sensor_msgs/JointState but its numbers; its frame_id may be any."""
+    gaps: list[slice] = []
+    names, numbers = [], []
+    try:
+        count = _COUNT[data[1]]
+        sec, nanosec, size = _TIME_AND_LENGTH[data[1]].unpack_from(data, 4)
+        stamp = _nanoseconds(data, sec, nanosec)
+        _text(data, 16, size)
+        number, at = _sequence(data, 16 + size, count, gaps)
+        for _ in range(number):
+            size, at = _sequence(data, at, count, gaps)
+            names.append(_text(data, at, size).decode(errors='replace'))
+            at += size
+        for _ in range(3):
+            number, end = _sequence(data, at, count, gaps)
+            # An empty sequence has nothing to align.
+            at = _aligned8(end) if number else end
+            gaps.append(slice(end, at))
+            numbers.append((at, number))
+            at += 8 * number
+    except (IndexError, KeyError, StructError) as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    if at > len(data):
+        raise MalformedError(f'{len(data)} bytes: must be at least {at}')
+    return JointStateFields(stamp, names, tuple(numbers), (*gaps, slice(at, len(data))))
+
+
 _FLOAT64 = Struct('<4sd')
 _CLOCK = Struct('<4siI')
 _BOOL = Struct('<4s?')

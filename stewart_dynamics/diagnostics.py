@@ -24,7 +24,7 @@ from collections import Counter
 from collections.abc import Sequence
 from operator import attrgetter
 from statistics import median
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.setpoints import NOT_JOINED, PASSED_OVER, Refusal
@@ -67,7 +67,7 @@ class Status(NamedTuple):
     values: tuple[tuple[str, str], ...]
 
 
-class _Held:
+class Held:
     """A state, and what was worse for as long as that holds."""
 
     def __init__(self) -> None:
@@ -88,6 +88,16 @@ class _Held:
         self._seen = {gravity: held for gravity, held in self._seen.items() if now < held[0]}
         return max([self._state, *(state for _, state in self._seen.values())],
                    key=attrgetter('gravity'))
+
+
+class Part(Protocol):
+    """What has a status of its own once there is something to say of it."""
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+
+    def report(self, now: float) -> tuple[Status, ...]:
+        """Return the status, none while there is nothing to say."""
 
 
 class _Second:
@@ -114,15 +124,19 @@ class Diagnostics:
         The setpoint topics that are joined.
     now : float
         From when silence counts.
+    others : sequence of Part
+        What else is reported, behind these.
 
     """
 
-    def __init__(self, parameters: Parameters, topics: Sequence[str], now: float) -> None:
+    def __init__(self, parameters: Parameters, topics: Sequence[str], now: float,
+                 others: Sequence[Part] = ()) -> None:
         self.parameters = parameters
         self.writers: dict[str, int] = {}
         """Of each setpoint topic."""
         self.namesakes: tuple[str, int] = '', 1
         """The node's name, and how many have it."""
+        self._others = others
         self._heard = dict.fromkeys(topics, now)
         self._silent = dict.fromkeys(topics, True)
         self._refusals: Counter[Refusal] = Counter()
@@ -131,7 +145,7 @@ class Diagnostics:
         self._output: Output | None = None
         self._second, self._second_before = _Second(now), _Second(now)
         self._refused, self._singularity, self._limits, self._timing = (
-            _Held(), _Held(), _Held(), _Held())
+            Held(), Held(), Held(), Held())
         self._levels: tuple[int, ...] = ()
 
     def heard(self, topic: str, now: float) -> None:
@@ -167,7 +181,8 @@ class Diagnostics:
         """Return the statuses; rate and processing time are of the last one or two seconds."""
         self._levels = self._current_levels(now)
         statuses = (self._report_setpoints(now), self._report_singularity(now),
-                    self._report_limits(now), self._report_timing(now))
+                    self._report_limits(now), self._report_timing(now),
+                    *(status for other in self._others for status in other.report(now)))
         # Reports come at changes of level as well, and may be much less than a second apart.
         if now - self._second.begin >= 1.0:
             self._second_before, self._second = self._second, _Second(now)
@@ -175,7 +190,8 @@ class Diagnostics:
 
     def _current_levels(self, now: float) -> tuple[int, ...]:
         return (self._setpoint_level(now).level, self._singularity.at(now).level,
-                self._limits.at(now).level, self._timing.at(now).level)
+                self._limits.at(now).level, self._timing.at(now).level,
+                *(other.level(now) for other in self._others))
 
     @property
     def _processing(self) -> list[float]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable
+from contextlib import suppress
 from functools import partial
 import gc
 import math
@@ -46,13 +47,16 @@ from stewart_dynamics import cdr, compiled
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
 from stewart_dynamics.markers import Markers
+from stewart_dynamics.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.parameters import is_of_ros, Parameters
 from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.series import Series
 from stewart_dynamics.setpoints import Refusal, Setpoints
-from stewart_dynamics.step import Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.step import NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.wrench_diagnostics import WrenchDiagnostics
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,
@@ -123,9 +127,14 @@ class DynamicsNode(LifecycleNode):
         """Begin to answer, as if nothing had come before."""
         now = time.monotonic()
         self._setpoints = Setpoints(self._settings, self._on_refusal, self._on_notice)
-        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now)
+        self._measured_legs = MeasuredLegs(
+            self._settings, self._external_wrench, self._on_refusal, self._on_notice)
+        self._wrench_diagnostics = WrenchDiagnostics(self._settings)
+        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now,
+                                        [self._wrench_diagnostics])
         self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
+        self._target: tuple[float, ...] | None = None  # the motion of the last one answered
         self._undrawn: tuple[Setpoint, Output] | None = None
         self._draw_at = now if self._settings['visualization_rate'] else math.inf
         self._restarting = False  # the last one was a restart and could not be answered
@@ -161,9 +170,13 @@ class DynamicsNode(LifecycleNode):
 
     def _configure(self) -> None:
         self._step = Step(self._settings)
+        self._external_wrench = ExternalWrench(self._settings)
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
         self._step(Setpoint(0, (0.0,) * 24), None)
+        with suppress(StewartError):  # no legs have such lengths
+            self._external_wrench(
+                Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
         for doubt in doubts(self._settings):
             self.get_logger().warning(doubt)
@@ -173,6 +186,8 @@ class DynamicsNode(LifecycleNode):
             if topic == 'singularity_warning':
                 qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self._publishers_of[topic] = self._publisher(_TYPES[name], f'~/{topic}', qos)
+        self._wrench_publisher = self._publisher(
+            WrenchStamped, f'~/{EXTERNAL_WRENCH}', QoSProfile(depth=10))
         self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         if self._settings['visualization_rate']:
@@ -185,6 +200,7 @@ class DynamicsNode(LifecycleNode):
         self._inputs = {topic: self._subscribe(topic, partial(self._on_setpoint, topic))
                         for topic in topics}
         self._subscribe(inputs.WRENCH, self._on_wrench)
+        self._subscribe(MEASURED_LEGS, self._on_measured_legs, JointState)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
         self._configured = True
@@ -199,9 +215,10 @@ class DynamicsNode(LifecycleNode):
         self._close_io.append(partial(self.destroy_publisher, publisher))
         return publisher
 
-    def _subscribe(self, topic: str, callback: Any) -> Any:
+    def _subscribe(self, topic: str, callback: Any, kind: Any = None) -> Any:
         subscription = self.create_subscription(
-            _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', until_shutdown(self, callback),
+            kind or _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}',
+            until_shutdown(self, callback),
             QoSProfile(depth=_QUEUE), raw=True,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
@@ -287,6 +304,19 @@ class DynamicsNode(LifecycleNode):
         if self._active:
             self._setpoints.take_wrench(data)
 
+    def _on_measured_legs(self, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        self._wrench_diagnostics.heard(now)
+        estimate = self._measured_legs.take(data, self._setpoints.wrench, self._target)
+        if estimate is None:
+            return
+        if estimate.wrench is not None:
+            self._wrench_publisher.publish(self._measured_legs.step.message(estimate))
+        if self._wrench_diagnostics.estimated(estimate, self._target, now):
+            self._report()
+
     def _answer(self) -> None:
         """
         Answer what waits: all of it, or the newest where the node has fallen behind.
@@ -318,7 +348,7 @@ class DynamicsNode(LifecycleNode):
             self._restarting = False
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
-            self._last = output
+            self._last, self._target = output, setpoint.motion
             self._undrawn = setpoint, output
             self._answered_at = time.monotonic()
             if (self._diagnostics.answered(output, came, self._answered_at)
@@ -370,7 +400,8 @@ class DynamicsNode(LifecycleNode):
     # -- words ----------------------------------------------------------------------------
 
     def _on_refusal(self, refusal: Refusal, details: str) -> None:
-        self._diagnostics.refused(refusal, details, time.monotonic())
+        of = self._wrench_diagnostics if refusal.topic == MEASURED_LEGS else self._diagnostics
+        of.refused(refusal, details, time.monotonic())
         how = '' if refusal.reason.startswith('passed over') else 'refused: '
         self._say(refusal, f'{refusal.topic} {how}{refusal.reason}: {details}')
 
@@ -440,16 +471,17 @@ class DynamicsNode(LifecycleNode):
                         f'{", ".join(fixed)}: only changed while the node is unconfigured: its '
                         'topics and its machine are made of it; deactivate and clean up first')
             parameters = self._settings.replaced(ours)
-            step = Step(parameters)
+            step, external_wrench = Step(parameters), ExternalWrench(parameters)
         except ParameterError as exc:
             return SetParametersResult(
                 successful=False, reason=str(exc).removeprefix('parameters: '))
         self._tell_changes(parameters)
         self._settings = parameters
         if self._configured:
-            self._step = step
+            self._step, self._external_wrench = step, external_wrench
         if self._active:
             self._diagnostics.parameters = parameters
+            self._measured_legs.step = external_wrench
         return SetParametersResult(successful=True)
 
     def _tell_changes(self, parameters: Parameters) -> None:

@@ -883,8 +883,8 @@ def _of_module(name: str) -> tuple[dict[str, ast.FunctionDef], list[ast.stmt]]:
             [item for item in body if isinstance(item, ast.Assign)])
 
 
-HERE, OF_NODE, OF_SIMULATOR = (
-    _of_module(name) for name in ('test_faults', 'test_node', 'test_simulator'))
+MODULES = tuple(_of_module(name) for name in (
+    'test_faults', 'test_node', 'test_simulator', 'test_external_wrench_node'))
 OF_THE_PAGE = ('test_every_fault_on_the_page_has_a_test_and_every_test_a_fault',
                'test_what_the_page_says_that_it_says_its_test_asks_for')
 
@@ -899,18 +899,17 @@ def test_every_fault_on_the_page_has_a_test_and_every_test_a_fault() -> None:
         tests = re.findall(r'`(\w+)`', row[4])
         assert tests, row
         named.update(tests)
-    assert len({*HERE[0], *OF_NODE[0], *OF_SIMULATOR[0]}) == len(
-        [*HERE[0], *OF_NODE[0], *OF_SIMULATOR[0]])
-    assert named <= {*HERE[0], *OF_NODE[0], *OF_SIMULATOR[0]}
-    assert set(HERE[0]) - named == set(OF_THE_PAGE)
+    tests = [test for module, _ in MODULES for test in module]
+    assert len(set(tests)) == len(tests)
+    assert named <= set(tests)
+    assert set(MODULES[0][0]) - named == set(OF_THE_PAGE)
 
 
 @pytest.mark.parametrize('row', _rows(), ids=lambda row: row[0])
 def test_what_the_page_says_that_it_says_its_test_asks_for(row: list[str]) -> None:
     texts = []
     for test in re.findall(r'`(\w+)`', row[4]):
-        tests, constants = next(
-            module for module in (HERE, OF_NODE, OF_SIMULATOR) if test in module[0])
+        tests, constants = next(module for module in MODULES if test in module[0])
         for part in (tests[test], *constants):
             texts += [each.value for each in ast.walk(part)
                       if isinstance(each, ast.Constant) and isinstance(each.value, str)]
