@@ -15,7 +15,8 @@
 """
 What the node says of itself: one status each for setpoints, singularity, limits and timing.
 
-A check knows no ROS: it is told what happened and returns words; the node makes messages.
+And one for planned motions, once there was one. A check knows no ROS: it is told what happened
+and returns words; the node makes messages.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from statistics import median
 from typing import NamedTuple
 
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.planned import Outcome
 from stewart_dynamics.setpoints import NOT_JOINED, PASSED_OVER, Refusal
 from stewart_dynamics.singularity import Cause
 from stewart_dynamics.step import Excess, Output
@@ -36,9 +38,6 @@ OK, WARN, ERROR, STALE = range(4)
 # A level holds for this long after its cause was last seen, so that a machine that dances on
 # a limit is not reported a thousand times in a second.
 _HOLD_SECONDS = 1.0
-
-_QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
-               'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
 
 
 class Level(NamedTuple):
@@ -133,6 +132,8 @@ class Diagnostics:
         self._refused, self._singularity, self._limits, self._timing = (
             _Held(), _Held(), _Held(), _Held())
         self._levels: tuple[int, ...] = ()
+        self._planned: Status | None = None
+        self._planned_counts: Counter[str] = Counter()
 
     def heard(self, topic: str, now: float) -> None:
         """Note that a message came on a setpoint topic."""
@@ -159,6 +160,18 @@ class Diagnostics:
         self._limits.see(self._limits_of(output), now, lasting=True)
         return self.level_changed(now)
 
+    def planned(self, outcome: Outcome, seconds: float) -> int:
+        """Note what has become of a trajectory, and how long that took; return its level."""
+        level = ERROR if outcome.reason else WARN if outcome.warning else OK
+        counts = self._planned_counts
+        counts[f'refused: {outcome.reason}' if outcome.reason else 'answered'] += 1
+        self._planned = Status('trajectory', level, outcome.message, (
+            ('answered', str(counts['answered'])),
+            ('refused', str(counts.total() - counts['answered'])),
+            *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'answered'),
+            *outcome.values, ('time it took (s)', f'{seconds:.3f}')))
+        return level
+
     def level_changed(self, now: float) -> bool:
         """Return whether any level is another than in the last report."""
         return self._current_levels(now) != self._levels
@@ -167,7 +180,8 @@ class Diagnostics:
         """Return the statuses; rate and processing time are of the last one or two seconds."""
         self._levels = self._current_levels(now)
         statuses = (self._report_setpoints(now), self._report_singularity(now),
-                    self._report_limits(now), self._report_timing(now))
+                    self._report_limits(now), self._report_timing(now),
+                    *([self._planned] if self._planned else []))
         # Reports come at changes of level as well, and may be much less than a second apart.
         if now - self._second.begin >= 1.0:
             self._second_before, self._second = self._second, _Second(now)
@@ -175,7 +189,8 @@ class Diagnostics:
 
     def _current_levels(self, now: float) -> tuple[int, ...]:
         return (self._setpoint_level(now).level, self._singularity.at(now).level,
-                self._limits.at(now).level, self._timing.at(now).level)
+                self._limits.at(now).level, self._timing.at(now).level,
+                self._planned.level if self._planned else OK)
 
     @property
     def _processing(self) -> list[float]:
@@ -279,11 +294,8 @@ class Diagnostics:
         return f' (of the last setpoint, {age:.1f} s ago)'
 
     def _words(self, excess: Excess) -> str:
-        quantity, unit = _QUANTITIES[excess.limit]
-        beyond = abs(abs(excess.value) - excess.bound)
-        how = ', clipped' if quantity == 'force' else ''
-        return (f'{self.parameters["joints"][excess.leg]}: {quantity} {excess.value:.6g} {unit} '
-                f'is {beyond:.6g} {unit} beyond {excess.limit}{how}')
+        how = ', clipped' if excess.limit == 'limits.force_max' else ''
+        return excess.words(self.parameters['joints']) + how
 
 
 _UNSOLVABLE = Level(ERROR, 'J_inv cannot be solved: no forces')

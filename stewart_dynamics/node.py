@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from functools import partial
 import gc
 import math
@@ -26,6 +26,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -39,13 +40,15 @@ from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
-from trajectory_msgs.msg import MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
-from stewart_dynamics import cdr, compiled
+from stewart_dynamics import cdr, compiled, planned
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.inverse_dynamics import MOTION
 from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.series import Series
@@ -62,12 +65,16 @@ _TYPES: dict[str, Any] = {
     'std_msgs/msg/Float64MultiArray': Float64MultiArray,
     'std_msgs/msg/Float64': Float64,
     'std_msgs/msg/Bool': Bool,
+    'trajectory_msgs/msg/JointTrajectory': JointTrajectory,
 }
+_INPUT_TYPES = {**inputs.INPUT_TYPES, planned.INPUT: planned.INPUT_TYPE}
 
 # So many messages of a topic may wait in the middleware, so many joined setpoints here.
 # When more setpoints wait the node has fallen behind: only the newest is answered.
 _QUEUE = 1000
 _BACKLOG = 100
+# So many trajectories may wait in the middleware, so many be in work or wait here.
+_PLANS = 5
 
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0
@@ -90,6 +97,9 @@ class DynamicsNode(LifecycleNode):
         self._configured = False
         self._close_io: list[Callable[[], Any]] = []
         self._series = Series()
+        # Trajectories in work, when they came; and whether a task for them waits to be run.
+        self._plans: deque[tuple[Iterator[planned.Outcome | None], float]] = deque()
+        self._planning = False
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
@@ -134,6 +144,7 @@ class DynamicsNode(LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._active = False
+        self._give_up_plans()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -144,6 +155,7 @@ class DynamicsNode(LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more and close the topics."""
         self._active = False
+        self._give_up_plans()
         self._close()
         return TransitionCallbackReturn.SUCCESS
 
@@ -159,7 +171,8 @@ class DynamicsNode(LifecycleNode):
         self._step = Step(self._settings)
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
-        self._step(Setpoint(0, (0.0,) * 24), None)
+        self._step(Setpoint(0, (0.0,) * MOTION), None)
+        StewartPlatform(self._settings).solve(np.zeros((1, MOTION)))
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
         for doubt in doubts(self._settings):
             self.get_logger().warning(doubt)
@@ -169,6 +182,8 @@ class DynamicsNode(LifecycleNode):
             if topic == 'singularity_warning':
                 qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self._publishers_of[topic] = self._publisher(_TYPES[name], f'~/{topic}', qos)
+        self._plan_publisher = self._publisher(
+            _TYPES[planned.OUTPUT_TYPE], f'~/{planned.OUTPUT}', QoSProfile(depth=_PLANS))
         self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
@@ -177,6 +192,8 @@ class DynamicsNode(LifecycleNode):
         self._inputs = {topic: self._subscribe(topic, partial(self._on_setpoint, topic))
                         for topic in topics}
         self._subscribe(inputs.WRENCH, self._on_wrench)
+        self._plan_task = until_shutdown(self, self._plan)
+        self._subscribe(planned.INPUT, self._on_trajectory, _PLANS)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
         self._configured = True
@@ -191,10 +208,10 @@ class DynamicsNode(LifecycleNode):
         self._close_io.append(partial(self.destroy_publisher, publisher))
         return publisher
 
-    def _subscribe(self, topic: str, callback: Any) -> Any:
+    def _subscribe(self, topic: str, callback: Any, depth: int = _QUEUE) -> Any:
         subscription = self.create_subscription(
-            _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', until_shutdown(self, callback),
-            QoSProfile(depth=_QUEUE), raw=True,
+            _TYPES[_INPUT_TYPES[topic]], f'~/{topic}', until_shutdown(self, callback),
+            QoSProfile(depth=depth), raw=True,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=partial(self._on_incompatible_qos, topic)))
@@ -345,6 +362,59 @@ class DynamicsNode(LifecycleNode):
                 if taken is not None:
                     came = True
                     self._on_setpoint(topic, taken[0])
+
+    # -- planned motions ------------------------------------------------------------------
+
+    def _on_trajectory(self, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        if len(self._plans) == _PLANS:
+            self._tell(planned.refused(planned.TOO_MANY, f'{_PLANS} are in work or wait'), now)
+            return
+        # Parameters and load are those of now, whatever changes meanwhile.
+        self._plans.append(
+            (planned.answer(self._settings, self._setpoints.wrench, data), now))
+        self._plan_on()
+
+    def _plan_on(self) -> None:
+        """Go on with a piece of the work behind the messages that have come meanwhile."""
+        if not self._planning:
+            self._planning = True
+            executor: Any = self.executor
+            executor.create_task(self._plan_task)
+
+    def _plan(self) -> None:
+        """Do a piece of the work on the trajectory whose turn it is."""
+        self._planning = False
+        if not self._plans:  # given up
+            return
+        work, came = self._plans[0]
+        outcome = next(work)
+        if outcome is not None:
+            self._plans.popleft()
+            if outcome.answer:
+                self._plan_publisher.publish(outcome.answer)
+            self._tell(outcome, came)
+        if self._plans:
+            self._plan_on()
+
+    def _tell(self, outcome: planned.Outcome, came: float) -> None:
+        """Say what has become of a trajectory."""
+        now = time.monotonic()
+        level = self._diagnostics.planned(outcome, now - came)
+        if outcome.reason:
+            self._logged['trajectory'] = level  # it is said here, each refusal
+            line = self._series.add(outcome.reason, f'trajectory {outcome.message}', now)
+            if line is not None:
+                self.get_logger().error(line)
+        self._report()
+
+    def _give_up_plans(self) -> None:
+        if self._plans:
+            self.get_logger().warning(
+                f'trajectories given up, the node is deactivated: {len(self._plans)}')
+            self._plans.clear()
 
     # -- words ----------------------------------------------------------------------------
 

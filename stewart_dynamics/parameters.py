@@ -155,6 +155,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'restart', 's', 0.1, minimum=0.0, above=True),
     Parameter('setpoint.exclusive', 'bool',
               'refuse setpoints while a topic has more than one writer', default=False),
+    Parameter('trajectory.effort', 'bool', 'give forces with the points of ~/leg_trajectory: a '
+              'joint_trajectory_controller without an effort command interface refuses points '
+              'that have them', default=True),
     Parameter('visualization_rate', 'double', 'most markers in a second, 0: none; markers are '
               'not published yet', 'Hz', 30.0, minimum=0.0),
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
