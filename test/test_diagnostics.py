@@ -25,6 +25,7 @@ from referees import symmetric_parameters
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 from stewart_dynamics.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.planned import Outcome
 from stewart_dynamics.setpoints import (
     ACCEL, NOT_FINITE, NOT_JOINED, PASSED_OVER, POSE, Refusal, TWICE, TWIST)
 from stewart_dynamics.singularity import Cause, Singularity
@@ -485,3 +486,26 @@ def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
     assert levels == sorted(levels, reverse=True), 'it was OK or rose in between'
     # and when setpoints end there
     assert status(diagnostics, 'singularity', BEGIN + 100.0).level == WARN
+
+
+def test_planned_motions_have_a_status_once_there_was_one() -> None:
+    diagnostics = begun()
+    diagnostics.report(BEGIN)
+    assert diagnostics.planned(Outcome('answered: 2 points', answer=b'1'), 0.25) == OK
+    status = diagnostics.report(BEGIN)[-1]
+    assert status == ('trajectory', OK, 'answered: 2 points', (
+        ('answered', '1'), ('refused', '0'), ('time it took (s)', '0.250')))
+    assert not diagnostics.level_changed(BEGIN)
+    refusal = Outcome('refused: x', 'why', values=(('points', '3'),))
+    assert diagnostics.planned(refusal, 0.1) == ERROR
+    assert diagnostics.level_changed(BEGIN)
+    # It lasts until the next.
+    for now in (BEGIN, BEGIN + 100.0):
+        status = diagnostics.report(now)[-1]
+        assert status.name == 'trajectory'
+        assert status.level == ERROR
+        assert dict(status.values) == {
+            'answered': '1', 'refused': '1', 'refused: why': '1', 'points': '3',
+            'time it took (s)': '0.100'}
+    assert diagnostics.planned(Outcome('answered', answer=b'1', warning=True), 0.1) == WARN
+    assert diagnostics.report(BEGIN)[-1].level == WARN
