@@ -894,10 +894,14 @@ def test_a_trajectory_in_work_is_given_up_with_the_node(begin: Start) -> None:
         assert node.call('change_state', ChangeState.Request(
             transition=Transition(id=transition))).success
     node.until_said('trajectories given up, the node is deactivated: ')
-    # What was still in the middleware may be answered before it.
     node.until_active()
-    planner.send([HOME, HOME], stamp=4 * STEP)
-    node.until_reported('trajectory', OK, 'answered: 2 points')
+
+    def answered() -> bool:
+        # What was still in the middleware may come before it, and leave no place for it.
+        planner.send([HOME, HOME])
+        return 'answered: 2 points' in node.status('trajectory').message
+
+    node.until(answered, 'the next trajectory is answered')
 
 
 # The page
