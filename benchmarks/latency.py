@@ -198,8 +198,7 @@ def plan(path: Path, name: str, points: int) -> None:
     Parameters
     ----------
     path : Path
-        Gets from when each is published to when its answer is here, and how long it takes to
-        publish it [ns].
+        Gets when each begins to be published, when it is, and when its answer is here [ns].
     name : str
         Of the node.
     points : int
@@ -229,7 +228,7 @@ def plan(path: Path, name: str, points: int) -> None:
             published = time.monotonic_ns()
             while not answers:
                 executor.spin_once(timeout_sec=10.0)
-            times.append((answers[0] - begin, published - begin))
+            times.append((begin, published, answers[0]))
         print('done', flush=True)
     executor.shutdown()
     np.savez(path, times=np.array(times))

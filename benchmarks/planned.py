@@ -68,7 +68,11 @@ class Planned(Measurement):
                          [(0, seconds * RATE)] * len(self.plans), folder)
 
     def measure(self) -> tuple[list[Turn], list[Turn], Array, Array]:
-        """Return turns without and with motions, times of motions alone and beside setpoints."""
+        """
+        Return turns without and with motions, times of motions alone and beside setpoints.
+
+        Times (N, 2) [ms]: to publish a motion, and from then to its answer.
+        """
         path = self._folder / 'planned.npz'
         with self._processes() as (nodes, source, _):
             planner = Process(role('plan', str(path), 'planned', str(POINTS)), {
@@ -96,7 +100,7 @@ class Planned(Measurement):
             planner.process.communicate(timeout=60)
             time.sleep(SETTLE)
         turns = list(zip(self._read(), self.plans, strict=True))[1:]
-        times = np.load(path)['times'] * 1e-6
+        times = np.diff(np.load(path)['times'], axis=1) * 1e-6
         return ([turn for turn, beside in turns if not beside],
                 [turn for turn, beside in turns if beside], times[:ALONE], times[ALONE:])
 
@@ -133,8 +137,8 @@ def main() -> None:
     rows: list[tuple[str, ...]] = [
         (f'from sending {POINTS:,} points to their answer (ms)', 'median', 'max', 'motions')]
     for label, times in (('alone', alone), ('beside setpoints at 1 kHz', streaming)):
-        rows.append((label, f'{np.median(times[:, 0]):.0f}', f'{times[:, 0].max():.0f}',
-                     str(len(times))))
+        rows.append((label, f'{np.median(times.sum(axis=1)):.0f}',
+                     f'{times.sum(axis=1).max():.0f}', str(len(times))))
     lines = ['', *table(rows), '']
     rows = [('latency of setpoints (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core')]
     for label, turns in (('no planned motion', without), ('one each second', beside)):
@@ -143,7 +147,7 @@ def main() -> None:
                      str(sum(turn.lost for turn in turns)),
                      f'{np.mean([turn.cores for turn in turns]):.0%}'))
     largest, many = pieces()
-    message = np.concatenate([alone, streaming])[:, 1]
+    message = np.concatenate([alone, streaming])[:, 0]
     lines += [*table(rows), '', (
         f'The work is done in {many} pieces, the largest of which takes {largest:.2f} ms of the '
         f'processor. To hand the middleware a message of {len(trajectory(POINTS)) / 1e6:.1f} MB '

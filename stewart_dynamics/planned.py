@@ -50,7 +50,7 @@ OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
 MOST_POINTS = 100_000
 # Points and samples between them that a motion may need.
 MOST_SAMPLES = 1_000_000
-# So many ways between points or samples at most are worked on between two yields: half a
+# So many ways between points or samples at most are worked on between two yields: about a
 # millisecond's work. Uncompiled, one takes a millisecond.
 PIECE = 256 if COMPILED else 1
 
