@@ -17,7 +17,7 @@ The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the machine; a caller asks
-for parameters and states meanwhile, a viewer takes the markers.
+for parameters and states meanwhile, a viewer takes the markers, a planner sends planned motions.
 """
 
 from __future__ import annotations
@@ -37,11 +37,13 @@ import numpy as np
 from pass_through import spin, TOPICS
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParametersAtomically
 import rclpy
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 from visualization_msgs.msg import MarkerArray
 
 from stewart_dynamics import cdr
@@ -53,6 +55,7 @@ PERIOD = 1_000_000  # [ns]
 FIRST_STAMP = 1_700_000_000_000_000_000
 DISCOVERY_SECONDS = 60.0
 CALLS_PERIOD = 0.1  # [s]
+PLAN_SECONDS = 1.0
 # All six coordinates move, within the limits of config/platform.yaml, and repeat themselves.
 MOTION = {
     'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
@@ -201,6 +204,70 @@ def view(name: str) -> None:
     print(len(seen), flush=True)
 
 
+def plan(path: Path, name: str, points: int) -> None:
+    """
+    Send a planned motion each second, so many for each number on stdin; note how long it takes.
+
+    Parameters
+    ----------
+    path : Path
+        Gets when each begins to be published, when it is, and when its answer is here [ns].
+    name : str
+        Of the node.
+    points : int
+        Of each motion, over ten seconds.
+
+    """
+    node = rclpy.create_node('planner')
+    executor = EventsExecutor()
+    executor.add_node(node)
+    answers: list[int] = []
+    node.create_subscription(JointTrajectory, f'/{name}/leg_trajectory', lambda data: (
+        answers.append(time.monotonic_ns()) if len(data) > points else None), QOS, raw=True)
+    publisher = node.create_publisher(
+        MultiDOFJointTrajectory, f'/{name}/platform_trajectory', QOS)
+    message = trajectory(points)
+    wait_for(lambda: publisher.get_subscription_count() and node.count_publishers(
+        f'/{name}/leg_trajectory'), 'the node is there')
+    print('ready', flush=True)
+    times = []
+    for line in iter(sys.stdin.readline, ''):
+        for n in range(int(line)):
+            if n:
+                time.sleep(PLAN_SECONDS)
+            answers.clear()
+            begin = time.monotonic_ns()
+            publisher.publish(message)
+            published = time.monotonic_ns()
+            while not answers:
+                executor.spin_once(timeout_sec=10.0)
+            times.append((begin, published, answers[0]))
+        print('done', flush=True)
+    executor.shutdown()
+    np.savez(path, times=np.array(times))
+
+
+def trajectory(points: int) -> bytes:
+    """Return a MultiDOFJointTrajectory of so many points of the motion, over ten seconds."""
+    seconds = np.linspace(0.0, 10.0, points)
+    motion = motion_at(TrajectoryParameters(MOTION), seconds)
+    rows = np.column_stack([motion.position, to_quaternion(motion.rotation),
+                            motion.rows[:, 12:24]]).tolist()
+    message = MultiDOFJointTrajectory(joint_names=['platform'])
+    for second, row in zip(seconds.tolist(), rows, strict=True):
+        point = MultiDOFJointTrajectoryPoint(
+            transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])
+        to, twist, accel = point.transforms[0], point.velocities[0], point.accelerations[0]
+        vectors = (to.translation, twist.linear, twist.angular, accel.linear, accel.angular)
+        for vector, at in zip(vectors, (0, 7, 10, 13, 16), strict=True):
+            vector.x, vector.y, vector.z = row[at:at + 3]
+        to.rotation.x, to.rotation.y, to.rotation.z, to.rotation.w = row[3:7]
+        point.time_from_start.sec, point.time_from_start.nanosec = divmod(
+            round(second * 1e9), 1_000_000_000)
+        message.points.append(point)
+    return bytes(serialize_message(message))
+
+
 def wait_for(condition: Any, what: str) -> None:
     """Wait for discovery."""
     end = time.monotonic() + DISCOVERY_SECONDS
@@ -220,6 +287,8 @@ def main() -> None:
         listen(Path(arguments[0]), arguments[1:])
     elif role == 'view':
         view(*arguments)
+    elif role == 'plan':
+        plan(Path(arguments[0]), arguments[1], int(arguments[2]))
     else:
         call(*arguments)
     rclpy.try_shutdown()

@@ -15,7 +15,8 @@
 """
 What the node says of itself: one status each for setpoints, singularity, limits and timing.
 
-A check knows no ROS: it is told what happened and returns words; the node makes messages.
+And one for planned motions, once there was one. A check knows no ROS: it is told what happened
+and returns words; the node makes messages.
 """
 
 from __future__ import annotations
@@ -36,9 +37,6 @@ OK, WARN, ERROR, STALE = range(4)
 # A level holds for this long after its cause was last seen, so that a machine that dances on
 # a limit is not reported a thousand times in a second.
 _HOLD_SECONDS = 1.0
-
-_QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
-               'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
 
 
 class Level(NamedTuple):
@@ -295,11 +293,8 @@ class Diagnostics:
         return f' (of the last setpoint, {age:.1f} s ago)'
 
     def _words(self, excess: Excess) -> str:
-        quantity, unit = _QUANTITIES[excess.limit]
-        beyond = abs(abs(excess.value) - excess.bound)
-        how = ', clipped' if quantity == 'force' else ''
-        return (f'{self.parameters["joints"][excess.leg]}: {quantity} {excess.value:.6g} {unit} '
-                f'is {beyond:.6g} {unit} beyond {excess.limit}{how}')
+        how = ', clipped' if excess.limit == 'limits.force_max' else ''
+        return excess.words(self.parameters['joints']) + how
 
 
 _UNSOLVABLE = Level(ERROR, 'J_inv cannot be solved: no forces')

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import suppress
 from functools import partial
 import gc
@@ -27,6 +27,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -40,17 +41,20 @@ from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
-from trajectory_msgs.msg import MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
-from stewart_dynamics import cdr, compiled
+from stewart_dynamics import cdr, compiled, planned
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
+from stewart_dynamics.inverse_dynamics import MOTION
 from stewart_dynamics.markers import Markers
 from stewart_dynamics.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.planned_diagnostics import PlannedDiagnostics
+from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.series import Series
@@ -74,6 +78,8 @@ _TYPES: dict[str, Any] = {
 # When more setpoints wait the node has fallen behind: only the newest is answered.
 _QUEUE = 1000
 _BACKLOG = 100
+# So many trajectories may wait in the middleware, so many be in work or wait here.
+_PLANS = 5
 
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0
@@ -96,6 +102,9 @@ class DynamicsNode(LifecycleNode):
         self._configured = False
         self._close_io: list[Callable[[], Any]] = []
         self._series = Series()
+        # Trajectories in work, when they came; and whether a task for them waits to be run.
+        self._plans: deque[tuple[Iterator[planned.Outcome | None], float]] = deque()
+        self._planning = False
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
@@ -130,8 +139,9 @@ class DynamicsNode(LifecycleNode):
         self._measured_legs = MeasuredLegs(
             self._settings, self._external_wrench, self._on_refusal, self._on_notice)
         self._wrench_diagnostics = WrenchDiagnostics(self._settings)
-        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now,
-                                        [self._wrench_diagnostics])
+        self._planned_diagnostics = PlannedDiagnostics()
+        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now, [
+            self._planned_diagnostics, self._wrench_diagnostics])
         self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
         self._target: tuple[float, ...] | None = None  # the motion of the last one answered
@@ -147,6 +157,7 @@ class DynamicsNode(LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._active = False
+        self._give_up_plans()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -157,6 +168,7 @@ class DynamicsNode(LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more and close the topics."""
         self._active = False
+        self._give_up_plans()
         self._close()
         return TransitionCallbackReturn.SUCCESS
 
@@ -173,7 +185,8 @@ class DynamicsNode(LifecycleNode):
         self._external_wrench = ExternalWrench(self._settings)
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
-        self._step(Setpoint(0, (0.0,) * 24), None)
+        self._step(Setpoint(0, (0.0,) * MOTION), None)
+        StewartPlatform(self._settings).solve(np.zeros((1, MOTION)))
         with suppress(StewartError):  # no legs have such lengths
             self._external_wrench(
                 Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)
@@ -188,6 +201,8 @@ class DynamicsNode(LifecycleNode):
             self._publishers_of[topic] = self._publisher(_TYPES[name], f'~/{topic}', qos)
         self._wrench_publisher = self._publisher(
             WrenchStamped, f'~/{EXTERNAL_WRENCH}', QoSProfile(depth=10))
+        self._plan_publisher = self._publisher(
+            JointTrajectory, f'~/{planned.OUTPUT}', QoSProfile(depth=_PLANS))
         self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
         if self._settings['visualization_rate']:
@@ -197,10 +212,13 @@ class DynamicsNode(LifecycleNode):
         topics = inputs.SOURCES[self._settings['setpoint.source']]
         self._exclusive = self._settings['setpoint.exclusive']
         self._answer_task = until_shutdown(self, self._answer)
-        self._inputs = {topic: self._subscribe(topic, partial(self._on_setpoint, topic))
-                        for topic in topics}
-        self._subscribe(inputs.WRENCH, self._on_wrench)
-        self._subscribe(MEASURED_LEGS, self._on_measured_legs, JointState)
+        self._inputs = {
+            topic: self._subscribe(_TYPES[inputs.INPUT_TYPES[topic]], topic,
+                                   partial(self._on_setpoint, topic)) for topic in topics}
+        self._subscribe(WrenchStamped, inputs.WRENCH, self._on_wrench)
+        self._subscribe(JointState, MEASURED_LEGS, self._on_measured_legs)
+        self._plan_task = until_shutdown(self, self._plan)
+        self._subscribe(MultiDOFJointTrajectory, planned.INPUT, self._on_trajectory, _PLANS)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
         self._configured = True
@@ -215,11 +233,9 @@ class DynamicsNode(LifecycleNode):
         self._close_io.append(partial(self.destroy_publisher, publisher))
         return publisher
 
-    def _subscribe(self, topic: str, callback: Any, kind: Any = None) -> Any:
+    def _subscribe(self, kind: Any, topic: str, callback: Any, depth: int = _QUEUE) -> Any:
         subscription = self.create_subscription(
-            kind or _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}',
-            until_shutdown(self, callback),
-            QoSProfile(depth=_QUEUE), raw=True,
+            kind, f'~/{topic}', until_shutdown(self, callback), QoSProfile(depth=depth), raw=True,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=partial(self._on_incompatible_qos, topic)))
@@ -396,6 +412,59 @@ class DynamicsNode(LifecycleNode):
                 if taken is not None:
                     came = True
                     self._on_setpoint(topic, taken[0])
+
+    # -- planned motions ------------------------------------------------------------------
+
+    def _on_trajectory(self, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        if len(self._plans) == _PLANS:
+            self._tell(planned.refused(planned.TOO_MANY, f'{_PLANS} are in work or wait'), now)
+            return
+        # Parameters and load are those of now, whatever changes meanwhile.
+        self._plans.append(
+            (planned.answer(self._settings, self._setpoints.wrench, data), now))
+        self._plan_on()
+
+    def _plan_on(self) -> None:
+        """Go on with a piece of the work behind the messages that have come meanwhile."""
+        if not self._planning:
+            self._planning = True
+            executor: Any = self.executor
+            executor.create_task(self._plan_task)
+
+    def _plan(self) -> None:
+        """Do a piece of the work on the trajectory whose turn it is."""
+        self._planning = False
+        if not self._plans:  # given up
+            return
+        work, came = self._plans[0]
+        outcome = next(work)
+        if outcome is not None:
+            self._plans.popleft()
+            if outcome.answer:
+                self._plan_publisher.publish(outcome.answer)
+            self._tell(outcome, came)
+        if self._plans:
+            self._plan_on()
+
+    def _tell(self, outcome: planned.Outcome, came: float) -> None:
+        """Say what has become of a trajectory."""
+        now = time.monotonic()
+        status = self._planned_diagnostics.done(outcome, now - came)
+        if outcome.reason:
+            self._logged[status.name] = status.level  # it is said here, each refusal
+            line = self._series.add(outcome.reason, f'trajectory {outcome.message}', now)
+            if line is not None:
+                self.get_logger().error(line)
+        self._report()
+
+    def _give_up_plans(self) -> None:
+        if self._plans:
+            self.get_logger().warning(
+                f'trajectories given up, the node is deactivated: {len(self._plans)}')
+            self._plans.clear()
 
     # -- words ----------------------------------------------------------------------------
 

@@ -155,6 +155,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'restart', 's', 0.1, minimum=0.0, above=True),
     Parameter('setpoint.exclusive', 'bool',
               'refuse setpoints while a topic has more than one writer', default=False),
+    Parameter('trajectory.effort', 'bool', 'give forces with the points of ~/leg_trajectory: a '
+              'joint_trajectory_controller without an effort command interface refuses points '
+              'that have them', default=True),
     Parameter('external_wrench.cutoff', 'double',
               'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0,
               minimum=0.0, above=True, while_active=True),

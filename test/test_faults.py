@@ -39,7 +39,7 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
     bits, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS, own_domain,
-    Peer, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
+    Peer, Planner, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
 
 import stewart_dynamics
 from stewart_dynamics import StewartPlatform
@@ -862,6 +862,68 @@ def _memory_to_refuse(domain: int, folder: Path, file: Path, reason: str) -> int
     assert reason in line
     assert len(line) < 500
     return int(program.stdout)
+
+
+# Planned motions
+
+TURNED = HOME._replace(quaternion=(0.0, 0.0, math.sin(1.0), math.cos(1.0)))
+UNFIT = {
+    'refused: at ': ([HOME, HOME._replace(position=(0.0, 0.0, 4.0))], {}),
+    'det(J) passes zero': ([HOME, TURNED], {}),
+    'not finite: points[1]': ([HOME, HOME._replace(position=(0.0, 0.0, math.nan))], {}),
+    'quaternion not of unit length: points[0]': (
+        [HOME._replace(quaternion=(0.0, 0.0, 0.0, 1.1)), HOME], {}),
+    "wrong frame_id: 'world', must be 'base' or empty": ([HOME, HOME], {'frame': 'world'}),
+    'time_from_start does not rise: points[1]': ([HOME, HOME], {'step': 0}),
+    'malformed: 0 points': ([], {}),
+    'out of range: the numbers overflow': ([HOME._replace(position=(1e200, 0.0, 0.0))], {}),
+    'too far between points': ([HOME, HOME._replace(position=(1e9, 0.0, 0.0))], {}),
+}
+
+
+def test_a_trajectory_that_is_unfit_is_refused_as_a_whole(begin: Start) -> None:
+    node = begin('singularity.stop_condition:=1.0e9', 'limits.force_max:=1.0e9',
+                 'limits.velocity_max:=100.0', 'limits.length_max:=3.0')
+    planner = Planner(node)
+    for number, (text, (samples, how)) in enumerate(UNFIT.items(), start=1):
+        planner.send(samples, **{'step': 10**9, **how})
+        planner.until_refused(text, number)
+        node.answer(MOVING)
+    planner.send_bytes(raw(HOME.combined(1))[:-20])
+    planner.until_refused('refused: malformed: ', len(UNFIT) + 1)
+    assert any('trajectory refused: ' in line for line in log_lines(node.program.stderr, 'ERROR'))
+    assert not planner.raw
+    planner.send([HOME, HOME])
+    planner.until_answered(1)
+    node.until_status('trajectory', OK, 'answered: 2 points')
+
+
+def test_more_trajectories_than_can_wait_are_refused(begin: Start) -> None:
+    node = begin()
+    planner = Planner(node)
+    planner.fill()
+    node.until_reported('trajectory', ERROR, 'refused: more than can wait: 5 are in work or wait')
+    node.until_status('trajectory', OK, 'answered: 20000 points')
+    node.until(lambda: int(node.values('trajectory')['refused: more than can wait']) > 0,
+               'they are counted')
+
+
+def test_a_trajectory_in_work_is_given_up_with_the_node(begin: Start) -> None:
+    node = begin()
+    planner = Planner(node)
+    planner.fill()
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
+        assert node.call('change_state', ChangeState.Request(
+            transition=Transition(id=transition))).success
+    node.until_said('trajectories given up, the node is deactivated: ')
+    node.until_active()
+
+    def answered() -> bool:
+        # What was still in the middleware may come before it, and leave no place for it.
+        planner.send([HOME, HOME])
+        return 'answered: 2 points' in node.status('trajectory').message
+
+    node.until(answered, 'the next trajectory is answered')
 
 
 # The page
