@@ -17,13 +17,15 @@ The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the machine; a caller asks
-for parameters and states meanwhile, a viewer takes the markers, a planner sends planned motions.
+for parameters and states meanwhile, a viewer takes the markers, a machine has its legs measured, a
+planner sends planned motions.
 """
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 import gc
 import itertools
 from pathlib import Path
@@ -37,6 +39,7 @@ import numpy as np
 from pass_through import spin, TOPICS
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParametersAtomically
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -46,10 +49,11 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 from visualization_msgs.msg import MarkerArray
 
-from stewart_dynamics import cdr
+from stewart_dynamics import cdr, Parameters, StewartPlatform
 from stewart_dynamics.rotation import to_quaternion
 from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
 
+PARAMETERS = Path(__file__).resolve().parents[1] / 'config' / 'platform.yaml'
 QOS = QoSProfile(depth=2000)
 PERIOD = 1_000_000  # [ns]
 FIRST_STAMP = 1_700_000_000_000_000_000
@@ -268,6 +272,38 @@ def trajectory(points: int) -> bytes:
     return bytes(serialize_message(message))
 
 
+def legs(parameters: Parameters, first: int) -> list[bytes]:
+    """Return the measured leg states of the motion, at 1 kHz."""
+    motion = motion_at(TrajectoryParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
+    result = StewartPlatform(parameters).inverse_dynamics(motion)
+    stamps = first + PERIOD * np.arange(REPEATED)
+    layout = cdr.JointState(parameters['joints']).layout(True)
+    return [each.tobytes() for each in layout.write(
+        stamps, result.lengths - parameters['geometry.zero_length'], result.rates,
+        result.forces)]
+
+
+def measure(name: str) -> None:
+    """Publish measured legs to a node at 1 kHz until a signal, and say how many."""
+    node = rclpy.create_node('machine')
+    publisher = node.create_publisher(JointState, f'/{name}/measured_legs', QOS)
+    bodies = legs(Parameters.from_yaml(PARAMETERS), FIRST_STAMP)
+    wait_for(publisher.get_subscription_count, 'the node is there')
+    print('ready', flush=True)
+    begin = time.monotonic_ns()
+    number = 0
+    with suppress(KeyboardInterrupt, RCLError):
+        while rclpy.ok():
+            sec, nanosec = divmod(FIRST_STAMP + number * PERIOD, 1_000_000_000)
+            publisher.publish(b'\x00\x01\x00\x00' + sec.to_bytes(4, 'little')
+                              + nanosec.to_bytes(4, 'little') + bodies[number % REPEATED][12:])
+            number += 1
+            left = begin + number * PERIOD - time.monotonic_ns()
+            if left > 0:
+                time.sleep(left * 1e-9)
+    print(number, flush=True)
+
+
 def wait_for(condition: Any, what: str) -> None:
     """Wait for discovery."""
     end = time.monotonic() + DISCOVERY_SECONDS
@@ -289,6 +325,8 @@ def main() -> None:
         view(*arguments)
     elif role == 'plan':
         plan(Path(arguments[0]), arguments[1], int(arguments[2]))
+    elif role == 'measure':
+        measure(*arguments)
     else:
         call(*arguments)
     rclpy.try_shutdown()

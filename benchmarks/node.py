@@ -39,18 +39,20 @@ from timeit import repeat
 from typing import NamedTuple
 
 from inverse_dynamics import Array, HERE, processor_name, write
-from latency import FIRST_STAMP, MOTION, PERIOD
+from latency import FIRST_STAMP, legs, MOTION, PARAMETERS, PERIOD
 import numpy as np
 from replay import table
 
+from stewart_dynamics.external_wrench import ExternalWrench
 from stewart_dynamics.markers import Markers
+from stewart_dynamics.measured_legs import MeasuredLegs
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.step import Setpoint, Step
+from stewart_dynamics.step import NO_WRENCH, Setpoint, Step
 from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
 
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
 BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'
-PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
+BEGIN_LEGS, END_LEGS = '<!-- measured legs: begin -->', '<!-- measured legs: end -->'
 NODE = str(Path(sys.executable).with_name('stewart_dynamics'))
 
 DOMAIN = '101'  # the tests have those below
@@ -205,7 +207,7 @@ class Measurement:
         How they talk.
     beside : str
         A role of ``latency.py`` that the first contestant has beside it all the time: its
-        services are called, or its markers viewed.
+        services are called, its markers viewed, or its legs measured.
     killed : bool
         One more listener is killed by SIGKILL in the middle of the last turn.
 
@@ -381,6 +383,36 @@ def markers_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
     return ['', *table(cells), '', picture_words(), '']
 
 
+def legs_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
+    """Return the table of a node whose legs are measured beside one whose are not."""
+    nodes = [ours('measured', 'separate'), ours('alone', 'separate')]
+    turns = in_turns(nodes, rounds, seconds, folder, beside='measure')
+    cells = [HEADER[:-2] + ('p50, times alone', 'p99, times alone')]
+    for title, row in zip(('`~/measured_legs` at 1 kHz', 'no measured legs'),
+                          latency_rows('', nodes, turns, beside=1), strict=True):
+        cells.append((title, *row[1:]))
+    return ['', *table(cells), '', measurement_words(), '']
+
+
+def measurement_words() -> str:
+    """Return how long a measurement takes, from its message to the wrench's."""
+    parameters = Parameters.from_yaml(PARAMETERS)
+    messages = legs(parameters, FIRST_STAMP)
+    step = ExternalWrench(parameters)
+
+    def follow() -> None:
+        measured = MeasuredLegs(parameters, step, lambda *said: None, lambda said: None)
+        for message in messages:
+            estimate = measured.take(message, NO_WRENCH, None)
+            if estimate is None:
+                raise SystemExit('a measurement was refused')
+            step.message(estimate)
+
+    times = repeat(follow, timer=time.process_time, repeat=21, number=1)
+    return (f'A measurement takes {median(times) / len(messages) * 1e6:.1f} us of processor time, '
+            "from its message's bytes to those of the wrench, median of 21.")
+
+
 def picture_words() -> str:
     """Return how long a picture takes and how large it is."""
     parameters = Parameters.from_yaml(PARAMETERS)
@@ -402,8 +434,8 @@ def main() -> None:
     parser.add_argument('--seconds', type=int, default=SECONDS, help='of a turn (%(default)s)')
     parser.add_argument('--minutes', type=int, default=MINUTES,
                         help='of the long run; 0: none (%(default)s)')
-    parser.add_argument('--parts', nargs='+', choices=('node', 'markers'),
-                        default=('node', 'markers'), help='what is measured (all of it)')
+    parser.add_argument('--parts', nargs='+', choices=('node', 'markers', 'legs'),
+                        default=('node', 'markers', 'legs'), help='what is measured (all of it)')
     parser.add_argument('--write', action='store_true', help='put the tables into README.md')
     options = parser.parse_args()
     if options.rounds < 1 or options.seconds < 1 or options.minutes < 0:
@@ -416,6 +448,9 @@ def main() -> None:
                 options.rounds, options.seconds, options.minutes, Path(name))
         if 'markers' in options.parts:
             lines[BEGIN_MARKERS, END_MARKERS] = markers_lines(
+                options.rounds, options.seconds, Path(name))
+        if 'legs' in options.parts:
+            lines[BEGIN_LEGS, END_LEGS] = legs_lines(
                 options.rounds, options.seconds, Path(name))
     versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
     machine = (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
