@@ -5,7 +5,8 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo docs environment lint test
+.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop docs \
+  environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -58,6 +59,9 @@ lint: $(INSTALLED)
 
 demo: $(INSTALLED)
 	@.venv/bin/python demo/demo.py
+
+demo-loop: $(INSTALLED)
+	@.venv/bin/python demo/loop.py
 
 bench: $(INSTALLED)
 	.venv/bin/python benchmarks/inverse_dynamics.py --write

@@ -13,17 +13,21 @@
 # limitations under the License.
 
 """
-Make what the README shows: pictures of the paper's motion, and the tables of parameters.
+Make what the README shows: pictures of the paper's motion and of the loop, and its tables.
 
-``make docs`` runs it. The pictures are drawn from bags/singular, by the joining and the step that
-node and replay have.
+``make docs`` runs it. The pictures of the motion are drawn from bags/singular, by the joining and
+the step that node and replay have; picture and table of the loop are of what ``make
+demo-loop`` leaves in docs/loop.json.
 """
 
 from __future__ import annotations
 
 from contextlib import closing
+import json
 from pathlib import Path
 import shutil
+import subprocess
+import sys
 import tempfile
 from typing import Any, NamedTuple
 
@@ -88,7 +92,26 @@ def readme(text: str) -> str:
         before, _, rest = text.partition(begin)
         _, _, after = rest.partition(end)
         text = f'{before}{begin}{table(kind)}\n{end}{after}'
-    return text
+    before, begin, rest = text.partition('<!-- errors in the loop -->\n')
+    _, end, after = rest.partition('<!-- end of the loop -->')
+    figures = json.loads((ROOT / 'docs' / 'loop.json').read_text(encoding='utf-8'))
+    return f'{before}{begin}{loop_table(figures)}\n{end}{after}'
+
+
+def loop_table(figures: dict[str, Any]) -> str:
+    """Return a Markdown table of what demo/loop.py found: RMS and peak of the errors."""
+    lines = ['| simulated machine | legs, PD alone | legs, PD + forces | | platform, PD alone | '
+             'platform, PD + forces | |', '| --- | --- | --- | --- | --- | --- | --- |']
+    runs = figures['runs']
+    for pd, forward in zip(runs[::2], runs[1::2], strict=True):
+        payload = pd['payload'] - 1.0
+        line = f'| payload {payload:+.0%} |' if payload else '| as the node believes |'
+        for name in ('all legs', 'position'):
+            for run in (pd, forward):
+                line += f' {run["rms"][name]:.3g} ({run["peak"][name]:.3g}) |'
+            line += f' 1/{pd["rms"][name] / forward["rms"][name]:.0f} |'
+        lines.append(line)
+    return '\n'.join(lines)
 
 
 class Recorded(NamedTuple):
@@ -263,6 +286,8 @@ def main() -> None:
     draw_singular(ROOT / 'docs' / 'singular.png', recorded)
     draw_figures(ROOT / 'docs' / 'figures.png', recorded)
     draw_report(ROOT / 'docs' / 'report.png')
+    subprocess.run([sys.executable, ROOT / 'demo' / 'loop.py', '--output', ROOT / 'docs'],
+                   check=True)
     README.write_text(readme(README.read_text(encoding='utf-8')), encoding='utf-8')
 
 

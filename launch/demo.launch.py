@@ -13,27 +13,79 @@
 # limitations under the License.
 
 
-"""The node, and a motion that is published to it as setpoints."""
+"""
+The machine in the loop, in real time: a motion, the node, the simulator and a controller.
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+    ros2 launch stewart_dynamics demo.launch.py feed_forward:=false payload_factor:=1.3
+"""
+
+import sys
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
+
+from stewart_dynamics.parameters import Parameters
+
+
+def simulator(context: LaunchContext) -> list[Node]:
+    """Return the simulator, its payload another one than the node believes in."""
+    file = LaunchConfiguration('params_file').perform(context)
+    factor = float(LaunchConfiguration('payload_factor').perform(context))
+    parameters = Parameters.from_yaml(file)
+    return [Node(
+        package='stewart_dynamics',
+        executable='stewart_simulator',
+        name='stewart_simulator',
+        namespace=LaunchConfiguration('namespace'),
+        parameters=[file, LaunchConfiguration('simulator_file'), {
+            'platform.mass': factor * parameters['platform.mass'],
+            'platform.inertia': (factor * parameters['platform.inertia']).tolist()}],
+        output='screen')]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the two nodes; `trajectory_file` adds to the arguments of the first."""
+    """Return the four; their arguments add to those of the node's own launch file."""
     share = FindPackageShare('stewart_dynamics')
     return LaunchDescription([
         DeclareLaunchArgument(
             'trajectory_file',
-            default_value=PathJoinSubstitution([share, 'config', 'trajectory_clear.yaml']),
+            default_value=PathJoinSubstitution([share, 'config', 'trajectory_loop.yaml']),
             description='YAML file with the parameters of the motion'),
+        DeclareLaunchArgument(
+            'simulator_file',
+            default_value=PathJoinSubstitution([share, 'config', 'simulator.yaml']),
+            description='YAML file with the parameters of the simulation: the motion must begin '
+                        'in its initial_pose'),
+        DeclareLaunchArgument(
+            'payload_factor', default_value='1.0',
+            description='mass and inertia of the simulated platform, of those in params_file'),
+        DeclareLaunchArgument(
+            'controller', default_value='true', choices=['true', 'false'],
+            description='run the example controller; false: run your own on '
+                        'stewart_simulator/commands'),
+        DeclareLaunchArgument(
+            'feed_forward', default_value='true', choices=['true', 'false'],
+            description='let the example controller add the forces of the node'),
         # It declares params_file and namespace, for this file as well.
         IncludeLaunchDescription(PythonLaunchDescriptionSource(
             PathJoinSubstitution([share, 'launch', 'stewart_dynamics.launch.py']))),
+        OpaqueFunction(function=simulator),
+        # No executable of the package, but a file to copy.
+        Node(
+            executable=sys.executable,
+            arguments=[PathJoinSubstitution([share, 'examples', 'leg_controller.py'])],
+            name='leg_controller',
+            namespace=LaunchConfiguration('namespace'),
+            parameters=[{'feed_forward': ParameterValue(
+                LaunchConfiguration('feed_forward'), value_type=bool)}],
+            condition=IfCondition(LaunchConfiguration('controller')),
+            output='screen'),
         # Setpoints go to stewart_dynamics/setpoint/..., hence the same namespace.
         Node(
             package='stewart_dynamics',

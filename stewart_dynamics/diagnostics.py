@@ -132,6 +132,8 @@ class Diagnostics:
         self.parameters = parameters
         self.writers: dict[str, int] = {}
         """Of each setpoint topic."""
+        self.readers: dict[str, int] = {}
+        """Of the topics that controllers read."""
         self.namesakes: tuple[str, int] = '', 1
         """The node's name, and how many have it."""
         self._others = others
@@ -235,6 +237,7 @@ class Diagnostics:
         values += [(f'{topic}: last heard (s ago)', 'never' if self._silent[topic]
                     else f'{now - at:.3f}') for topic, at in self._heard.items()]
         values += [(f'{topic}: writers', str(n)) for topic, n in self.writers.items()]
+        values += [(f'{topic}: readers', str(n)) for topic, n in self.readers.items()]
         values += [(f'refused, {topic}: {reason}', str(n))
                    for (topic, reason), n in sorted(self._refusals.items())]
         return Status('setpoints', level, message or 'answered', tuple(values))

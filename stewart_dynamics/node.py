@@ -81,6 +81,9 @@ _BACKLOG = 100
 # So many trajectories may wait in the middleware, so many be in work or wait here.
 _PLANS = 5
 
+# What controllers read; in the diagnostics stands how many do.
+_READ = ('leg_states', 'leg_forces')
+
 _WATCH_SECONDS = 0.05
 _REPORT_SECONDS = 1.0
 
@@ -501,6 +504,8 @@ class DynamicsNode(LifecycleNode):
         full_name = self.get_fully_qualified_name()
         self._diagnostics.writers = {topic: self.count_publishers(name)
                                      for topic, name in self._topic_names.items()}
+        self._diagnostics.readers = {
+            topic: self._publishers_of[topic].get_subscription_count() for topic in _READ}
         self._diagnostics.namesakes = full_name, self.get_node_names_and_namespaces().count(
             (self.get_name(), self.get_namespace()))
         name = full_name.lstrip('/')

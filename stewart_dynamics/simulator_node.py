@@ -130,7 +130,8 @@ class SimulatorNode(Node):
         first, second, third, fourth, fifth, sixth = values
         self._commands = first, second, third, fourth, fifth, sixth
         if self._stepped:
-            self._announcing.cancel()
+            # /clock is best effort: what is not answered is said again.
+            self._announcing.reset()
             self._advance()
 
     def _on_time(self) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Publishes a motion as setpoints, in real time."""
+"""Publishes a motion as setpoints, in real time or in that of a simulation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from typing import Any
 from geometry_msgs.msg import (
     Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
     Vector3)
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock, ClockType, JumpThreshold
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
@@ -46,6 +47,9 @@ _SETTLE = 500_000_000  # [ns]
 class TrajectoryNode(Node):
     """
     Publishes the motion's samples when they are due, then is done.
+
+    With ``use_sim_time`` they are due by /clock and published as soon as it comes: a simulation
+    may run as fast or as slowly as it can, or wait for what it is answered.
 
     Parameters
     ----------
@@ -83,19 +87,44 @@ class TrajectoryNode(Node):
             self._publish = self._publish_separate
         self._begun = self._subscribed = False
         self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * 1e9)
-        self.create_timer(1.0 / self._settings['rate'], until_shutdown(self, self._on_timer),
-                          clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = self.create_timer(
+            1.0 / self._settings['rate'], until_shutdown(self, self._on_timer),
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._simulated = self.get_parameter('use_sim_time').value
+        if self._simulated:
+            self._jumps = self.get_clock().create_jump_callback(
+                JumpThreshold(min_forward=Duration(nanoseconds=1),
+                              min_backward=Duration(nanoseconds=-1), on_clock_change=False),
+                post_callback=until_shutdown(self, self._on_clock))
         motion, rate = self._settings['motion.type'], self._settings['rate']
         self.get_logger().info(
             f'{motion} motion at {rate:g} Hz to {target}' + (
                 ', until stopped' if self._loop else f', {self._samples} setpoints'))
 
     def _on_timer(self) -> None:
-        """Publish what is due, each sample with its own stamp, however late the timer is."""
+        """Begin, and go on in real time."""
         now = time.monotonic_ns() - self._start
-        if not self._begun:
-            self._wait(now)
+        if self._begun:
+            self._publish_due(now)
             return
+        self._wait(now)
+        if self._begun and self._simulated:
+            self._timer.cancel()
+            self._publish_due(0)  # the clock may wait for what comes of it
+
+    def _on_clock(self, jump: Any) -> None:
+        """Go on in simulated time."""
+        if not self._begun:
+            return
+        now = self.get_clock().now().nanoseconds - self._stamp
+        if now < 0:
+            self.get_logger().warning('/clock is before the start of the motion: it begins anew')
+            self._stamp += now
+            self._index = now = 0
+        self._publish_due(now)
+
+    def _publish_due(self, now: int) -> None:
+        """Publish what is due, each sample with its own stamp, however late it is [ns]."""
         while not self._done.done():
             due = int(sample_time(self._settings, self._index))
             if due > now:
@@ -115,7 +144,9 @@ class TrajectoryNode(Node):
                 self._start += now + _SETTLE
                 now = -_SETTLE
         stamp = self.get_clock().now().nanoseconds
-        if now >= 0 and stamp:  # simulated time stands at zero until there is a clock
+        if now >= 0 and not stamp:  # simulated time stands at zero until there is a clock
+            self.get_logger().warning('waiting for /clock', once=True)
+        elif now >= 0:
             self._begun = True
             if not self._subscribed:
                 self.get_logger().warning('begun, but not every topic has a subscriber: '

@@ -431,7 +431,8 @@ def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
 UNIT = re.compile(r'\((m|m/s|N|s|us|s ago|Hz|m\^3|m\^3/s)\)$')
 PLAIN = re.compile(
     r'setpoints answered|crossings|condition number|worst condition number of the last second'
-    r'|largest leg force under a unit load|its leg|refused, .*|.*: writers|passed over|incomplete')
+    r'|largest leg force under a unit load|its leg|refused, .*|.*: (?:writers|readers)|passed over'
+    r'|incomplete')
 
 
 def _check_values(diagnostics: Diagnostics, now: float) -> None:
@@ -467,6 +468,7 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
             answered(diagnostics, now, output)
             state = output.singularity
         diagnostics.writers = {POSE: 2}
+        diagnostics.readers = {'leg_states': 1}
         _check_values(diagnostics, now)
 
 

@@ -34,9 +34,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
 EXECUTABLES = ('stewart_dynamics', 'stewart_replay', 'stewart_simulator', 'stewart_trajectory')
-PACKAGED = ('bags', 'config', 'launch', 'resource', 'security', NAME, 'LICENSE', 'package.xml',
-            'pyproject.toml', 'setup.cfg', 'setup.py')
-SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'launch', 'test', NAME)
+PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
+            'package.xml', 'pyproject.toml', 'setup.cfg', 'setup.py')
+SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', NAME)
 
 # Modules whose rosdep key is not their own name; '' where rosdep has no key.
 KEYS = {
@@ -170,7 +170,7 @@ def check_share(share: Path) -> None:
     """Check that the files are there which ROS and the launch files look up."""
     assert (share / 'ament_index/resource_index/packages' / NAME).is_file()
     assert (share / NAME / 'package.xml').is_file()
-    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.yaml',
+    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.yaml', 'examples/*.py',
                     'launch/*.launch.py', 'security/*'):
         expected = {path.name for path in ROOT.glob(pattern)}
         folder, _, files = pattern.rpartition('/')
@@ -235,7 +235,7 @@ def test_launch_file_compiles(path: Path, tmp_path: Path) -> None:
 def test_package_xml_names_what_the_package_imports() -> None:
     """Each third-party module that is imported has its rosdep key in package.xml."""
     needed = {KEYS.get(name, name)
-              for name in third_party('launch', NAME) - set(OPTIONAL)} - {''}
+              for name in third_party('examples', 'launch', NAME) - set(OPTIONAL)} - {''}
     assert needed <= depends('depend', 'exec_depend')
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 import signal
 from typing import Any
@@ -25,6 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from running import (
     assert_only_log_lines, executable, INPUTS, log_lines, nanoseconds, Peer, Program, ROOT,
     SEPARATE)
@@ -54,6 +56,7 @@ class Trajectory:
         self._raw = {topic: self.peer.listen(f'/stewart_dynamics/{topic}', kind)
                      for topic, kind in INPUTS.items()}
         arguments = [part for override in overrides for part in ('-p', override)]
+        self._clock = self.peer.writer('/clock', Clock)
         self.program = Program([executable('stewart_trajectory'), '--ros-args', '--params-file',
                                 file, *arguments], domain, folder)
 
@@ -65,6 +68,15 @@ class Trajectory:
         """Wait until so many messages have come on these topics."""
         self.peer.until(lambda: all(len(self._raw[topic]) >= number
                                     for topic, number in numbers.items()), f'{numbers} come')
+
+    def at(self, now: int, number: int, topics: Sequence[str] = SEPARATE) -> None:
+        """Set the clock [ns] and wait until so many messages have come on these topics."""
+        def answered() -> bool:
+            # Time is best effort: a message of it may be lost, all others come.
+            self._clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
+            return all(len(self._raw[topic]) >= number for topic in topics)
+
+        self.peer.until(answered, f'{number} messages have come by {now} ns')
 
     def close(self) -> None:
         """Leave ROS, and end the program if it still runs."""
@@ -188,6 +200,60 @@ def test_a_signal_ends_it_while_it_waits_for_subscribers(start: Start) -> None:
     trajectory.peer.until(lambda: log_lines(trajectory.program.stderr), 'it has started')
     assert trajectory.program.stop() == 0
     assert_only_log_lines(trajectory.program.stderr)
+
+
+SECOND = 1_000_000_000
+PERIOD = 5_000_000  # at 200 Hz
+
+
+def test_in_simulated_time_what_is_due_comes_with_the_clock(start: Start, tmp_path: Path) -> None:
+    trajectory = start(MOTION.format(kind='sine', more='output: combined'), 'use_sim_time:=true',
+                       'motion.duration:=0.1')
+    topics = ('setpoint/combined',)
+    # It begins where the clock stands, by itself, and waits for it at each sample.
+    trajectory.at(SECOND, 1, topics)
+    trajectory.at(SECOND + PERIOD - 1, 1, topics)
+    for n in range(1, 11):
+        trajectory.at(SECOND + n * PERIOD, n + 1, topics)
+        assert len(trajectory.received(*topics)) == n + 1
+    # What has become due meanwhile comes at once, and then it is done.
+    trajectory.at(2 * SECOND, 21, topics)
+    assert trajectory.program.wait() == 0
+    stamps, rows = _combined(trajectory)
+    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    times = sample_times(parameters)[:21]
+    assert stamps == (SECOND + times).tolist()
+    np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
+    assert_only_log_lines(trajectory.program.stderr)
+
+
+def test_it_begins_anew_where_the_clock_does(start: Start, tmp_path: Path) -> None:
+    trajectory = start(MOTION.format(kind='sine', more='loop: true'), 'use_sim_time:=true')
+    trajectory.at(7 * SECOND, 1)
+    trajectory.at(7 * SECOND + 3 * PERIOD, 4)
+    # No sample comes twice where the clock goes back less than to the start.
+    trajectory.at(7 * SECOND + 2 * PERIOD, 4)
+    trajectory.at(7 * SECOND + 4 * PERIOD, 5)
+    trajectory.at(SECOND, 6)
+    trajectory.at(SECOND + PERIOD, 7)
+    assert trajectory.program.stop() == 0
+    stamps, rows = _separate(trajectory)
+    times = np.array([0, 1, 2, 3, 4, 0, 1]) * PERIOD
+    assert stamps == (np.repeat([7, 1], [5, 2]) * SECOND + times).tolist()
+    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
+    warning, = log_lines(trajectory.program.stderr, 'WARN')
+    assert 'it begins anew' in warning
+
+
+def test_it_waits_for_the_clock(start: Start) -> None:
+    trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
+                       'use_sim_time:=true')
+    trajectory.peer.until(lambda: 'waiting for /clock' in trajectory.program.stderr, 'it waits')
+    assert not trajectory.received('setpoint/pose')
+    trajectory.at(SECOND, 1)
+    assert trajectory.program.stop() == 0
+    assert len(log_lines(trajectory.program.stderr, 'WARN')) == 1
 
 
 BROKEN = {

@@ -1,0 +1,429 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Run a controller in the loop with a simulated machine, and print how well the legs follow.
+
+``make demo-loop`` runs it: trajectory, node, simulator and examples/leg_controller.py, each in a
+process of its own, over ROS 2 topics; four times, without and with the node's forces as
+feed-forward, on a machine that is as the node believes and on one that carries more. The
+simulator owns time and waits for each command, so that no figure depends on this computer's load.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import json
+import math
+import os
+from pathlib import Path
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from tqdm import tqdm
+import yaml
+
+from stewart_dynamics import cdr, Motion, StewartPlatform
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.rotation import from_quaternion
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+
+matplotlib.use('Agg')
+from matplotlib import pyplot  # noqa: E402, I100, I202
+
+Array = NDArray[np.float64]
+
+ROOT = Path(__file__).resolve().parent.parent
+NODE, SIMULATOR = '/stewart_dynamics', '/stewart_simulator'
+QOS = QoSProfile(depth=1000)
+BEGIN = 1_000_000_000  # of simulated time [ns]
+RATE = 1000.0  # of setpoints, states and commands [Hz]
+HEAVIER = 1.3
+# Nothing takes so long on a computer at rest, though two programs compile first [s].
+PATIENCE = 60.0
+LOOK = 0.1  # how often programs and progress are looked after [s]
+
+# What is started, in this order; the last when the others hear each other: it sets all in motion.
+PROGRAMS: dict[str, list[str | Path]] = {
+    'stewart_simulator': [Path(sys.executable).with_name('stewart_simulator')],
+    'stewart_dynamics': [Path(sys.executable).with_name('stewart_dynamics')],
+    'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py'],
+    'stewart_trajectory': [Path(sys.executable).with_name('stewart_trajectory')]}
+
+UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position': 'um',
+         'rotation': 'urad'}
+
+
+class Failure(Exception):
+    """What ends the demo; its text is one line."""
+
+
+class Errors(NamedTuple):
+    """How far what was measured is from what was desired for the same time, N times."""
+
+    seconds: Array
+    """Since the start of the motion (N,)."""
+    legs: Array
+    """Of the lengths (N, 6) [um]."""
+    position: Array
+    """Distance of the platform's origin (N,) [um]."""
+    rotation: Array
+    """Angle (N,) [urad]."""
+
+    def figures(self, of: Callable[[Array], Any]) -> dict[str, float]:
+        """Return one figure of each series of errors."""
+        series = [*self.legs.T, self.legs, self.position, self.rotation]
+        return {name: float(of(each)) for name, each in zip(UNITS, series, strict=True)}
+
+
+class Run(NamedTuple):
+    """One of the four, and what it gave."""
+
+    feed_forward: bool
+    payload: float
+    """The simulator's, of that which the node believes in."""
+    errors: Errors
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root of the mean square of each series of errors."""
+        return self.errors.figures(lambda each: np.sqrt(np.mean(np.square(each))))
+
+    @property
+    def peak(self) -> dict[str, float]:
+        """Largest of each."""
+        return self.errors.figures(lambda each: np.abs(each).max())
+
+
+class Recorder(Node):
+    """Keeps what is measured, as it comes."""
+
+    def __init__(self) -> None:
+        super().__init__('recorder')
+        self._readers = 0
+        self.states = self._kept(JointState, f'{SIMULATOR}/leg_states')
+        self.poses = self._kept(PoseStamped, f'{SIMULATOR}/pose')
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
+
+    def _kept(self, kind: Any, topic: str) -> list[bytes]:
+        messages: list[bytes] = []
+        self.create_subscription(kind, topic, messages.append, QOS, raw=True)
+        return messages
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            for pair in status.values:
+                if pair.key == 'leg_states: readers':
+                    self._readers = int(pair.value)
+
+    def ready(self) -> bool:
+        """
+        Return whether the simulator is heard and the controller hears the node.
+
+        The node answers each setpoint once, so it must know the controller before the first. All
+        else is said again, or waited for, until it is heard.
+        """
+        return self._readers > 0 and bool(self.states) and bool(self.poses)
+
+    @property
+    def time(self) -> int:
+        """How far simulated time has come since it began [ns]."""
+        last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
+        return max(last - BEGIN, 0)
+
+    def errors(self, times: NDArray[np.int64], lengths: Array, wanted: Motion) -> Errors:
+        """Return how far this is from a motion (N,) and its leg positions (N, 6) by its times."""
+        states = {_stamp(data): np.array(deserialize_message(data, JointState).position)
+                  for data in self.states}
+        poses = {stamp: numbers for stamp, _, numbers in map(cdr.pose, self.poses)}
+        stamps = (BEGIN + times).tolist()
+        missing = sum(stamp not in states or stamp not in poses for stamp in stamps)
+        if missing:
+            raise Failure(f'{missing} of {len(stamps)} states have not come')
+        true = np.array([poses[stamp] for stamp in stamps])
+        rotation = np.moveaxis(np.reshape(from_quaternion(*true[:, 3:].T), (3, 3, -1)), -1, 0)
+        turned = wanted.rotation.swapaxes(1, 2) @ rotation
+        # By the sine: no angle below 1e-8 is seen in the cosine.
+        sine = 0.5 * np.linalg.norm(turned[:, [2, 0, 1], [1, 2, 0]]
+                                    - turned[:, [1, 2, 0], [2, 0, 1]], axis=1)
+        return Errors(
+            times * 1e-9, 1e6 * (np.array([states[stamp] for stamp in stamps]) - lengths),
+            1e6 * np.linalg.norm(true[:, :3] - wanted.position, axis=1),
+            1e6 * np.arcsin(np.minimum(sine, 1.0)))
+
+
+def _stamp(message: bytes) -> int:
+    """Return the stamp of any message with a header, from this computer [ns]."""
+    sec, nanosec = struct.unpack_from('<iI', message, 4)
+    return int(sec) * 1_000_000_000 + int(nanosec)
+
+
+class Program:
+    """One of the four in a process of its own."""
+
+    def __init__(self, name: str, arguments: Sequence[str | Path], folder: Path) -> None:
+        self.name = name
+        self._said = folder / f'{name}.txt'
+        with self._said.open('wb') as said:
+            self._process = subprocess.Popen([*PROGRAMS[name], *arguments], stdout=said,
+                                             stderr=said, stdin=subprocess.DEVNULL)
+
+    @property
+    def last_line(self) -> str:
+        """What it has said last."""
+        return (self._said.read_text(errors='replace').splitlines() or ['nothing was said'])[-1]
+
+    def check(self) -> None:
+        """Raise Failure if it has ended; the trajectory may, when it has published all."""
+        code = self._process.poll()
+        if code or (code == 0 and self.name != 'stewart_trajectory'):
+            raise Failure(f'{self.name} ended with exit code {code}: {self.last_line}')
+
+    def stop(self) -> None:
+        """Tell it to end, if it still runs."""
+        self._process.terminate()
+
+    def wait(self) -> None:
+        """Wait until it has ended."""
+        try:
+            self._process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+class Loop:
+    """
+    What all runs have in common: machine, motion and gains.
+
+    Parameters
+    ----------
+    machine, motion : Path
+        Parameter files of the node and of the trajectory.
+    seconds : float
+        How much of the motion.
+    bandwidth : float
+        Natural frequency [Hz] of a leg under PD control, with a damping ratio of 1, and with the
+        mass that it moves at the start while the other five hold still.
+
+    Raises Failure for a motion that does not begin at rest, and no bandwidth.
+
+    """
+
+    def __init__(self, machine: Path, motion: Path, seconds: float, bandwidth: float) -> None:
+        parameters = Parameters.from_yaml(machine)
+        trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
+                      'motion.duration': seconds}
+        settings = TrajectoryParameters.from_yaml(motion).replaced(trajectory, str(motion))
+        platform = StewartPlatform(parameters)
+        self.times = sample_times(settings)
+        self._motion = motion_at(settings, self.times * 1e-9)
+        self._lengths = platform.inverse_kinematics(
+            self._motion.position, self._motion.rotation) - parameters['geometry.zero_length']
+        if not 0.0 < bandwidth < math.inf:
+            raise Failure(f'bandwidth: {bandwidth} Hz: must be more than 0')
+        start = motion_at(settings, 0.0)
+        if np.abs([start.linear_velocity, start.angular_velocity]).max() > 1e-9:
+            raise Failure(f'{motion}: must begin at rest, as the simulator does')
+        self.bandwidth, self.leg_mass = bandwidth, leg_mass(platform, start)
+        omega = 2.0 * math.pi * bandwidth
+        self.gains = {'proportional_gain': self.leg_mass * omega ** 2,
+                      'derivative_gain': 2.0 * self.leg_mass * omega}
+        self._machine = parameters['platform.mass'], parameters['platform.inertia']
+        self._files = {
+            'stewart_simulator': [machine, ROOT / 'config' / 'simulator.yaml'],
+            'stewart_dynamics': [machine], 'stewart_trajectory': [motion]}
+        self._given: dict[str, dict[str, Any]] = {
+            'stewart_simulator': {'use_sim_time': True, 'rate': RATE, 'initial_pose': [
+                *start.position.tolist(), *_angles(start.rotation)]},
+            'stewart_dynamics': {'setpoint.source': 'combined'},
+            'leg_controller': {'use_sim_time': True, **self.gains},
+            'stewart_trajectory': {'use_sim_time': True, **trajectory}}
+
+    def run(self, feed_forward: bool, payload: float, tell: Callable[[int], object]) -> Run:
+        """Run the four programs, telling how far time is [ns], and return the errors."""
+        mass, inertia = self._machine
+        given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
+        given['leg_controller']['ros__parameters']['feed_forward'] = feed_forward
+        given['stewart_simulator']['ros__parameters'].update({
+            'platform.mass': payload * mass, 'platform.inertia': (payload * inertia).tolist()})
+        recorder = Recorder()
+        executor = EventsExecutor()
+        executor.add_node(recorder)
+        programs: list[Program] = []
+
+        def until(done: Callable[[], bool]) -> None:
+            reached, since, looked = 0, time.monotonic(), 0.0
+            while not done():
+                executor.spin_once(timeout_sec=LOOK)
+                now = time.monotonic()
+                if now - looked < LOOK:
+                    continue
+                looked = now
+                for program in programs:
+                    program.check()
+                if reached != (reached := recorder.time):
+                    since = now
+                    tell(reached)
+                if now - since > PATIENCE:
+                    raise Failure(f'stands still at {reached * 1e-9:.3f} s; ' + '; '.join(
+                        f'{each.name}: {each.last_line}' for each in programs))
+
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / 'given.yaml'
+            file.write_text(yaml.safe_dump(given), encoding='utf-8')
+            try:
+                for name in PROGRAMS:
+                    if name == 'stewart_trajectory':
+                        until(recorder.ready)
+                    arguments = [part for path in (*self._files.get(name, ()), file)
+                                 for part in ('--params-file', path)]
+                    programs.append(Program(name, ['--ros-args', *arguments], Path(folder)))
+                until(lambda: recorder.time >= self.times[-1])
+            finally:
+                for program in programs:
+                    program.stop()
+                for program in programs:
+                    program.wait()
+                executor.shutdown()
+                recorder.destroy_node()
+        tell(int(self.times[-1]))
+        return Run(feed_forward, payload, recorder.errors(
+            self.times, self._lengths, self._motion))
+
+
+def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
+    """Return the mass that a leg moves alone [kg], the mean of the six."""
+    to_legs = np.linalg.inv(platform.jacobian(motion.position, motion.rotation))
+    masses = to_legs.T @ platform.mass_matrix(motion.position, motion.rotation) @ to_legs
+    return float(np.mean(np.diag(masses)))
+
+
+def _angles(r: Array) -> list[float]:
+    """Return alpha, beta, gamma [rad] of R = Rz(gamma) Ry(beta) Rx(alpha)."""
+    return [math.atan2(r[2, 1], r[2, 2]), -math.asin(r[2, 0]), math.atan2(r[1, 0], r[0, 0])]
+
+
+def machine(payload: float) -> str:
+    """Return in words what the simulator's machine is to the node."""
+    return 'as the node believes' if payload == 1.0 else f'payload {payload - 1.0:+.0%}'
+
+
+def table(runs: Sequence[Run]) -> str:
+    """Return the table of all runs: without and with feed-forward, side by side."""
+    pairs = list(zip(runs[::2], runs[1::2], strict=True))
+    lines = ['tracking error        ' + ''.join(f'{machine(pd.payload):^36}' for pd, _ in pairs),
+             'RMS (peak)            ' + f'{"PD alone":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
+    for name, unit in UNITS.items():
+        line = f'{name:12}{unit:>5}     '
+        for pd, forward in pairs:
+            line += ''.join(f'{each.rms[name]:8.1f} {f"({each.peak[name]:.0f})":>6}'
+                            for each in (pd, forward))
+            line += f'{pd.rms[name] / forward.rms[name]:5.0f}x'
+        lines.append(line)
+    return '\n'.join(lines)
+
+
+def draw(path: Path, runs: Sequence[Run]) -> None:
+    """Draw the errors of the legs over time, without and with feed-forward."""
+    pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
+                            'axes.spines.top': False, 'axes.spines.right': False})
+    figure, panels = pyplot.subplots(1, 2, figsize=(11, 4), sharey=True, layout='constrained')
+    for axes, pair in zip(panels, zip(runs[::2], runs[1::2], strict=True), strict=True):
+        for run, color in zip(pair, ('#d55e00', '#0072b2'), strict=True):
+            errors = np.sqrt(np.mean(np.square(run.errors.legs), axis=1))
+            axes.plot(run.errors.seconds, errors, color=color, linewidth=1.2,
+                      label='PD and the forces of the node' if run.feed_forward else 'PD alone')
+        axes.set(title=machine(pair[0].payload), xlabel='time  [s]', yscale='log',
+                 xlim=(0.0, run.errors.seconds[-1]))
+    panels[0].set_ylabel('error of the leg lengths, RMS of six  [µm]')
+    panels[0].legend(frameon=False)
+    figure.savefig(path, dpi=110, metadata={'Software': None})
+
+
+def summary(loop: Loop, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the figures of all runs."""
+    return {'setpoints': len(loop.times), 'rate [Hz]': RATE, 'bandwidth [Hz]': loop.bandwidth,
+            'leg mass [kg]': loop.leg_mass, **loop.gains, 'units': UNITS,
+            'runs': [{'feed_forward': run.feed_forward, 'payload': run.payload, 'rms': run.rms,
+                      'peak': run.peak} for run in runs]}
+
+
+def main() -> None:
+    """Run the loop four times, print the table, draw the plot."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--params', type=Path, default=ROOT / 'config' / 'platform.yaml',
+                        help='the machine')
+    parser.add_argument('--motion', type=Path, default=ROOT / 'config' / 'trajectory_loop.yaml',
+                        help='the motion, which must begin at rest')
+    parser.add_argument('--seconds', type=float, default=10.0, help='how much of it')
+    parser.add_argument('--bandwidth', type=float, default=8.0, help='of a leg under PD [Hz]')
+    parser.add_argument('--output', type=Path, default=ROOT / 'looped',
+                        help='folder that gets loop.json and loop.png')
+    options = parser.parse_args()
+    # Apart from whatever else runs on this computer or its network.
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(os.getpid() % 100 + 1))
+    runs: list[Run] = []
+    try:
+        loop = Loop(options.params, options.motion, options.seconds, options.bandwidth)
+        options.output.mkdir(parents=True, exist_ok=True)
+        rclpy.init()
+        print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1 with the {loop.leg_mass:.0f} kg '
+              f'that it moves: {loop.gains["proportional_gain"]:.3g} N/m, '
+              f'{loop.gains["derivative_gain"]:.3g} N s/m')
+        begun = time.monotonic()
+        with tqdm(total=4 * options.seconds, unit='s', ncols=79, mininterval=0.5,
+                  bar_format='{desc} {bar} {n:.1f} of {total:.1f} s') as progress:
+            for payload in (1.0, HEAVIER):
+                for feed_forward in (False, True):
+                    progress.set_description_str(
+                        f'{"PD + forces" if feed_forward else "PD alone"}, {machine(payload)}')
+                    before = len(runs) * options.seconds
+                    runs.append(loop.run(feed_forward, payload, lambda reached, before=before: (
+                        progress.update(before + min(reached * 1e-9, options.seconds)
+                                        - progress.n))))
+        print(f'\n{table(runs)}\n')
+        draw(options.output / 'loop.png', runs)
+        (options.output / 'loop.json').write_text(
+            json.dumps(summary(loop, runs), indent=1) + '\n', encoding='utf-8')
+        print(f'{time.monotonic() - begun:.0f} s; {options.output}: loop.png, loop.json')
+    except (Failure, StewartError, OSError) as exc:
+        raise SystemExit(f'demo-loop: {exc}') from None
+    except (KeyboardInterrupt, ExternalShutdownException):
+        raise SystemExit(130) from None
+    finally:
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()
