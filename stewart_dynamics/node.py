@@ -80,6 +80,9 @@ _QUEUE = 1000
 _BACKLOG = 100
 # So many trajectories may wait in the middleware, so many be in work or wait here.
 _PLANS = 5
+# Between two pieces of the work on them; a node that computed all the time would be made to wait
+# by an operating system that others ask for time as well, and its setpoints with it [s].
+_PLAN_PAUSE = 0.001
 
 # What controllers read; in the diagnostics stands how many do.
 _READ = ('leg_states', 'leg_forces')
@@ -105,9 +108,12 @@ class DynamicsNode(LifecycleNode):
         self._configured = False
         self._close_io: list[Callable[[], Any]] = []
         self._series = Series()
-        # Trajectories in work, when they came; and whether a task for them waits to be run.
+        # Trajectories in work, and when they came; the timer runs while there are some.
         self._plans: deque[tuple[Iterator[planned.Outcome | None], float]] = deque()
-        self._planning = False
+        self._plan_timer = self.create_timer(
+            _PLAN_PAUSE, until_shutdown(self, self._plan),
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._plan_timer.cancel()
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
@@ -220,7 +226,6 @@ class DynamicsNode(LifecycleNode):
                                    partial(self._on_setpoint, topic)) for topic in topics}
         self._subscribe(WrenchStamped, inputs.WRENCH, self._on_wrench)
         self._subscribe(JointState, MEASURED_LEGS, self._on_measured_legs)
-        self._plan_task = until_shutdown(self, self._plan)
         self._subscribe(MultiDOFJointTrajectory, planned.INPUT, self._on_trajectory, _PLANS)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
@@ -428,18 +433,11 @@ class DynamicsNode(LifecycleNode):
         # Parameters and load are those of now, whatever changes meanwhile.
         self._plans.append(
             (planned.answer(self._settings, self._setpoints.wrench, data), now))
-        self._plan_on()
-
-    def _plan_on(self) -> None:
-        """Go on with a piece of the work behind the messages that have come meanwhile."""
-        if not self._planning:
-            self._planning = True
-            executor: Any = self.executor
-            executor.create_task(self._plan_task)
+        self._plan_timer.reset()
 
     def _plan(self) -> None:
         """Do a piece of the work on the trajectory whose turn it is."""
-        self._planning = False
+        self._plan_timer.cancel()
         if not self._plans:  # given up
             return
         work, came = self._plans[0]
@@ -450,7 +448,7 @@ class DynamicsNode(LifecycleNode):
                 self._plan_publisher.publish(outcome.answer)
             self._tell(outcome, came)
         if self._plans:
-            self._plan_on()
+            self._plan_timer.reset()
 
     def _tell(self, outcome: planned.Outcome, came: float) -> None:
         """Say what has become of a trajectory."""
