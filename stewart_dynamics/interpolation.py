@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The platform's motion between points that give pose, twist and acceleration.
+Motion between points: the platform's by pose, twist and acceleration, a leg's by length and rate.
 
 Position and rotation vector are polynomials of fifth degree in time (quintic Hermite). With
 R = exp(skew(r)) R_0 the twist and acceleration of a rotation vector r are
@@ -28,7 +28,7 @@ estimation in robotics, 2018, arXiv:1812.01537, equation 145).
 from __future__ import annotations
 
 from math import comb, factorial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,6 +137,81 @@ class Interpolation:
             there = part == end
             rows[there] = self._motions[which[there] + end]
         return rows
+
+
+class Cubics(NamedTuple):
+    """Polynomials of third degree of a part, 0 to 1, in Hermite's form; each array (N, ...)."""
+
+    start: Array
+    end: Array
+    start_rate: Array
+    end_rate: Array
+
+    @classmethod
+    def between(cls, values: Array, rates: Array, durations: Array) -> Cubics:
+        """Return those that join values and rates (N + 1, ...)."""
+        return cls(values[:-1], values[1:], rates[:-1] * durations, rates[1:] * durations)
+
+    def chosen(self, which: Any) -> Cubics:
+        """Return some of them: an index, or an array of such."""
+        return Cubics._make(each[which] for each in self)
+
+    def hull(self) -> tuple[Array, Array]:
+        """Return bounds: the least and the largest of the control points of Bezier's form."""
+        inner = self.start + self.start_rate / 3.0, self.end - self.end_rate / 3.0
+        low: Array = np.minimum(np.minimum(self.start, self.end), np.minimum(*inner))
+        high: Array = np.maximum(np.maximum(self.start, self.end), np.maximum(*inner))
+        return low, high
+
+    def middle_rate(self) -> Array:
+        """Return the control point between the rates at both ends, with them a bound of all."""
+        return 3.0 * (self.end - self.start) - self.start_rate - self.end_rate
+
+    def at(self, part: Array) -> Array:
+        """Return the values at a part."""
+        _, second, third = self._powers()
+        return self.start + part * (self.start_rate + part * (second + part * third))
+
+    def rate_at(self, part: Array) -> Array:
+        """Return the derivatives at a part."""
+        _, second, third = self._powers()
+        return self.start_rate + part * (2.0 * second + part * 3.0 * third)
+
+    def extremes(self) -> tuple[Array, Array]:
+        """Return where they are least or largest within; nan where they are not."""
+        first, second, third = self._powers()
+        with np.errstate(all='ignore'):
+            # the roots of first + 2 second u + 3 third u^2, without a difference of like numbers
+            root = np.sqrt(second * second - 3.0 * third * first)
+            s = -(second + np.copysign(root, second))
+            return _inside(s / (3.0 * third)), _inside(first / s)
+
+    def fastest(self) -> Array:
+        """Return where the derivatives are least or largest within; nan where they are not."""
+        _, second, third = self._powers()
+        with np.errstate(all='ignore'):
+            return _inside(-second / (3.0 * third))
+
+    def zero(self) -> float:
+        """Return where one of them that changes its sign is zero."""
+        low, high = 0.0, 1.0
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            if float(self.at(np.array(middle))) > 0.0:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _powers(self) -> tuple[Array, Array, Array]:
+        way = self.end - self.start
+        return (self.start_rate, 3.0 * way - 2.0 * self.start_rate - self.end_rate,
+                self.start_rate + self.end_rate - 2.0 * way)
+
+
+def _inside(part: Array) -> Array:
+    inside: Array = np.where((part > 0.0) & (part < 1.0), part, np.nan)
+    return inside
 
 
 _THIRDS = np.array([[1.0 / 3.0], [2.0 / 3.0]])

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from stewart_dynamics import cdr
 from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics.compiled import COMPILED
-from stewart_dynamics.interpolation import Interpolation
+from stewart_dynamics.interpolation import Cubics, Interpolation
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.rotation import from_quaternion
@@ -404,7 +404,7 @@ class _Checks:
                      joined: NDArray[np.bool_]) -> None:
         """Check polynomials of third degree that have the samples' lengths and rates."""
         lengths, rates = (results[:, at:at + 6] for at in (runtime.LENGTHS, runtime.RATES))
-        cubics = _Cubics.between(lengths, rates, durations[:, None])
+        cubics = Cubics.between(lengths, rates, durations[:, None])
         # Most are within their control points, and those within the limits.
         low, high = cubics.hull()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
@@ -431,8 +431,8 @@ class _Checks:
         """Check whether det(J) passes zero between samples; return where that is not clear."""
         determinants = results[:, runtime.DETERMINANT]
         condition = results[:, runtime.CONDITION]
-        cubics = _Cubics.between(determinants, results[:, runtime.DETERMINANT_RATE], durations)
-        cubics = _Cubics._make(each * np.sign(determinants[:-1]) for each in cubics)
+        cubics = Cubics.between(determinants, results[:, runtime.DETERMINANT_RATE], durations)
+        cubics = Cubics._make(each * np.sign(determinants[:-1]) for each in cubics)
         if (crossed := near & (cubics.end < 0.0)).any():
             n = int(np.argmax(crossed))
             self._singular(times[n] + cubics.chosen(n).zero() * durations[n], results[n],
@@ -460,78 +460,3 @@ class _Checks:
         leg = int(np.argmax(result[runtime.UNIT_LOAD_FORCES:runtime.UNIT_LOAD_FORCES + 6]))
         self.troubles.append(_Trouble(
             float(time), leg, SINGULAR, f': {words}, worst for {self._joints[leg]}'))
-
-
-class _Cubics(NamedTuple):
-    """Polynomials of third degree of a part, 0 to 1, in Hermite's form; each array (N, ...)."""
-
-    start: Array
-    end: Array
-    start_rate: Array
-    end_rate: Array
-
-    @classmethod
-    def between(cls, values: Array, rates: Array, durations: Array) -> _Cubics:
-        """Return those that join values and rates (N + 1, ...)."""
-        return cls(values[:-1], values[1:], rates[:-1] * durations, rates[1:] * durations)
-
-    def chosen(self, which: Any) -> _Cubics:
-        """Return some of them: an index, or an array of such."""
-        return _Cubics._make(each[which] for each in self)
-
-    def hull(self) -> tuple[Array, Array]:
-        """Return bounds: the least and the largest of the control points of Bezier's form."""
-        inner = self.start + self.start_rate / 3.0, self.end - self.end_rate / 3.0
-        low: Array = np.minimum(np.minimum(self.start, self.end), np.minimum(*inner))
-        high: Array = np.maximum(np.maximum(self.start, self.end), np.maximum(*inner))
-        return low, high
-
-    def middle_rate(self) -> Array:
-        """Return the control point between the rates at both ends, with them a bound of all."""
-        return 3.0 * (self.end - self.start) - self.start_rate - self.end_rate
-
-    def at(self, part: Array) -> Array:
-        """Return the values at a part."""
-        _, second, third = self._powers()
-        return self.start + part * (self.start_rate + part * (second + part * third))
-
-    def rate_at(self, part: Array) -> Array:
-        """Return the derivatives at a part."""
-        _, second, third = self._powers()
-        return self.start_rate + part * (2.0 * second + part * 3.0 * third)
-
-    def extremes(self) -> tuple[Array, Array]:
-        """Return where they are least or largest within; nan where they are not."""
-        first, second, third = self._powers()
-        with np.errstate(all='ignore'):
-            # the roots of first + 2 second u + 3 third u^2, without a difference of like numbers
-            root = np.sqrt(second * second - 3.0 * third * first)
-            s = -(second + np.copysign(root, second))
-            return _inside(s / (3.0 * third)), _inside(first / s)
-
-    def fastest(self) -> Array:
-        """Return where the derivatives are least or largest within; nan where they are not."""
-        _, second, third = self._powers()
-        with np.errstate(all='ignore'):
-            return _inside(-second / (3.0 * third))
-
-    def zero(self) -> float:
-        """Return where one of them that changes its sign is zero."""
-        low, high = 0.0, 1.0
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            if float(self.at(np.array(middle))) > 0.0:
-                low = middle
-            else:
-                high = middle
-        return low
-
-    def _powers(self) -> tuple[Array, Array, Array]:
-        way = self.end - self.start
-        return (self.start_rate, 3.0 * way - 2.0 * self.start_rate - self.end_rate,
-                self.start_rate + self.end_rate - 2.0 * way)
-
-
-def _inside(part: Array) -> Array:
-    inside: Array = np.where((part > 0.0) & (part < 1.0), part, np.nan)
-    return inside
