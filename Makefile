@@ -5,7 +5,8 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-loop bench-node bench-replay clean demo demo-loop docs environment lint test
+.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop docs \
+  environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -71,6 +72,9 @@ bench-loop: $(INSTALLED)
 
 bench-node: $(INSTALLED)
 	.venv/bin/python benchmarks/node.py --write
+
+bench-planned: $(INSTALLED)
+	.venv/bin/python benchmarks/planned.py --write
 
 bench-replay: $(INSTALLED)
 	.venv/bin/python benchmarks/replay.py --write

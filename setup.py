@@ -87,7 +87,8 @@ setup(
         (f'{share}/bags', ['bags/README.md']),
         *[(f'{share}/{bag}', sorted(glob(f'{bag}/*'))) for bag in sorted(glob('bags/*/'))
           if not bag.startswith('bags/__')],
-        (f'{share}/config', sorted(glob('config/*.yaml'))),
+        (f'{share}/config', sorted(glob('config/*.*'))),
+        (f'{share}/config/controllers', sorted(glob('config/controllers/*.yaml'))),
         (f'{share}/examples', sorted(glob('examples/*.py'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),

@@ -17,13 +17,15 @@ The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the machine; a caller asks
-for parameters and states meanwhile.
+for parameters and states meanwhile, a viewer takes the markers, a machine has its legs measured, a
+planner sends planned motions.
 """
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 import gc
 import itertools
 from pathlib import Path
@@ -37,21 +39,27 @@ import numpy as np
 from pass_through import spin, TOPICS
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParametersAtomically
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
+from visualization_msgs.msg import MarkerArray
 
-from stewart_dynamics import cdr
+from stewart_dynamics import cdr, Parameters, StewartPlatform
 from stewart_dynamics.rotation import to_quaternion
 from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
 
+PARAMETERS = Path(__file__).resolve().parents[1] / 'config' / 'platform.yaml'
 QOS = QoSProfile(depth=2000)
 PERIOD = 1_000_000  # [ns]
 FIRST_STAMP = 1_700_000_000_000_000_000
 DISCOVERY_SECONDS = 60.0
 CALLS_PERIOD = 0.1  # [s]
+PLAN_SECONDS = 1.0
 # All six coordinates move, within the limits of config/platform.yaml, and repeat themselves.
 MOTION = {
     'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
@@ -188,6 +196,114 @@ def call(name: str) -> None:
     print(len(answered), flush=True)
 
 
+def view(name: str) -> None:
+    """Take the markers of a node as bytes, until a signal, and say how many there were."""
+    node = rclpy.create_node('viewer')
+    seen: list[int] = []
+    node.create_subscription(MarkerArray, f'/{name}/markers', lambda data: seen.append(len(data)),
+                             QoSProfile(depth=1), raw=True)
+    wait_for(lambda: node.count_publishers(f'/{name}/markers'), 'the node is there')
+    print('ready', flush=True)
+    spin(node)
+    print(len(seen), flush=True)
+
+
+def plan(path: Path, name: str, points: int) -> None:
+    """
+    Send a planned motion each second, so many for each number on stdin; note how long it takes.
+
+    Parameters
+    ----------
+    path : Path
+        Gets when each begins to be published, when it is, and when its answer is here [ns].
+    name : str
+        Of the node.
+    points : int
+        Of each motion, over ten seconds.
+
+    """
+    node = rclpy.create_node('planner')
+    executor = EventsExecutor()
+    executor.add_node(node)
+    answers: list[int] = []
+    node.create_subscription(JointTrajectory, f'/{name}/leg_trajectory', lambda data: (
+        answers.append(time.monotonic_ns()) if len(data) > points else None), QOS, raw=True)
+    publisher = node.create_publisher(
+        MultiDOFJointTrajectory, f'/{name}/platform_trajectory', QOS)
+    message = trajectory(points)
+    wait_for(lambda: publisher.get_subscription_count() and node.count_publishers(
+        f'/{name}/leg_trajectory'), 'the node is there')
+    print('ready', flush=True)
+    times = []
+    for line in iter(sys.stdin.readline, ''):
+        for n in range(int(line)):
+            if n:
+                time.sleep(PLAN_SECONDS)
+            answers.clear()
+            begin = time.monotonic_ns()
+            publisher.publish(message)
+            published = time.monotonic_ns()
+            while not answers:
+                executor.spin_once(timeout_sec=10.0)
+            times.append((begin, published, answers[0]))
+        print('done', flush=True)
+    executor.shutdown()
+    np.savez(path, times=np.array(times))
+
+
+def trajectory(points: int) -> bytes:
+    """Return a MultiDOFJointTrajectory of so many points of the motion, over ten seconds."""
+    seconds = np.linspace(0.0, 10.0, points)
+    motion = motion_at(TrajectoryParameters(MOTION), seconds)
+    rows = np.column_stack([motion.position, to_quaternion(motion.rotation),
+                            motion.rows[:, 12:24]]).tolist()
+    message = MultiDOFJointTrajectory(joint_names=['platform'])
+    for second, row in zip(seconds.tolist(), rows, strict=True):
+        point = MultiDOFJointTrajectoryPoint(
+            transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])
+        to, twist, accel = point.transforms[0], point.velocities[0], point.accelerations[0]
+        vectors = (to.translation, twist.linear, twist.angular, accel.linear, accel.angular)
+        for vector, at in zip(vectors, (0, 7, 10, 13, 16), strict=True):
+            vector.x, vector.y, vector.z = row[at:at + 3]
+        to.rotation.x, to.rotation.y, to.rotation.z, to.rotation.w = row[3:7]
+        point.time_from_start.sec, point.time_from_start.nanosec = divmod(
+            round(second * 1e9), 1_000_000_000)
+        message.points.append(point)
+    return bytes(serialize_message(message))
+
+
+def legs(parameters: Parameters, first: int) -> list[bytes]:
+    """Return the measured leg states of the motion, at 1 kHz."""
+    motion = motion_at(TrajectoryParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
+    result = StewartPlatform(parameters).inverse_dynamics(motion)
+    stamps = first + PERIOD * np.arange(REPEATED)
+    layout = cdr.JointState(parameters['joints']).layout(True)
+    return [each.tobytes() for each in layout.write(
+        stamps, result.lengths - parameters['geometry.zero_length'], result.rates,
+        result.forces)]
+
+
+def measure(name: str) -> None:
+    """Publish measured legs to a node at 1 kHz until a signal, and say how many."""
+    node = rclpy.create_node('machine')
+    publisher = node.create_publisher(JointState, f'/{name}/measured_legs', QOS)
+    bodies = legs(Parameters.from_yaml(PARAMETERS), FIRST_STAMP)
+    wait_for(publisher.get_subscription_count, 'the node is there')
+    print('ready', flush=True)
+    begin = time.monotonic_ns()
+    number = 0
+    with suppress(KeyboardInterrupt, RCLError):
+        while rclpy.ok():
+            sec, nanosec = divmod(FIRST_STAMP + number * PERIOD, 1_000_000_000)
+            publisher.publish(b'\x00\x01\x00\x00' + sec.to_bytes(4, 'little')
+                              + nanosec.to_bytes(4, 'little') + bodies[number % REPEATED][12:])
+            number += 1
+            left = begin + number * PERIOD - time.monotonic_ns()
+            if left > 0:
+                time.sleep(left * 1e-9)
+    print(number, flush=True)
+
+
 def wait_for(condition: Any, what: str) -> None:
     """Wait for discovery."""
     end = time.monotonic() + DISCOVERY_SECONDS
@@ -205,6 +321,12 @@ def main() -> None:
         publish(Path(arguments[0]), arguments[1:])
     elif role == 'listen':
         listen(Path(arguments[0]), arguments[1:])
+    elif role == 'view':
+        view(*arguments)
+    elif role == 'plan':
+        plan(Path(arguments[0]), arguments[1], int(arguments[2]))
+    elif role == 'measure':
+        measure(*arguments)
     else:
         call(*arguments)
     rclpy.try_shutdown()

@@ -30,19 +30,29 @@ from pathlib import Path
 import platform
 import signal
 import socket
+from statistics import median
 import subprocess
 import sys
 import tempfile
 import time
+from timeit import repeat
 from typing import NamedTuple
 
 from inverse_dynamics import Array, HERE, processor_name, write
-from latency import FIRST_STAMP, PERIOD
+from latency import FIRST_STAMP, legs, MOTION, PARAMETERS, PERIOD
 import numpy as np
 from replay import table
 
+from stewart_dynamics.external_wrench import ExternalWrench
+from stewart_dynamics.markers import Markers
+from stewart_dynamics.measured_legs import MeasuredLegs
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.step import NO_WRENCH, Setpoint, Step
+from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
+
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
-PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
+BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'
+BEGIN_LEGS, END_LEGS = '<!-- measured legs: begin -->', '<!-- measured legs: end -->'
 NODE = str(Path(sys.executable).with_name('stewart_dynamics'))
 
 DOMAIN = '101'  # the tests have those below
@@ -53,6 +63,9 @@ RATE = 1_000_000_000 // PERIOD
 SETTLE = 0.5  # [s] between turns: what is under way arrives
 TICKS = os.sysconf('SC_CLK_TCK')
 EACH = [50.0, 99.0, 99.9, 100.0]
+HEADER: tuple[str, ...] = (
+    'latency (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core', 'p50, times typed',
+    'p99, times typed')
 
 
 class Contestant(NamedTuple):
@@ -192,8 +205,9 @@ class Measurement:
         Gets the times.
     transport : Transport
         How they talk.
-    called : bool
-        The services of the first contestant are called all the time.
+    beside : str
+        A role of ``latency.py`` that the first contestant has beside it all the time: its
+        services are called, its markers viewed, or its legs measured.
     killed : bool
         One more listener is killed by SIGKILL in the middle of the last turn.
 
@@ -201,9 +215,9 @@ class Measurement:
 
     def __init__(self, contestants: Sequence[Contestant], turns: Sequence[tuple[int, int]],
                  folder: Path, transport: Transport = SHARED_MEMORY,
-                 called: bool = False, killed: bool = False) -> None:
+                 beside: str = '', killed: bool = False) -> None:
         self._contestants, self._turns, self._folder = contestants, turns, folder
-        self._transport, self._called, self._killed = transport, called, killed
+        self._transport, self._beside, self._killed = transport, beside, killed
         self._cores: list[float] = []
         self.memory: list[float] = []
         """Of the first contestant, every ten seconds [kB]."""
@@ -242,9 +256,9 @@ class Measurement:
                 role('listen', str(self._folder / f'{which}.npz'), *names),
                 self._transport.listener) if wanted else None
                 for which, wanted in (('listened', True), ('spare', self._killed)))
-            called = self._called and start(
-                role('call', self._contestants[0].name), self._transport.listener)
-            for process in (listener, spare, called):
+            beside = self._beside and start(
+                role(self._beside, self._contestants[0].name), self._transport.listener)
+            for process in (listener, spare, beside):
                 if process:
                     process.expect('ready')
             plan = [f'{self._contestants[which].name} {self._contestants[which].source} {number}'
@@ -274,15 +288,14 @@ class Measurement:
 
 
 def in_turns(contestants: Sequence[Contestant], rounds: int, seconds: int, folder: Path,
-             transport: Transport = SHARED_MEMORY, called: bool = False,
-             ) -> list[list[Turn]]:
+             transport: Transport = SHARED_MEMORY, beside: str = '') -> list[list[Turn]]:
     """Return the turns of each contestant; they take turns in one order and then the other."""
     order = list(range(len(contestants)))
     plan = [which for n in range(rounds) for which in (order if n % 2 == 0 else order[::-1])]
     setpoints = seconds * RATE
     # The first turn of each is not measured: discovery settles, caches fill.
     turns = Measurement(contestants, [(which, RATE) for which in order] + [
-        (which, setpoints) for which in plan], folder, transport, called).run()[len(order):]
+        (which, setpoints) for which in plan], folder, transport, beside).run()[len(order):]
     return [[turn for turn, of in zip(turns, plan, strict=True) if of == which]
             for which in order]
 
@@ -338,6 +351,82 @@ def killed_words(folder: Path) -> str:
             f'shared memory, {longest[1]:.1f} ms on one host.')
 
 
+def node_lines(rounds: int, seconds: int, minutes: int, folder: Path) -> list[str]:
+    """Return the tables of the node beside those that compute nothing."""
+    cells = [HEADER]
+    for source, contestants in CONTESTANTS.items():
+        turns = in_turns(contestants, rounds, seconds, folder)
+        cells += latency_rows(source, contestants, turns, beside=1)
+    called = [CALLED, CONTESTANTS['separate'][1]]
+    turns = in_turns(called, rounds, seconds, folder, beside='call')
+    cells += latency_rows('separate, services called', called, turns, beside=1)
+    for label, transport in (('one host', ONE_HOST), ('TLS', tls(folder))):
+        turns = in_turns(called, rounds, seconds, folder, transport)
+        cells += latency_rows(f'separate, {label}', called, turns, beside=1)
+    lines = ['', *table(cells), '', *table(stall_rows(folder)), '', killed_words(folder), '']
+    if minutes:
+        run = Measurement([CALLED], [(0, minutes * 60 * RATE)], folder)
+        turn, = run.run()
+        lines += [*table(long_rows(turn, run.memory, minutes)), '',
+                  f'{turn.sent:,} setpoints in {minutes} minutes, {turn.lost} lost.', '']
+    return lines
+
+
+def markers_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
+    """Return the table of a node whose markers are viewed beside one whose are not."""
+    nodes = [ours('viewed', 'separate'), ours('alone', 'separate')]
+    turns = in_turns(nodes, rounds, seconds, folder, beside='view')
+    cells = [HEADER[:-2] + ('p50, times alone', 'p99, times alone')]
+    for title, row in zip(('`~/markers` viewed', 'nobody looks'),
+                          latency_rows('', nodes, turns, beside=1), strict=True):
+        cells.append((title, *row[1:]))
+    return ['', *table(cells), '', picture_words(), '']
+
+
+def legs_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
+    """Return the table of a node whose legs are measured beside one whose are not."""
+    nodes = [ours('measured', 'separate'), ours('alone', 'separate')]
+    turns = in_turns(nodes, rounds, seconds, folder, beside='measure')
+    cells = [HEADER[:-2] + ('p50, times alone', 'p99, times alone')]
+    for title, row in zip(('`~/measured_legs` at 1 kHz', 'no measured legs'),
+                          latency_rows('', nodes, turns, beside=1), strict=True):
+        cells.append((title, *row[1:]))
+    return ['', *table(cells), '', measurement_words(), '']
+
+
+def measurement_words() -> str:
+    """Return how long a measurement takes, from its message to the wrench's."""
+    parameters = Parameters.from_yaml(PARAMETERS)
+    messages = legs(parameters, FIRST_STAMP)
+    step = ExternalWrench(parameters)
+
+    def follow() -> None:
+        measured = MeasuredLegs(parameters, step, lambda *said: None, lambda said: None)
+        for message in messages:
+            estimate = measured.take(message, NO_WRENCH, None)
+            if estimate is None:
+                raise SystemExit('a measurement was refused')
+            step.message(estimate)
+
+    times = repeat(follow, timer=time.process_time, repeat=21, number=1)
+    return (f'A measurement takes {median(times) / len(messages) * 1e6:.1f} us of processor time, '
+            "from its message's bytes to those of the wrench, median of 21.")
+
+
+def picture_words() -> str:
+    """Return how long a picture takes and how large it is."""
+    parameters = Parameters.from_yaml(PARAMETERS)
+    motion = motion_at(TrajectoryParameters(MOTION), np.array([0.3])).rows[0].tolist()
+    output = Step(parameters)(Setpoint(FIRST_STAMP, motion), None)
+    assert output is not None
+    markers = Markers(parameters)
+    size = len(markers.write(motion, output))
+    times = repeat(lambda: markers.write(motion, output), timer=time.process_time, repeat=21,
+                   number=200)
+    return (f'A picture has {size:,} bytes and is written in {median(times) / 200 * 1e6:.0f} us '
+            'of processor time, median of 21.')
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
@@ -345,40 +434,33 @@ def main() -> None:
     parser.add_argument('--seconds', type=int, default=SECONDS, help='of a turn (%(default)s)')
     parser.add_argument('--minutes', type=int, default=MINUTES,
                         help='of the long run; 0: none (%(default)s)')
+    parser.add_argument('--parts', nargs='+', choices=('node', 'markers', 'legs'),
+                        default=('node', 'markers', 'legs'), help='what is measured (all of it)')
     parser.add_argument('--write', action='store_true', help='put the tables into README.md')
     options = parser.parse_args()
     if options.rounds < 1 or options.seconds < 1 or options.minutes < 0:
         parser.error('--rounds and --seconds must be at least 1, --minutes 0')
 
-    cells: list[tuple[str, ...]] = [(
-        'latency (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core', 'p50, times typed',
-        'p99, times typed')]
-    lines = ['']
+    lines = {}
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for source, contestants in CONTESTANTS.items():
-            turns = in_turns(contestants, options.rounds, options.seconds, folder)
-            cells += latency_rows(source, contestants, turns, beside=1)
-        called = [CALLED, CONTESTANTS['separate'][1]]
-        turns = in_turns(called, options.rounds, options.seconds, folder, called=True)
-        cells += latency_rows('separate, services called', called, turns, beside=1)
-        for label, transport in (('one host', ONE_HOST), ('TLS', tls(folder))):
-            turns = in_turns(called, options.rounds, options.seconds, folder, transport)
-            cells += latency_rows(f'separate, {label}', called, turns, beside=1)
-        lines += [*table(cells), '', *table(stall_rows(folder)), '', killed_words(folder), '']
-        if options.minutes:
-            run = Measurement([CALLED], [(0, options.minutes * 60 * RATE)], folder)
-            turn, = run.run()
-            lines += [*table(long_rows(turn, run.memory, options.minutes)), '',
-                      f'{turn.sent:,} setpoints in {options.minutes} minutes, {turn.lost} lost.',
-                      '']
+        if 'node' in options.parts:
+            lines[BEGIN, END] = node_lines(
+                options.rounds, options.seconds, options.minutes, Path(name))
+        if 'markers' in options.parts:
+            lines[BEGIN_MARKERS, END_MARKERS] = markers_lines(
+                options.rounds, options.seconds, Path(name))
+        if 'legs' in options.parts:
+            lines[BEGIN_LEGS, END_LEGS] = legs_lines(
+                options.rounds, options.seconds, Path(name))
     versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
-    lines += [f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
-              f'{platform.python_version()}, {versions}. {options.rounds} turns of '
-              f'{options.seconds} s each.', '']
-    print('\n'.join(lines))
-    if options.write:
-        write(lines, BEGIN, END)
+    machine = (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
+               f'{platform.python_version()}, {versions}. {options.rounds} turns of '
+               f'{options.seconds} s each.')
+    for (begin, end), of_part in lines.items():
+        of_part += [machine, '']
+        print('\n'.join(of_part))
+        if options.write:
+            write(of_part, begin, end)
 
 
 if __name__ == '__main__':

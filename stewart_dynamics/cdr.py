@@ -123,11 +123,9 @@ def combined(data: bytes) -> Stamped:
     return Stamped(_nanoseconds(data, sec, nanosec), _text(data, 16, size), values)
 
 
-def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]:
-    """Return where transform, velocity and acceleration begin; note what only aligns."""
-    gaps = [] if gaps is None else gaps
-    order = data[1]
-    count = _COUNT[order]
+def _points(data: bytes, gaps: list[slice]) -> tuple[int, int]:
+    """Return how many points a MultiDOFJointTrajectory of one joint has, where they begin."""
+    count = _COUNT[data[1]]
     size = count.unpack_from(data, 12)[0]
     names, at = _sequence(data, 16 + size, count, gaps)
     if names > 1:
@@ -135,7 +133,14 @@ def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]
     for _ in range(names):
         length, at = _sequence(data, at, count, gaps)
         at += length
-    points, at = _sequence(data, at, count, gaps)
+    return _sequence(data, at, count, gaps)
+
+
+def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]:
+    """Return where transform, velocity and acceleration begin; note what only aligns."""
+    gaps = [] if gaps is None else gaps
+    count = _COUNT[data[1]]
+    points, at = _points(data, gaps)
     if points != 1:
         raise MalformedError(f'{points} points: a setpoint has one')
     found = []
@@ -145,7 +150,7 @@ def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]
             raise MalformedError(f'{number} {name}: a setpoint has one')
         found.append(_aligned8(at))
         gaps.append(slice(at, found[-1]))
-        at = found[-1] + layout[order].size
+        at = found[-1] + layout[data[1]].size
     return found
 
 
@@ -177,6 +182,46 @@ def float64_values(data: bytes) -> tuple[float, ...]:
     if data[0] != 0:
         raise MalformedError(f'encapsulation {data[:2].hex()} is not plain CDR')
     return values
+
+
+class JointStateFields(NamedTuple):
+    """Stamp and names of a sensor_msgs/JointState, and where its numbers stand in its bytes."""
+
+    stamp: int
+    """[ns]"""
+    names: list[str]
+    numbers: tuple[tuple[int, int], ...]
+    """Of position, velocity and effort: offset and count."""
+    gaps: tuple[slice, ...]
+    """Bytes that only align what follows, and those behind the message: they may be anything."""
+
+
+def joint_state_fields(data: bytes) -> JointStateFields:
+    """Read all of a sensor_msgs/JointState but its numbers; its frame_id may be any."""
+    gaps: list[slice] = []
+    names, numbers = [], []
+    try:
+        count = _COUNT[data[1]]
+        sec, nanosec, size = _TIME_AND_LENGTH[data[1]].unpack_from(data, 4)
+        stamp = _nanoseconds(data, sec, nanosec)
+        _text(data, 16, size)
+        number, at = _sequence(data, 16 + size, count, gaps)
+        for _ in range(number):
+            size, at = _sequence(data, at, count, gaps)
+            names.append(_text(data, at, size).decode(errors='replace'))
+            at += size
+        for _ in range(3):
+            number, end = _sequence(data, at, count, gaps)
+            # An empty sequence has nothing to align.
+            at = _aligned8(end) if number else end
+            gaps.append(slice(end, at))
+            numbers.append((at, number))
+            at += 8 * number
+    except (IndexError, KeyError, StructError) as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    if at > len(data):
+        raise MalformedError(f'{len(data)} bytes: must be at least {at}')
+    return JointStateFields(stamp, names, tuple(numbers), (*gaps, slice(at, len(data))))
 
 
 _FLOAT64 = Struct('<4sd')
@@ -443,3 +488,126 @@ def finite(values: Sequence[float]) -> bool:
     """Return whether all numbers are finite."""
     # A sum is not finite where one of its terms is not; it may also overflow.
     return math.isfinite(sum(values)) or all(map(math.isfinite, values))
+
+
+# A point of a MultiDOFJointTrajectory of one joint, and one of a JointTrajectory of six without
+# accelerations. All begin at a multiple of eight bytes but the first, which may begin four bytes
+# behind one: then only its first count stands there, all else where it would in the others.
+_PARTS = ('transforms', 'velocities', 'accelerations')
+_PLATFORM_POINT = {order: np.dtype({
+    'names': [*_PARTS, 'pose', 'twist', 'accel', 'sec', 'nanosec'],
+    'formats': [f'{sign}{kind}' for kind in (
+        'u4', 'u4', 'u4', '7f8', '6f8', '6f8', 'i4', 'u4')],
+    'offsets': [0, 64, 120, 8, 72, 128, 176, 180], 'itemsize': 184})
+    for order, sign in ((0, '>'), (1, '<'))}
+_LEG_POINT = {effort: np.dtype({
+    'names': ['positions', 'velocities', 'accelerations', 'efforts', 'position', 'velocity',
+              'effort', 'sec', 'nanosec'],
+    'formats': ['<u4', '<u4', '<u4', '<u4', '<6f8', '<6f8', f'<{6 * effort}f8', '<i4', '<u4'],
+    'offsets': [0, 56, 112, 116, 8, 64, 120, end, end + 4], 'itemsize': end + 8})
+    for effort, end in ((True, 168), (False, 120))}
+
+
+class PlatformTrajectory:
+    """
+    Reads a trajectory_msgs/MultiDOFJointTrajectory of one joint and any number of points.
+
+    Parameters
+    ----------
+    data : bytes
+        The message.
+
+    Raises MalformedError where it has no header, or more than one joint.
+
+    """
+
+    def __init__(self, data: bytes) -> None:
+        try:
+            order = data[1]
+            sec, nanosec, size = _TIME_AND_LENGTH[order].unpack_from(data, 4)
+            self.size, self._first = _points(data, [])
+        except (IndexError, KeyError, StructError) as exc:
+            raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+        self.stamp = _nanoseconds(data, sec, nanosec)
+        self.frame = _text(data, 16, size)
+        self._data = data
+        self._begin = (self._first - 4 & ~7) + 4
+        kind = _PLATFORM_POINT[order]
+        whole = max(0, (len(data) - self._begin) // kind.itemsize)
+        self._records: NDArray[np.void] = np.frombuffer(
+            data, kind, min(whole, self.size), self._begin) if whole else np.empty(0, kind)
+
+    def points(self, first: int, end: int) -> NDArray[np.void]:
+        """
+        Return points by their index: fields pose (7), twist (6), accel (6), sec and nanosec.
+
+        Those before them must have been read. Raises MalformedError where one has not one
+        transform, velocity and acceleration: what follows it cannot be found.
+        """
+        records = self._records[first:end]
+        other = np.logical_or.reduce([records[part] != 1 for part in _PARTS])
+        other[:first == 0] = True  # its first count may stand elsewhere
+        for n in np.flatnonzero(other).tolist():
+            self._check_counts(first + n)
+        if end > len(self._records):
+            self._check_counts(len(self._records))
+            raise MalformedError(
+                f'{len(self._data)} bytes: points[{len(self._records)}] is cut short')
+        return records
+
+    def _check_counts(self, n: int) -> None:
+        kind = _PLATFORM_POINT[self._data[1]]
+        begin = self._begin + n * kind.itemsize
+        for part, at in zip(_PARTS, (begin if n else self._first, begin + 64, begin + 120),
+                            strict=True):
+            if at + 4 <= len(self._data):
+                number, = _COUNT[self._data[1]].unpack_from(self._data, at)
+                if number != 1:
+                    raise MalformedError(f'points[{n}]: {number} {part}: each point has one')
+
+
+class LegTrajectory:
+    """
+    Writes a trajectory_msgs/JointTrajectory of six joints without accelerations.
+
+    Parameters
+    ----------
+    stamp : int
+        [ns]
+    names : sequence of str
+        Of the joints; frame_id is empty.
+    size : int
+        How many points it has.
+    effort : bool
+        Points have effort.
+
+    """
+
+    def __init__(self, stamp: int, names: Sequence[str], size: int, effort: bool) -> None:
+        head = bytearray(_TIME_AND_LENGTH[1].pack(*divmod(stamp, 1_000_000_000), 1) + b'\x00')
+        _put_count(head, len(names))
+        for name in names:
+            _put_text(head, name)
+        _put_count(head, size)
+        self._effort = effort
+        self._records = np.zeros(size, _LEG_POINT[effort])
+        self._head = LITTLE_ENDIAN + head
+        self._shared = len(head) % 8  # bytes of the head where the first record begins
+        for name in ('positions', 'velocities', 'efforts')[:2 + effort]:
+            self._records[name] = 6
+        if self._shared:
+            self._records[:1].view('<u4')[:2] = size, 6
+
+    def put(self, first: int, points: NDArray[np.void], positions: NDArray[np.float64],
+            velocities: NDArray[np.float64], efforts: NDArray[np.float64]) -> None:
+        """Write points from an index on; their time_from_start is that of the other points."""
+        records = self._records[first:first + len(points)]
+        records['position'], records['velocity'] = positions, velocities
+        if self._effort:
+            records['effort'] = efforts
+        records['sec'], records['nanosec'] = points['sec'], points['nanosec']
+
+    def message(self) -> bytes:
+        """Return the message."""
+        head = self._head[:len(self._head) - self._shared]
+        return b''.join([head, self._records.view(np.uint8).data])

@@ -15,7 +15,8 @@
 """
 What the node says of itself: one status each for setpoints, singularity, limits and timing.
 
-A check knows no ROS: it is told what happened and returns words; the node makes messages.
+And one for planned motions, once there was one. A check knows no ROS: it is told what happened
+and returns words; the node makes messages.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from collections import Counter
 from collections.abc import Sequence
 from operator import attrgetter
 from statistics import median
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.setpoints import NOT_JOINED, PASSED_OVER, Refusal
@@ -36,9 +37,6 @@ OK, WARN, ERROR, STALE = range(4)
 # A level holds for this long after its cause was last seen, so that a machine that dances on
 # a limit is not reported a thousand times in a second.
 _HOLD_SECONDS = 1.0
-
-_QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
-               'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
 
 
 class Level(NamedTuple):
@@ -67,7 +65,7 @@ class Status(NamedTuple):
     values: tuple[tuple[str, str], ...]
 
 
-class _Held:
+class Held:
     """A state, and what was worse for as long as that holds."""
 
     def __init__(self) -> None:
@@ -88,6 +86,16 @@ class _Held:
         self._seen = {gravity: held for gravity, held in self._seen.items() if now < held[0]}
         return max([self._state, *(state for _, state in self._seen.values())],
                    key=attrgetter('gravity'))
+
+
+class Part(Protocol):
+    """What has a status of its own once there is something to say of it."""
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+
+    def report(self, now: float) -> tuple[Status, ...]:
+        """Return the status, none while there is nothing to say."""
 
 
 class _Second:
@@ -114,10 +122,13 @@ class Diagnostics:
         The setpoint topics that are joined.
     now : float
         From when silence counts.
+    others : sequence of Part
+        What else is reported, behind these.
 
     """
 
-    def __init__(self, parameters: Parameters, topics: Sequence[str], now: float) -> None:
+    def __init__(self, parameters: Parameters, topics: Sequence[str], now: float,
+                 others: Sequence[Part] = ()) -> None:
         self.parameters = parameters
         self.writers: dict[str, int] = {}
         """Of each setpoint topic."""
@@ -125,6 +136,7 @@ class Diagnostics:
         """Of the topics that controllers read."""
         self.namesakes: tuple[str, int] = '', 1
         """The node's name, and how many have it."""
+        self._others = others
         self._heard = dict.fromkeys(topics, now)
         self._silent = dict.fromkeys(topics, True)
         self._refusals: Counter[Refusal] = Counter()
@@ -133,7 +145,7 @@ class Diagnostics:
         self._output: Output | None = None
         self._second, self._second_before = _Second(now), _Second(now)
         self._refused, self._singularity, self._limits, self._timing = (
-            _Held(), _Held(), _Held(), _Held())
+            Held(), Held(), Held(), Held())
         self._levels: tuple[int, ...] = ()
 
     def heard(self, topic: str, now: float) -> None:
@@ -157,7 +169,7 @@ class Diagnostics:
         if output.condition > self._second.worst_condition:
             self._second.worst_condition = output.condition
         self._output = output
-        self._singularity.see(_singularity_of(output), now, lasting=True)
+        self._singularity.see(singularity_level(output), now, lasting=True)
         self._limits.see(self._limits_of(output), now, lasting=True)
         return self.level_changed(now)
 
@@ -169,7 +181,8 @@ class Diagnostics:
         """Return the statuses; rate and processing time are of the last one or two seconds."""
         self._levels = self._current_levels(now)
         statuses = (self._report_setpoints(now), self._report_singularity(now),
-                    self._report_limits(now), self._report_timing(now))
+                    self._report_limits(now), self._report_timing(now),
+                    *(status for other in self._others for status in other.report(now)))
         # Reports come at changes of level as well, and may be much less than a second apart.
         if now - self._second.begin >= 1.0:
             self._second_before, self._second = self._second, _Second(now)
@@ -177,7 +190,8 @@ class Diagnostics:
 
     def _current_levels(self, now: float) -> tuple[int, ...]:
         return (self._setpoint_level(now).level, self._singularity.at(now).level,
-                self._limits.at(now).level, self._timing.at(now).level)
+                self._limits.at(now).level, self._timing.at(now).level,
+                *(other.level(now) for other in self._others))
 
     @property
     def _processing(self) -> list[float]:
@@ -282,11 +296,8 @@ class Diagnostics:
         return f' (of the last setpoint, {age:.1f} s ago)'
 
     def _words(self, excess: Excess) -> str:
-        quantity, unit = _QUANTITIES[excess.limit]
-        beyond = abs(abs(excess.value) - excess.bound)
-        how = ', clipped' if quantity == 'force' else ''
-        return (f'{self.parameters["joints"][excess.leg]}: {quantity} {excess.value:.6g} {unit} '
-                f'is {beyond:.6g} {unit} beyond {excess.limit}{how}')
+        how = ', clipped' if excess.limit == 'limits.force_max' else ''
+        return excess.words(self.parameters['joints']) + how
 
 
 _UNSOLVABLE = Level(ERROR, 'J_inv cannot be solved: no forces')
@@ -296,7 +307,8 @@ _SUPPRESSED = Level(ERROR, 'inside stop_condition: forces suppressed')
 _WARNINGS = {cause: Level(WARN, cause.value, cause is Cause.CROSSED) for cause in Cause}
 
 
-def _singularity_of(output: Output) -> Level:
+def singularity_level(output: Output) -> Level:
+    """Return how grave the singularity is that an output is near, and in which words."""
     if output.demanded_forces is None:
         return _UNSOLVABLE
     if output.singularity.stopped:

@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 import gc
 import math
@@ -26,6 +27,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -39,18 +41,26 @@ from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
-from trajectory_msgs.msg import MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
 
-from stewart_dynamics import cdr, compiled
+from stewart_dynamics import cdr, compiled, planned
 from stewart_dynamics import setpoints as inputs
 from stewart_dynamics.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
+from stewart_dynamics.inverse_dynamics import MOTION
+from stewart_dynamics.markers import Markers
+from stewart_dynamics.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.planned_diagnostics import PlannedDiagnostics
+from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.series import Series
 from stewart_dynamics.setpoints import Refusal, Setpoints
-from stewart_dynamics.step import Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.step import NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.wrench_diagnostics import WrenchDiagnostics
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,
@@ -68,6 +78,11 @@ _TYPES: dict[str, Any] = {
 # When more setpoints wait the node has fallen behind: only the newest is answered.
 _QUEUE = 1000
 _BACKLOG = 100
+# So many trajectories may wait in the middleware, so many be in work or wait here.
+_PLANS = 5
+# Between two pieces of the work on them; a node that computed all the time would be made to wait
+# by an operating system that others ask for time as well, and its setpoints with it [s].
+_PLAN_PAUSE = 0.001
 
 # What controllers read; in the diagnostics stands how many do.
 _READ = ('leg_states', 'leg_forces')
@@ -93,6 +108,12 @@ class DynamicsNode(LifecycleNode):
         self._configured = False
         self._close_io: list[Callable[[], Any]] = []
         self._series = Series()
+        # Trajectories in work, and when they came; the timer runs while there are some.
+        self._plans: deque[tuple[Iterator[planned.Outcome | None], float]] = deque()
+        self._plan_timer = self.create_timer(
+            _PLAN_PAUSE, until_shutdown(self, self._plan),
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._plan_timer.cancel()
         self.add_on_set_parameters_callback(self._on_set_parameters)
         # A steady clock: ROS time may stand still or jump.
         self.create_timer(_WATCH_SECONDS, until_shutdown(self, self._on_watch),
@@ -124,9 +145,17 @@ class DynamicsNode(LifecycleNode):
         """Begin to answer, as if nothing had come before."""
         now = time.monotonic()
         self._setpoints = Setpoints(self._settings, self._on_refusal, self._on_notice)
-        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now)
+        self._measured_legs = MeasuredLegs(
+            self._settings, self._external_wrench, self._on_refusal, self._on_notice)
+        self._wrench_diagnostics = WrenchDiagnostics(self._settings)
+        self._planned_diagnostics = PlannedDiagnostics()
+        self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now, [
+            self._planned_diagnostics, self._wrench_diagnostics])
         self._waiting: deque[tuple[Setpoint, float]] = deque()  # and when they came
         self._last: Output | None = None
+        self._target: tuple[float, ...] | None = None  # the motion of the last one answered
+        self._undrawn: tuple[Setpoint, Output] | None = None
+        self._draw_at = now if self._settings['visualization_rate'] else math.inf
         self._restarting = False  # the last one was a restart and could not be answered
         self._reported = self._answered_at = now
         self._busy = False
@@ -137,6 +166,7 @@ class DynamicsNode(LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._active = False
+        self._give_up_plans()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -147,6 +177,7 @@ class DynamicsNode(LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more and close the topics."""
         self._active = False
+        self._give_up_plans()
         self._close()
         return TransitionCallbackReturn.SUCCESS
 
@@ -160,9 +191,14 @@ class DynamicsNode(LifecycleNode):
 
     def _configure(self) -> None:
         self._step = Step(self._settings)
+        self._external_wrench = ExternalWrench(self._settings)
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
-        self._step(Setpoint(0, (0.0,) * 24), None)
+        self._step(Setpoint(0, (0.0,) * MOTION), None)
+        StewartPlatform(self._settings).solve(np.zeros((1, MOTION)))
+        with suppress(StewartError):  # no legs have such lengths
+            self._external_wrench(
+                Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
         for doubt in doubts(self._settings):
             self.get_logger().warning(doubt)
@@ -172,14 +208,25 @@ class DynamicsNode(LifecycleNode):
             if topic == 'singularity_warning':
                 qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self._publishers_of[topic] = self._publisher(_TYPES[name], f'~/{topic}', qos)
+        self._wrench_publisher = self._publisher(
+            WrenchStamped, f'~/{EXTERNAL_WRENCH}', QoSProfile(depth=10))
+        self._plan_publisher = self._publisher(
+            JointTrajectory, f'~/{planned.OUTPUT}', QoSProfile(depth=_PLANS))
         self._diagnostics_publisher = self._publisher(
             DiagnosticArray, '/diagnostics', QoSProfile(depth=10))
+        if self._settings['visualization_rate']:
+            self._markers = Markers(self._settings)
+            self._markers_publisher = self._publisher(
+                MarkerArray, '~/markers', QoSProfile(depth=1))
         topics = inputs.SOURCES[self._settings['setpoint.source']]
         self._exclusive = self._settings['setpoint.exclusive']
         self._answer_task = until_shutdown(self, self._answer)
-        self._inputs = {topic: self._subscribe(topic, partial(self._on_setpoint, topic))
-                        for topic in topics}
-        self._subscribe(inputs.WRENCH, self._on_wrench)
+        self._inputs = {
+            topic: self._subscribe(_TYPES[inputs.INPUT_TYPES[topic]], topic,
+                                   partial(self._on_setpoint, topic)) for topic in topics}
+        self._subscribe(WrenchStamped, inputs.WRENCH, self._on_wrench)
+        self._subscribe(JointState, MEASURED_LEGS, self._on_measured_legs)
+        self._subscribe(MultiDOFJointTrajectory, planned.INPUT, self._on_trajectory, _PLANS)
         self._topic_names = {topic: subscription.topic_name
                              for topic, subscription in self._inputs.items()}
         self._configured = True
@@ -194,10 +241,9 @@ class DynamicsNode(LifecycleNode):
         self._close_io.append(partial(self.destroy_publisher, publisher))
         return publisher
 
-    def _subscribe(self, topic: str, callback: Any) -> Any:
+    def _subscribe(self, kind: Any, topic: str, callback: Any, depth: int = _QUEUE) -> Any:
         subscription = self.create_subscription(
-            _TYPES[inputs.INPUT_TYPES[topic]], f'~/{topic}', until_shutdown(self, callback),
-            QoSProfile(depth=_QUEUE), raw=True,
+            kind, f'~/{topic}', until_shutdown(self, callback), QoSProfile(depth=depth), raw=True,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=partial(self._on_incompatible_qos, topic)))
@@ -282,6 +328,19 @@ class DynamicsNode(LifecycleNode):
         if self._active:
             self._setpoints.take_wrench(data)
 
+    def _on_measured_legs(self, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        self._wrench_diagnostics.heard(now)
+        estimate = self._measured_legs.take(data, self._setpoints.wrench, self._target)
+        if estimate is None:
+            return
+        if estimate.wrench is not None:
+            self._wrench_publisher.publish(self._measured_legs.step.message(estimate))
+        if self._wrench_diagnostics.estimated(estimate, self._target, now):
+            self._report()
+
     def _answer(self) -> None:
         """
         Answer what waits: all of it, or the newest where the node has fallen behind.
@@ -313,13 +372,26 @@ class DynamicsNode(LifecycleNode):
             self._restarting = False
             for topic, message in self._step.messages(output):
                 self._publishers_of[topic].publish(message)
-            self._last = output
+            self._last, self._target = output, setpoint.motion
+            self._undrawn = setpoint, output
             self._answered_at = time.monotonic()
             if (self._diagnostics.answered(output, came, self._answered_at)
                     or self._answered_at - self._reported >= _REPORT_SECONDS):
                 self._report()
+        self._draw(self._answered_at)
         executor: Any = self.executor
         executor.create_task(self._answer_task)
+
+    def _draw(self, now: float) -> None:
+        """Publish the markers of the last answer if they are due and somebody looks."""
+        if self._undrawn is None or now < self._draw_at:
+            return
+        setpoint, output = self._undrawn
+        # Who looks only later gets no picture of what was long ago.
+        self._undrawn = None
+        self._draw_at = now + 1.0 / self._settings['visualization_rate']
+        if self._markers_publisher.get_subscription_count():
+            self._markers_publisher.publish(self._markers.write(setpoint.motion, output))
 
     def _pass_over(self) -> None:
         """Let nothing wait but the newest setpoint, and count the others."""
@@ -349,10 +421,57 @@ class DynamicsNode(LifecycleNode):
                     came = True
                     self._on_setpoint(topic, taken[0])
 
+    # -- planned motions ------------------------------------------------------------------
+
+    def _on_trajectory(self, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        if len(self._plans) == _PLANS:
+            self._tell(planned.refused(planned.TOO_MANY, f'{_PLANS} are in work or wait'), now)
+            return
+        # Parameters and load are those of now, whatever changes meanwhile.
+        self._plans.append(
+            (planned.answer(self._settings, self._setpoints.wrench, data), now))
+        self._plan_timer.reset()
+
+    def _plan(self) -> None:
+        """Do a piece of the work on the trajectory whose turn it is."""
+        self._plan_timer.cancel()
+        if not self._plans:  # given up
+            return
+        work, came = self._plans[0]
+        outcome = next(work)
+        if outcome is not None:
+            self._plans.popleft()
+            if outcome.answer:
+                self._plan_publisher.publish(outcome.answer)
+            self._tell(outcome, came)
+        if self._plans:
+            self._plan_timer.reset()
+
+    def _tell(self, outcome: planned.Outcome, came: float) -> None:
+        """Say what has become of a trajectory."""
+        now = time.monotonic()
+        status = self._planned_diagnostics.done(outcome, now - came)
+        if outcome.reason:
+            self._logged[status.name] = status.level  # it is said here, each refusal
+            line = self._series.add(outcome.reason, f'trajectory {outcome.message}', now)
+            if line is not None:
+                self.get_logger().error(line)
+        self._report()
+
+    def _give_up_plans(self) -> None:
+        if self._plans:
+            self.get_logger().warning(
+                f'trajectories given up, the node is deactivated: {len(self._plans)}')
+            self._plans.clear()
+
     # -- words ----------------------------------------------------------------------------
 
     def _on_refusal(self, refusal: Refusal, details: str) -> None:
-        self._diagnostics.refused(refusal, details, time.monotonic())
+        of = self._wrench_diagnostics if refusal.topic == MEASURED_LEGS else self._diagnostics
+        of.refused(refusal, details, time.monotonic())
         how = '' if refusal.reason.startswith('passed over') else 'refused: '
         self._say(refusal, f'{refusal.topic} {how}{refusal.reason}: {details}')
 
@@ -370,6 +489,7 @@ class DynamicsNode(LifecycleNode):
             self.get_logger().warning(line)
         if not self._active:
             return
+        self._draw(now)  # the last answer before a silence
         # While setpoints are answered it is done behind an answer, when time is left for it.
         due = (now - self._answered_at >= _WATCH_SECONDS
                and now - self._reported >= _REPORT_SECONDS - 0.5 * _WATCH_SECONDS)
@@ -423,16 +543,17 @@ class DynamicsNode(LifecycleNode):
                         f'{", ".join(fixed)}: only changed while the node is unconfigured: its '
                         'topics and its machine are made of it; deactivate and clean up first')
             parameters = self._settings.replaced(ours)
-            step = Step(parameters)
+            step, external_wrench = Step(parameters), ExternalWrench(parameters)
         except ParameterError as exc:
             return SetParametersResult(
                 successful=False, reason=str(exc).removeprefix('parameters: '))
         self._tell_changes(parameters)
         self._settings = parameters
         if self._configured:
-            self._step = step
+            self._step, self._external_wrench = step, external_wrench
         if self._active:
             self._diagnostics.parameters = parameters
+            self._measured_legs.step = external_wrench
         return SetParametersResult(successful=True)
 
     def _tell_changes(self, parameters: Parameters) -> None:

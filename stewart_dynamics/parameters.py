@@ -155,8 +155,20 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'restart', 's', 0.1, minimum=0.0, above=True),
     Parameter('setpoint.exclusive', 'bool',
               'refuse setpoints while a topic has more than one writer', default=False),
-    Parameter('visualization_rate', 'double', 'most markers in a second, 0: none; markers are '
-              'not published yet', 'Hz', 30.0, minimum=0.0),
+    Parameter('trajectory.effort', 'bool', 'give forces with the points of ~/leg_trajectory: a '
+              'joint_trajectory_controller without an effort command interface refuses points '
+              'that have them', default=True),
+    Parameter('external_wrench.cutoff', 'double',
+              'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0,
+              minimum=0.0, above=True, while_active=True),
+    Parameter('external_wrench.force_max', 'double',
+              'external force from which diagnostics are an ERROR; none: not checked', 'N',
+              minimum=0.0, above=True, while_active=True),
+    Parameter('external_wrench.moment_max', 'double',
+              "external moment at the platform's origin likewise; none: not checked", 'N m',
+              minimum=0.0, above=True, while_active=True),
+    Parameter('visualization_rate', 'double', 'most pictures (~/markers) in a second, 0: none',
+              'Hz', 30.0, minimum=0.0),
     Parameter('autostart', 'bool', 'bring the node to active by itself', default=True),
 )})
 

@@ -111,15 +111,30 @@ def doubts(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     return tuple(found)
 
 
+def homes(parameters: Parameters) -> tuple[Array, Array]:
+    """
+    Return where the platform may stand at home, the likeliest first; see ``doubts``.
+
+    Positions (N, 3) [m] and rotations (N, 3, 3); the normal of the base joints' plane does not
+    tell above from below, so half of them are on its other side.
+    """
+    with np.errstate(all='ignore'):
+        shape = _shape(parameters)
+        reach = _reach(parameters, shape)
+        heights, _ = _home(parameters, shape, reach)
+        return _poses(parameters, shape, heights,
+                      _about(2, np.full(len(heights), reach.yaw or 0.0)))
+
+
 def _shape(p: Parameters) -> _Shape:
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
     around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
-    axes = _level_axes(around)
+    axes = level_axes(around)
     return _Shape(around @ axes.T, carried @ axes.T, axes, _mean_norm(around),
                   _mean_norm(carried))
 
 
-def _level_axes(around: Array) -> Array:
+def level_axes(around: Array) -> Array:
     """Return two axes in the plane of points, and its normal, (3, 3)."""
     moments = around.T @ around
     if not np.isfinite(moments).all():
@@ -311,12 +326,19 @@ def _mean_length(shape: _Shape, height: float, yaw: float) -> float:
     return _mean_norm(offset)
 
 
-def _conditions(p: Parameters, shape: _Shape, heights: Array, rotations: Array) -> Array:
-    """Return condition numbers (N,) at these heights and turns, both in the shape's axes."""
+def _poses(p: Parameters, shape: _Shape, heights: Array, rotations: Array,
+           ) -> tuple[Array, Array]:
+    """Return positions (N, 3) and rotations (N, 3, 3) at these heights and turns of the shape."""
     middle = p['geometry.platform_joints'].mean(axis=0)
     rotations = shape.axes.T @ rotations @ shape.axes
     positions = (p['geometry.base_joints'].mean(axis=0) - rotations @ middle
                  + heights[:, None] * shape.axes[2])
+    return positions, rotations
+
+
+def _conditions(p: Parameters, shape: _Shape, heights: Array, rotations: Array) -> Array:
+    """Return condition numbers (N,) at these heights and turns, both in the shape's axes."""
+    positions, rotations = _poses(p, shape, heights, rotations)
     if not np.isfinite(positions).all():
         return np.full(len(heights), 1.0)
     matrices = StewartPlatform(p).jacobian(positions, rotations)

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import math
 from typing import TypeVar
 
 import numpy as np
@@ -102,6 +104,20 @@ def to_quaternion(rotation: ArrayLike) -> Array:
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     unit: Array = np.where(q[..., 3:] < 0.0, -q, q)
     return unit
+
+
+def quaternion_of(rotation: Sequence[float]) -> tuple[float, float, float, float]:
+    """Return what ``to_quaternion`` does of one matrix's nine numbers, far sooner."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation
+    xy, xz, yz = r01 + r10, r02 + r20, r12 + r21
+    xw, yw, zw = r21 - r12, r02 - r20, r10 - r01
+    xx, yy, zz, ww = (1.0 + r00 - r11 - r22, 1.0 - r00 + r11 - r22, 1.0 - r00 - r11 + r22,
+                      1.0 + r00 + r11 + r22)
+    # The row of the largest number on the diagonal; of each the first entry is that number.
+    _, x, y, z, w = max((xx, xx, xy, xz, xw), (yy, xy, yy, yz, yw), (zz, xz, yz, zz, zw),
+                        (ww, xw, yw, zw, ww))
+    length = math.copysign(math.sqrt(x * x + y * y + z * z + w * w), w)
+    return x / length, y / length, z / length, w / length
 
 
 def _matrix(rows: list[list[Array]]) -> Array:

@@ -113,6 +113,16 @@ NOT_EXCLUSIVE = 'more than one writer'
 PASSED_OVER = 'passed over: more came at once than can be answered'
 
 
+def frame_details(frame: bytes, base_frame: bytes) -> str:
+    """Return what is said of a WRONG_FRAME."""
+    return f'{frame[:60].decode(errors="replace")!r}, must be {base_frame.decode()!r} or empty'
+
+
+def unit_details(length: float) -> str:
+    """Return what is said of a quaternion that is NOT_UNIT."""
+    return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'
+
+
 class Setpoints:
     """
     Joins the topics' samples by stamp.
@@ -240,8 +250,7 @@ class Setpoints:
                 self.refuse(topic, MALFORMED, str(exc))
                 return None
             if frame not in self._frames:
-                self.refuse(topic, WRONG_FRAME, f'{frame[:60].decode(errors="replace")!r}, must '
-                            f'be {max(self._frames).decode()!r} or empty')
+                self.refuse(topic, WRONG_FRAME, frame_details(frame, max(self._frames)))
                 return None
             self._learn(topic, data)
         else:
@@ -253,8 +262,7 @@ class Setpoints:
             x, y, z, w = values[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
             if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
-                self.refuse(topic, NOT_UNIT, f'length {length:.6g}, must be within '
-                            f'{QUATERNION_TOLERANCE:g} of 1')
+                self.refuse(topic, NOT_UNIT, unit_details(length))
                 return None
             values = values[:3] + from_quaternion(
                 x / length, y / length, z / length, w / length) + values[7:]

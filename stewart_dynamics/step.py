@@ -21,7 +21,7 @@ whether setpoints come one at a time or by the thousand.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import math
 from operator import sub
 from struct import Struct
@@ -45,6 +45,9 @@ Flags = NDArray[np.bool_]
 Six = tuple[float, float, float, float, float, float]
 
 NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+_QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
+               'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
 
 # Under the node's name, in the order in which they are published.
 OUTPUT_TYPES = {
@@ -76,6 +79,13 @@ class Excess(NamedTuple):
     leg: int
     value: float
     bound: float
+
+    def words(self, joints: Sequence[str]) -> str:
+        """Return what is beyond the limit, and by how much."""
+        quantity, unit = _QUANTITIES[self.limit]
+        beyond = abs(abs(self.value) - self.bound)
+        return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {beyond:.6g} {unit} '
+                f'beyond {self.limit}')
 
 
 class Output(NamedTuple):

@@ -34,6 +34,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
 
 NODE = '/stewart_dynamics'
 TYPES = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped,
@@ -74,9 +75,10 @@ def feed(rate: float, first: int, step: int, many: int, messages: dict[str, byte
 
 
 def hear() -> None:
-    """Subscribe to what the node publishes, as a controller, until told to end."""
+    """Subscribe to what the node publishes, as controller and RViz do, until told to end."""
     node = rclpy.create_node('controller')
-    for topic, kind in (('leg_states', JointState), ('leg_forces', Float64MultiArray)):
+    for topic, kind in (('leg_states', JointState), ('leg_forces', Float64MultiArray),
+                        ('markers', MarkerArray)):
         node.create_subscription(kind, f'{NODE}/{topic}', lambda message: None, QOS)
     while rclpy.ok():
         rclpy.spin_once(node, timeout_sec=1.0)

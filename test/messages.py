@@ -89,3 +89,26 @@ def combined(
                  [_vectors('geometry_msgs/msg/Twist', acceleration)] * parts[2],
                  _new('builtin_interfaces/msg/Duration', 0, 0))
     return _bytes(_new(COMBINED, _header(stamp, frame), list(names), [point] * points))
+
+
+def trajectory(stamp: int, times: Sequence[int], rows: Sequence[Sequence[float]],
+               frame: str = 'base', names: Sequence[str] = ('platform',),
+               little_endian: bool = True, parts: Sequence[tuple[int, int, int]] = ()) -> bytes:
+    """
+    Return a MultiDOFJointTrajectory of points at times [ns].
+
+    Rows have position, quaternion, velocity and acceleration, 19 numbers; ``parts``: how many
+    transforms, velocities, accelerations each point has.
+    """
+    points = []
+    for n, (time, row) in enumerate(zip(times, rows, strict=True)):
+        many = parts[n] if parts else (1, 1, 1)
+        transform = _new(
+            'geometry_msgs/msg/Transform', _new('geometry_msgs/msg/Vector3', *row[0:3]),
+            _new('geometry_msgs/msg/Quaternion', *row[3:7]))
+        points.append(_new(
+            'trajectory_msgs/msg/MultiDOFJointTrajectoryPoint', [transform] * many[0],
+            [_vectors('geometry_msgs/msg/Twist', row[7:13])] * many[1],
+            [_vectors('geometry_msgs/msg/Twist', row[13:19])] * many[2],
+            _new('builtin_interfaces/msg/Duration', *divmod(time, 1_000_000_000))))
+    return _bytes(_new(COMBINED, _header(stamp, frame), list(names), points), little_endian)

@@ -59,7 +59,8 @@ from rclpy.time import Time
 from referees import ROOT
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.platform import InverseDynamics
@@ -681,6 +682,67 @@ class Feeder(Program):
     def _writers(self) -> int:
         values = self._node.values('setpoints')
         return min(int(values[f'{topic}: writers']) for topic in self._node.topics)
+
+
+class Planner:
+    """Sends a node whole motions, and keeps the bytes that it answers."""
+
+    def __init__(self, node: DynamicsNode) -> None:
+        self._node = node
+        self.raw = node.peer.listen(f'{NODE}/leg_trajectory', JointTrajectory)
+        self._writer = node.peer.writer(f'{NODE}/platform_trajectory', MultiDOFJointTrajectory)
+        node.until(lambda: self._writer.get_subscription_count() == 1, 'the node hears it')
+        node.until(lambda: node.peer.node.count_publishers(f'{NODE}/leg_trajectory') == 1,
+                   'it hears the node')
+
+    def send(self, samples: Sequence[Sample], step: int = 10 * STEP, frame: str = 'base',
+             stamp: int = STEP) -> None:
+        """Send a motion through these samples, so many ns apart."""
+        message = MultiDOFJointTrajectory(header=header(stamp, frame), joint_names=['platform'])
+        for n, sample in enumerate(samples):
+            point, = sample.combined(0).points
+            point.time_from_start.sec, point.time_from_start.nanosec = divmod(
+                n * step, 1_000_000_000)
+            message.points.append(point)
+        self._writer.publish(message)
+
+    def send_bytes(self, message: bytes) -> None:
+        """Send these bytes in the place of a message."""
+        self._writer.publish(message)
+
+    def send_long(self, points: int, stamp: int = STEP) -> None:
+        """Send a motion that stays at home for so many points, 1 ms apart."""
+        point, = HOME.combined(0).points
+        two = raw(MultiDOFJointTrajectory(header=header(stamp, ''), points=[point, point]))
+        # Points are of 184 bytes, their times in the last eight.
+        head, each = two[:-2 * 184], two[-184:]
+        assert head[-4:] == b'\x02\0\0\0'
+        many = np.tile(np.frombuffer(each, np.uint8), (points, 1))
+        times = np.arange(points)
+        many[:, 176:].view('<i4')[:] = np.column_stack([times // 1000, times % 1000 * 1_000_000])
+        self._writer.publish(head[:-4] + points.to_bytes(4, 'little') + many.tobytes())
+
+    def fill(self) -> int:
+        """Send long motions until as many are in work as can wait; return how many."""
+        number = 0
+        while not any('more than can wait' in line for line in log_lines(
+                self._node.program.stderr, 'ERROR')):
+            self.send_long(20_000)
+            number += 1
+            self._node.peer.spin(0.0)
+        return number
+
+    def until_answered(self, number: int) -> JointTrajectory:
+        """Return the last answer once so many have come."""
+        self._node.until(lambda: len(self.raw) >= number, f'{number} trajectories are answered')
+        assert len(self.raw) == number
+        return deserialize_message(self.raw[-1], JointTrajectory)
+
+    def until_refused(self, text: str, number: int) -> None:
+        """Wait until the last trajectory is refused for a reason, so many in all."""
+        self._node.until_status('trajectory', b'\2', text)
+        self._node.until(lambda: self._node.values('trajectory')['refused'] == str(number),
+                         f'{number} trajectories are refused')
 
 
 def bits(numbers: Any) -> bytes:

@@ -23,6 +23,7 @@ import math
 import os
 from pathlib import Path
 import re
+import signal
 import sys
 from typing import Any
 
@@ -38,7 +39,7 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
     bits, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS, own_domain,
-    Peer, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
+    Peer, Planner, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
 
 import stewart_dynamics
 from stewart_dynamics import StewartPlatform
@@ -654,6 +655,27 @@ def test_a_killed_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Pa
     node.until(lambda: node.peer.node.count_subscribers(forces) == 1, 'it is forgotten')
 
 
+def test_a_stopped_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+    """A viewer that hangs takes neither forces nor pictures; the node does not wait for it."""
+    node = at_work
+    viewer = Program([sys.executable, FEEDER], node.domain, tmp_path / 'viewer')
+    markers = f'{NODE}/markers'
+    node.until(lambda: node.peer.node.count_subscribers(markers) == 1, 'the viewer is there')
+    before = len(node.raw['leg_states'])
+    feeder = Feeder(node, tmp_path / 'feeder', 250, 750)
+    feeder.begin()
+    _until_answered(node, feeder)
+    viewer.process.send_signal(signal.SIGSTOP)
+    try:
+        node.until(lambda: feeder.ended, 'all are sent')
+        feeder.end()
+        node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
+    finally:
+        viewer.process.send_signal(signal.SIGCONT)
+        viewer.stop()
+    node.until(lambda: node.peer.node.count_subscribers(markers) == 0, 'it is gone')
+
+
 # Singularities
 
 def _turned(degrees: float, rate: float = 0.0) -> Sample:
@@ -842,6 +864,68 @@ def _memory_to_refuse(domain: int, folder: Path, file: Path, reason: str) -> int
     return int(program.stdout)
 
 
+# Planned motions
+
+TURNED = HOME._replace(quaternion=(0.0, 0.0, math.sin(1.0), math.cos(1.0)))
+UNFIT = {
+    'refused: at ': ([HOME, HOME._replace(position=(0.0, 0.0, 4.0))], {}),
+    'det(J) passes zero': ([HOME, TURNED], {}),
+    'not finite: points[1]': ([HOME, HOME._replace(position=(0.0, 0.0, math.nan))], {}),
+    'quaternion not of unit length: points[0]': (
+        [HOME._replace(quaternion=(0.0, 0.0, 0.0, 1.1)), HOME], {}),
+    "wrong frame_id: 'world', must be 'base' or empty": ([HOME, HOME], {'frame': 'world'}),
+    'time_from_start does not rise: points[1]': ([HOME, HOME], {'step': 0}),
+    'malformed: 0 points': ([], {}),
+    'out of range: the numbers overflow': ([HOME._replace(position=(1e200, 0.0, 0.0))], {}),
+    'too far between points': ([HOME, HOME._replace(position=(1e9, 0.0, 0.0))], {}),
+}
+
+
+def test_a_trajectory_that_is_unfit_is_refused_as_a_whole(begin: Start) -> None:
+    node = begin('singularity.stop_condition:=1.0e9', 'limits.force_max:=1.0e9',
+                 'limits.velocity_max:=100.0', 'limits.length_max:=3.0')
+    planner = Planner(node)
+    for number, (text, (samples, how)) in enumerate(UNFIT.items(), start=1):
+        planner.send(samples, **{'step': 10**9, **how})
+        planner.until_refused(text, number)
+        node.answer(MOVING)
+    planner.send_bytes(raw(HOME.combined(1))[:-20])
+    planner.until_refused('refused: malformed: ', len(UNFIT) + 1)
+    assert any('trajectory refused: ' in line for line in log_lines(node.program.stderr, 'ERROR'))
+    assert not planner.raw
+    planner.send([HOME, HOME])
+    planner.until_answered(1)
+    node.until_status('trajectory', OK, 'answered: 2 points')
+
+
+def test_more_trajectories_than_can_wait_are_refused(begin: Start) -> None:
+    node = begin()
+    planner = Planner(node)
+    planner.fill()
+    node.until_reported('trajectory', ERROR, 'refused: more than can wait: 5 are in work or wait')
+    node.until_status('trajectory', OK, 'answered: 20000 points')
+    node.until(lambda: int(node.values('trajectory')['refused: more than can wait']) > 0,
+               'they are counted')
+
+
+def test_a_trajectory_in_work_is_given_up_with_the_node(begin: Start) -> None:
+    node = begin()
+    planner = Planner(node)
+    planner.fill()
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
+        assert node.call('change_state', ChangeState.Request(
+            transition=Transition(id=transition))).success
+    node.until_said('trajectories given up, the node is deactivated: ')
+    node.until_active()
+
+    def answered() -> bool:
+        # What was still in the middleware may come before it, and leave no place for it.
+        planner.send([HOME, HOME])
+        return 'answered: 2 points' in node.status('trajectory').message
+
+    node.until(answered, 'the next trajectory is answered')
+
+
 # The page
 
 def _rows() -> list[list[str]]:
@@ -861,8 +945,8 @@ def _of_module(name: str) -> tuple[dict[str, ast.FunctionDef], list[ast.stmt]]:
             [item for item in body if isinstance(item, ast.Assign)])
 
 
-HERE, OF_NODE, OF_SIMULATOR = (
-    _of_module(name) for name in ('test_faults', 'test_node', 'test_simulator'))
+MODULES = tuple(_of_module(name) for name in (
+    'test_faults', 'test_node', 'test_simulator', 'test_external_wrench_node'))
 OF_THE_PAGE = ('test_every_fault_on_the_page_has_a_test_and_every_test_a_fault',
                'test_what_the_page_says_that_it_says_its_test_asks_for')
 
@@ -877,18 +961,17 @@ def test_every_fault_on_the_page_has_a_test_and_every_test_a_fault() -> None:
         tests = re.findall(r'`(\w+)`', row[4])
         assert tests, row
         named.update(tests)
-    assert len({*HERE[0], *OF_NODE[0], *OF_SIMULATOR[0]}) == len(
-        [*HERE[0], *OF_NODE[0], *OF_SIMULATOR[0]])
-    assert named <= {*HERE[0], *OF_NODE[0], *OF_SIMULATOR[0]}
-    assert set(HERE[0]) - named == set(OF_THE_PAGE)
+    tests = [test for module, _ in MODULES for test in module]
+    assert len(set(tests)) == len(tests)
+    assert named <= set(tests)
+    assert set(MODULES[0][0]) - named == set(OF_THE_PAGE)
 
 
 @pytest.mark.parametrize('row', _rows(), ids=lambda row: row[0])
 def test_what_the_page_says_that_it_says_its_test_asks_for(row: list[str]) -> None:
     texts = []
     for test in re.findall(r'`(\w+)`', row[4]):
-        tests, constants = next(
-            module for module in (HERE, OF_NODE, OF_SIMULATOR) if test in module[0])
+        tests, constants = next(module for module in MODULES if test in module[0])
         for part in (tests[test], *constants):
             texts += [each.value for each in ast.walk(part)
                       if isinstance(each, ast.Constant) and isinstance(each.value, str)]

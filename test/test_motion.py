@@ -32,7 +32,7 @@ from referees import (
 from stewart_dynamics import Motion, MotionError
 from stewart_dynamics.lagrange import skew
 from stewart_dynamics.rotation import (
-    euler_rate_matrix, euler_rate_matrix_rate, from_euler, to_quaternion)
+    euler_rate_matrix, euler_rate_matrix_rate, from_euler, quaternion_of, to_quaternion)
 
 Array = NDArray[np.float64]
 
@@ -125,6 +125,20 @@ def test_exact_half_turns_have_exact_quaternions() -> None:
         turn = 2.0 * np.outer(axis, axis) - np.eye(3)
         assert np.array_equal(to_quaternion(turn), [*axis, 0.0])
     assert np.array_equal(to_quaternion(np.eye(3)), [0.0, 0.0, 0.0, 1.0])
+
+
+def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
+    random = rng()
+    turns = [rotation_about(random_direction(random), angle)
+             for angle in (0.0, *random.uniform(-np.pi, np.pi, 200))]
+    turns += [rotation_about(axis, np.pi - short_of) for axis in (X, Y, Z, (X + Y) / np.sqrt(2))
+              for short_of in (1e-12, 1e-8, 1e-4)]
+    for turn in turns:
+        assert np.allclose(quaternion_of(turn.ravel().tolist()), to_quaternion(turn),
+                           rtol=0.0, atol=4e-16)
+    for axis in np.eye(3):
+        exact = quaternion_of((2.0 * np.outer(axis, axis) - np.eye(3)).ravel().tolist())
+        assert np.array_equal(np.abs(exact), [*axis, 0.0])
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)

@@ -170,10 +170,10 @@ def check_share(share: Path) -> None:
     """Check that the files are there which ROS and the launch files look up."""
     assert (share / 'ament_index/resource_index/packages' / NAME).is_file()
     assert (share / NAME / 'package.xml').is_file()
-    for pattern in ('bags/*.mcap', 'config/*.yaml', 'examples/*.py', 'launch/*.launch.py',
-                    'security/*'):
+    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.yaml', 'examples/*.py',
+                    'launch/*.launch.py', 'security/*'):
         expected = {path.name for path in ROOT.glob(pattern)}
-        folder, _, files = pattern.partition('/')
+        folder, _, files = pattern.rpartition('/')
         assert {path.name for path in (share / NAME / folder).glob(files)} == expected
     assert (share / NAME / 'config/platform.yaml').is_file()
     assert (share / NAME / 'launch/demo.launch.py').is_file()

@@ -357,6 +357,41 @@ def test_a_stiff_machine_is_integrated_without_trembling(changes: dict[str, Any]
     assert not plant.fault
 
 
+@pytest.mark.parametrize('seed', range(12))
+def test_of_a_stiff_machine_let_loose_the_energy_never_rises(seed: int) -> None:
+    """Friction from none to far too much, stops from soft to hard, with reflected mass or none."""
+    random = rng(seed)
+    p = random_simulated(seed)
+    lengths = StewartPlatform(p).inverse_kinematics(p['initial_pose'][:3], np.eye(3))
+    plant = Plant(random_simulated(
+        seed, rate=1000.0, limits__length_min=(lengths * random.uniform(0.8, 0.99)).tolist(),
+        limits__length_max=(lengths * random.uniform(1.01, 1.3)).tolist(),
+        actuator__viscous_friction=float(10.0 ** random.uniform(-1.0, 4.0)),
+        actuator__coulomb_friction=float(10.0 ** random.uniform(-1.0, 2.5)),
+        actuator__reflected_mass=float(random.choice([0.0, 1.0, 30.0])),
+        end_stops__frequency=float(10.0 ** random.uniform(0.0, 2.5)),
+        end_stops__damping_ratio=float(10.0 ** random.uniform(-1.0, 1.0))))
+    limits = plant.parameters['limits.length_min'], plant.parameters['limits.length_max']
+    moved = plant.parameters['platform.mass'] + sum(plant.parameters['legs.piston.mass'])
+    carried = moved / 6.0 + plant.parameters['actuator.reflected_mass']
+    stiffness = carried * (2.0 * math.pi * plant.parameters['end_stops.frequency']) ** 2
+    set_moving(plant, random.uniform(-2.0, 2.0, 6))
+    plant.state = plant._run(0)
+
+    def energy() -> float:
+        now = np.array(plant.state.lengths)
+        deep = np.maximum(limits[0] - now, 0.0) + np.maximum(now - limits[1], 0.0)
+        return energy_of(plant) + 0.5 * float(stiffness @ deep ** 2)
+
+    kinetic, last = float(energies(plant.parameters, motion_of(plant.state))[0]), energy()
+    for _ in range(min(1000, 20_000 // plant.substeps)):
+        plant.advance(ZERO, ZERO)
+        now = energy()
+        assert now < last + 1e-12 * (kinetic + abs(last))
+        last = now
+    assert not plant.fault
+
+
 @pytest.mark.parametrize(('changes', 'named'), [
     ({'actuator.coulomb_friction': 1e8}, 'actuator.coulomb_friction'),
     ({'actuator.viscous_friction': 1e12}, 'actuator.viscous_friction'),

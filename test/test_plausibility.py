@@ -26,7 +26,7 @@ import pytest
 from referees import random_parameters, ROOT, symmetric_parameters
 
 from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.plausibility import doubts
+from stewart_dynamics.plausibility import doubts, homes
 from stewart_dynamics.rotation import from_euler
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -251,6 +251,17 @@ def test_a_home_that_is_turned_is_found_by_the_limits() -> None:
     assert doubts(Parameters(good)) == ()
     (doubt,) = doubts(Parameters({**good, 'limits.length_min': (), 'limits.length_max': ()}))
     assert 'singular at home (the axes parallel, at any height)' in doubt
+
+
+def test_home_is_where_the_mean_leg_is_halfway_between_its_limits() -> None:
+    """First above the base, then below it."""
+    machine = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+    positions, rotations = homes(machine)
+    assert positions[0, 2] == -positions[1, 2] > 0.9
+    assert np.allclose(positions[:, :2], 0.0, atol=1e-9)
+    assert np.allclose(rotations, np.eye(3), atol=1e-12)
+    lengths = StewartPlatform(machine).inverse_kinematics(positions, rotations)
+    assert np.allclose(np.mean(lengths, axis=1), 1.3, rtol=0.0, atol=1e-9)
 
 
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))

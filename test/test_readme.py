@@ -42,6 +42,7 @@ def test_tables_of_parameters_are_those_of_the_code(monkeypatch: pytest.MonkeyPa
 
 def test_topics_are_those_of_the_code() -> None:
     for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
+                        ('markers', 'visualization_msgs/msg/MarkerArray'),
                         *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
 

@@ -131,7 +131,8 @@ def test_the_policy_is_what_the_node_does(start: Start) -> None:
     union: dict[str, set[str]] = {}
     for node in nodes:
         node.until_active()
-        of_inputs = {f'{NODE}/{topic}' for topic in (*node.topics, 'wrench')}
+        of_inputs = {f'{NODE}/{topic}' for topic in (
+            *node.topics, 'wrench', 'measured_legs')}
         node.until(lambda node=node, of_inputs=of_inputs: of_inputs <= done_by(
             node.peer, 'stewart_dynamics').get('subscribe', set()), 'its topics are known')
         for right, names in done_by(node.peer, 'stewart_dynamics').items():

@@ -32,8 +32,8 @@ from rclpy.serialization import deserialize_message
 from referees import rng
 from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, bits, executable, log_lines, nanoseconds, Peer, PLATFORM, Program, QOS,
-    ROOT, wrench_message)
+    assert_only_log_lines, bits, executable, log_lines, nanoseconds, Peer, PLATFORM, Program, ROOT,
+    wrench_message)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -60,10 +60,9 @@ class Simulator:
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = ()
                  ) -> None:
         self.peer = Peer(domain)
-        self.events: list[tuple[str, bytes]] = []
-        for topic, kind in TYPES.items():
-            self._listen(topic, f'{SIMULATOR}/{topic}', kind)
-        self._listen('clock', '/clock', Clock)
+        self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
+                    for topic, kind in TYPES.items()}
+        self.raw['clock'] = self.peer.listen('/clock', Clock)
         self._commands = self.peer.writer(f'{SIMULATOR}/commands', Float64MultiArray)
         self._wrench = self.peer.writer(f'{SIMULATOR}/wrench', WrenchStamped)
         paths = [part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)]
@@ -72,10 +71,6 @@ class Simulator:
              *(part for override in overrides for part in ('-p', override))], domain, folder)
         self.peer.watched = self.program
 
-    def _listen(self, name: str, topic: str, kind: Any) -> None:
-        self.peer.node.create_subscription(
-            kind, topic, lambda data: self.events.append((name, data)), QOS, raw=True)
-
     def until(self, condition: Callable[[], Any], what: str) -> None:
         """Take messages until a condition holds."""
         self.peer.until(condition, what)
@@ -83,7 +78,7 @@ class Simulator:
     def until_there(self) -> None:
         """Wait until it hears us and we hear it."""
         topics = {*TYPES, 'clock'} if self._stepped else set(TYPES)
-        self.until(lambda: topics <= {name for name, _ in self.events}
+        self.until(lambda: all(self.raw[topic] for topic in topics)
                    and self._commands.get_subscription_count()
                    and self._wrench.get_subscription_count(), 'the simulator is there')
 
@@ -110,31 +105,31 @@ class Simulator:
         """Publish a load on the platform."""
         self._wrench.publish(wrench_message(wrench, frame))
 
-    def raw(self, topic: str) -> list[bytes]:
-        """Return the messages of a topic so far, as they came."""
-        return [data for name, data in self.events if name == topic]
-
     def states(self, topic: str = 'leg_states') -> list[Any]:
         """Return the messages of a topic so far."""
-        return [deserialize_message(data, TYPES[topic]) for data in self.raw(topic)]
+        return [deserialize_message(data, TYPES[topic]) for data in self.raw[topic]]
+
+    def last(self, topic: str = 'leg_states') -> Any:
+        """Return the last message of a topic."""
+        return deserialize_message(self.raw[topic][-1], TYPES[topic])
 
     def stamps(self, topic: str = 'leg_states') -> list[int]:
         """Return the stamps of a topic's messages so far [ns]."""
-        return [int.from_bytes(data[4:8], 'little') * 1_000_000_000
-                + int.from_bytes(data[8:12], 'little') for data in self.raw(topic)]
+        return [stamp_of(data) for data in self.raw[topic]]
 
     def step(self, message: Any) -> int:
-        """Command one period and return its stamp, once its clock has come."""
-        before = self.stamps('clock')[-1]
+        """Command one period and return its stamp, once all of it has come."""
+        before = stamp_of(self.raw['clock'][-1])
         self.command(message)
-        self.until(lambda: self.stamps('clock')[-1] > before, 'time is moved')
-        return self.stamps('clock')[-1]
+        self.until(lambda: all(stamp_of(of[-1]) > before for of in self.raw.values()),
+                   'time is moved')
+        return stamp_of(self.raw['clock'][-1])
 
     def at_work(self) -> None:
         """Check that it still publishes, and nothing but numbers."""
         if not self._stepped:
-            many = len(self.events)
-            self.until(lambda: len(self.events) > many + 50, 'it goes on')
+            many = len(self.raw['accel'])
+            self.until(lambda: len(self.raw['accel']) > many + 10, 'it goes on')
         for topic in TYPES:
             for message in self.states(topic):
                 assert np.all(np.isfinite(numbers_of(message))), message
@@ -153,6 +148,12 @@ class Simulator:
         finally:
             self.program.kill()
             self.peer.close()
+
+
+def stamp_of(data: bytes) -> int:
+    """Return the stamp of a message's bytes, or of a clock's [ns]."""
+    return int.from_bytes(data[4:8], 'little') * 1_000_000_000 + int.from_bytes(
+        data[8:12], 'little')
 
 
 def numbers_of(message: Any) -> list[float]:
@@ -240,7 +241,7 @@ def test_step_by_step_the_same_commands_give_the_same_bits(begin: Start) -> None
                 simulator.load((1.0,) * 6, frame='elsewhere')
                 simulator.until_said('WARN', 'wrench refused: wrong frame_id')
             simulator.step(command)
-        seen.append({topic: simulator.raw(topic)[-len(commands):] for topic in TYPES})
+        seen.append({topic: simulator.raw[topic][-len(commands):] for topic in TYPES})
         assert simulator.stamps()[-len(commands):] == [
             FIRST + PERIOD * (n + 1) for n in range(len(commands))]
     assert seen[0] == seen[1]
@@ -256,16 +257,17 @@ def test_step_by_step_the_same_commands_give_the_same_bits(begin: Start) -> None
 def test_each_command_is_one_period_and_nothing_else_moves_time(begin: Start) -> None:
     simulator = begin(STEPPED)
     # Until the first command it says again and again where it is.
-    simulator.until(lambda: len(simulator.raw('clock')) >= 3, 'it says so again')
+    simulator.until(lambda: len(simulator.raw['clock']) >= 3, 'it says so again')
     assert set(simulator.stamps('clock')) == set(simulator.stamps()) == {FIRST}
-    assert len(set(simulator.raw('leg_states'))) == 1
+    assert len(set(simulator.raw['leg_states'])) == 1
     first = simulator.states()[0]
     assert not np.any([*first.velocity, *first.effort])
     # Many at once are as many periods, in their order.
     for n in range(200):
         simulator.command([500.0 + n] * 6)
     end = FIRST + 200 * PERIOD
-    simulator.until(lambda: simulator.stamps('clock')[-1] >= end, 'all are answered')
+    simulator.until(lambda: all(stamp_of(of[-1]) >= end for of in simulator.raw.values()),
+                    'all are answered')
     assert [state.effort[0] for state in simulator.states()
             if nanoseconds(state.header.stamp) > FIRST] == [500.0 + n for n in range(200)]
     for topic in (*TYPES, 'clock'):
@@ -281,8 +283,8 @@ def test_each_command_is_one_period_and_nothing_else_moves_time(begin: Start) ->
 
 def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> None:
     simulator = begin('rate:=250.0')
-    simulator.until(lambda: len(simulator.raw('accel')) > 100, 'it goes on')
-    assert simulator.raw('clock') == []
+    simulator.until(lambda: len(simulator.raw['accel']) > 100, 'it goes on')
+    assert simulator.raw['clock'] == []
     home = StewartPlatform(SimulatorParameters(GIVEN)).inverse_kinematics(
         [0.0, 0.0, 1.1], np.eye(3)) - 0.95
     for state in simulator.states():
@@ -291,24 +293,28 @@ def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> 
     # The last command holds until the next, as of effort controllers.
     up = (np.array(holding()) + 100.0).tolist()
     simulator.command(up)
-    simulator.until(lambda: simulator.states('pose')[-1].pose.position.z > 1.12, 'it rises')
-    simulator.until(lambda: len(simulator.raw('accel')) == len(simulator.raw('leg_states')),
+    simulator.until(lambda: simulator.last('pose').pose.position.z > 1.12, 'it rises')
+    simulator.until(lambda: len(simulator.raw['accel']) == len(simulator.raw['leg_states']),
                     'the last ones have come')
-    assert not simulator.said('WARN', ''), simulator.program.stderr
     stamps = simulator.stamps()
-    assert set(np.diff(stamps).tolist()) == {4_000_000}
+    assert min(np.diff(stamps)) == 4_000_000
+    # A machine that is busy with other things may hold it up; that is all it may say.
+    behind = simulator.said('WARN', 'fell behind by')
+    assert simulator.said('WARN', '') == behind
+    if not behind:
+        assert max(np.diff(stamps)) == 4_000_000
     assert all(simulator.stamps(topic) == stamps for topic in TYPES)
     assert abs(stamps[0] - time.time_ns()) < 1_000_000_000_000
-    assert bits(simulator.states()[-1].effort) == bits(up)
+    assert bits(simulator.last().effort) == bits(up)
 
 
 def test_a_load_moves_it(begin: Start) -> None:
     simulator = begin()
     simulator.command(holding())
     simulator.load((0.0, 0.0, 400.0, 0.0, 0.0, 0.0))
-    simulator.until(lambda: simulator.states('pose')[-1].pose.position.z > 1.15, 'it rises')
+    simulator.until(lambda: simulator.last('pose').pose.position.z > 1.15, 'it rises')
     simulator.load((0.0, 0.0, -2000.0, 0.0, 0.0, 0.0))
-    simulator.until(lambda: simulator.states('pose')[-1].pose.position.z < 1.1, 'it sinks')
+    simulator.until(lambda: simulator.last('pose').pose.position.z < 1.1, 'it sinks')
 
 
 # Faults: see docs/faults.md
@@ -321,7 +327,7 @@ def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mod
         simulator.step(good)
     else:
         simulator.command(good)
-        simulator.until(lambda: simulator.states()[-1].effort[0] == good[0], 'it is heard')
+        simulator.until(lambda: simulator.last().effort[0] == good[0], 'it is heard')
     for n in range(6):
         for special in SPECIAL:
             simulator.command([*good[:n], special, *good[n + 1:]])
@@ -331,12 +337,12 @@ def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mod
     simulator.command(b'\0\7\0\0' + bytes(68))
     for reason in ('not finite: (', 'not six numbers: 0 of them', 'malformed: '):
         simulator.until_said('WARN', f'commands refused: {reason}')
-    before = simulator.stamps()[-1]
+    before = stamp_of(simulator.raw['leg_states'][-1])
     if mode == 'stepped':
         # Time stood; the next is one period.
         assert simulator.step(good) == FIRST + 2 * PERIOD
     else:
-        simulator.until(lambda: simulator.stamps()[-1] > before, 'it goes on')
+        simulator.until(lambda: stamp_of(simulator.raw['leg_states'][-1]) > before, 'it goes on')
     assert {tuple(state.effort) for state in simulator.states()} == {NO_LOAD, tuple(good)}
     simulator.until_said('WARN', '(the last of 18)')
 
@@ -351,14 +357,14 @@ def test_loads_that_are_none_are_refused_and_the_last_holds(begin: Start) -> Non
     simulator.until_said('WARN', 'wrench refused: wrong frame_id')
     simulator.until_said('WARN', 'wrench refused: not finite')
     simulator.step(holding())
-    assert np.allclose(numbers_of(simulator.states('accel')[-1])[:2], 0.0, atol=1e-1)
-    assert simulator.states('accel')[-1].accel.linear.z > 0.5
+    assert np.allclose(numbers_of(simulator.last('accel'))[:2], 0.0, atol=1e-1)
+    assert simulator.last('accel').accel.linear.z > 0.5
 
 
 def test_forces_beyond_their_limit_saturate(begin: Start) -> None:
     simulator = begin(STEPPED)
     simulator.step([1000.0, -7000.0, 6000.0, 6001.0, 0.0, 1e300])
-    assert simulator.states()[-1].effort.tolist() == [
+    assert simulator.last().effort.tolist() == [
         1000.0, -6000.0, 6000.0, 6000.0, 0.0, 6000.0]
     line = simulator.until_said('WARN', 'is beyond limits.force_max, clipped to')
     assert 'commands: leg_6: 1e+300 N is beyond limits.force_max, clipped to 6000 N' in line
@@ -378,9 +384,9 @@ def test_what_cannot_be_computed_holds_it_at_rest(
         assert simulator.step(holding()) == FIRST + 2 * PERIOD
         assert simulator.step(holding()) == FIRST + 3 * PERIOD
     else:
-        many = len(simulator.states())
-        simulator.until(lambda: len(simulator.states()) > many + 20, 'it goes on')
-    last = simulator.states()[-1]
+        many = len(simulator.raw['leg_states'])
+        simulator.until(lambda: len(simulator.raw['leg_states']) > many + 20, 'it goes on')
+    last = simulator.last()
     assert not np.any([*last.velocity, *last.effort])
     assert len(simulator.said('ERROR', '')) == 1
 
@@ -389,10 +395,11 @@ def test_a_machine_too_stiff_for_real_time_lets_time_go(begin: Start) -> None:
     simulator = begin('actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0')
     simulator.command(holding())
     simulator.until_said('WARN', 'fell behind by')
-    # Its stamps keep up with the clock, by which they are late no more than it says.
-    simulator.until(lambda: abs(simulator.stamps()[-1] - time.time_ns()) < 30_000_000_000
-                    and simulator.stamps()[-1] > simulator.stamps()[0] + 1_000_000_000,
+    # Its stamps go on with the clock, with periods left out.
+    begun = stamp_of(simulator.raw['leg_states'][0])
+    simulator.until(lambda: stamp_of(simulator.raw['leg_states'][-1]) > begun + 1_000_000_000,
                     'stamps go on')
+    assert max(np.diff(simulator.stamps())) > PERIOD
 
 
 def test_a_simulator_that_was_stopped_takes_what_is_due_and_lets_the_rest_go(
@@ -404,8 +411,8 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_lets_the_rest_go(
     simulator.program.process.send_signal(signal.SIGCONT)
     line = simulator.until_said('WARN', 'fell behind by')
     assert float(line.rpartition('fell behind by ')[2].partition(' s')[0]) > 0.5
-    many = len(simulator.stamps())
-    simulator.until(lambda: len(simulator.stamps()) > many + 100, 'it goes on')
+    many = len(simulator.raw['leg_states'])
+    simulator.until(lambda: len(simulator.raw['leg_states']) > many + 100, 'it goes on')
     gaps = np.diff(simulator.stamps())
     assert np.sum(gaps != PERIOD) >= 1
     assert np.all(gaps >= PERIOD)

@@ -19,13 +19,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-import struct
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stewart_dynamics.cdr import MalformedError
+from stewart_dynamics import cdr
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.setpoints import MALFORMED, NOT_FINITE
 
@@ -70,23 +69,20 @@ class _Layout(NamedTuple):
     @classmethod
     def of(cls, data: bytes, joints: Sequence[str]) -> _Layout:
         """Return the layout of a message, read field by field; MalformedError if it is none."""
-        if len(data) < _AFTER_STAMP or data[0] != 0 or data[1] not in _ORDERS:
-            raise MalformedError(f'{len(data)} bytes: not plain CDR with a header')
-        fields = _Fields(data, _ORDERS[data[1]])
-        fields.text()  # frame_id
-        names = [fields.text().decode(errors='replace') for _ in range(fields.count())]
-        fields.doubles()  # position
-        fields.doubles()  # velocity
-        efforts = fields.doubles()
-        number = (efforts.stop - efforts.start) // 8
+        _, names, numbers, gaps = cdr.joint_state_fields(data)
+        begin, number = numbers[2]
         reason = ''
         if not set(joints) <= set(names):
             reason = LACKING
         elif number != len(names):
             reason = UNEVEN if number else WITHOUT_EFFORT
         wanted = [] if reason else [names.index(joint) for joint in joints]
-        return cls(np.frombuffer(data, dtype=np.uint8), fields.fixed, fields.order, reason,
-                   efforts, wanted, names)
+        fixed = np.full(len(data), 255, dtype=np.uint8)
+        for free in (slice(2, _AFTER_STAMP), *gaps, *(
+                slice(at, at + 8 * many) for at, many in numbers)):
+            fixed[free] = 0
+        return cls(np.frombuffer(data, dtype=np.uint8), fixed, _ORDERS[data[1]], reason,
+                   slice(begin, begin + 8 * number), wanted, names)
 
     def messages(self, whole: Bytes, begins: Stamps) -> Bytes:
         """Return messages, (N, size), by where they begin."""
@@ -110,48 +106,6 @@ class _Layout(NamedTuple):
         numbers = messages[:, self.efforts].copy().view(f'{self.order}f8')
         values: Array = numbers[:, self.joints].astype(float)
         return values
-
-
-class _Fields:
-    """A message's fields one after the other, and which of its bytes they fix."""
-
-    def __init__(self, data: bytes, order: str) -> None:
-        self.order = order
-        self.fixed = np.zeros(len(data), dtype=np.uint8)
-        self.fixed[:2] = 255
-        self._data = data
-        self._at = _AFTER_STAMP
-
-    def count(self) -> int:
-        """Read the length of a sequence."""
-        begin = self._at + 3 & ~3
-        self._at = self._fix(begin, 4)
-        return int(struct.unpack_from(f'{self.order}I', self._data, begin)[0])
-
-    def text(self) -> bytes:
-        """Read a string."""
-        size = self.count()
-        begin, self._at = self._at, self._fix(self._at, size)
-        if size and self._data[self._at - 1] != 0:
-            raise MalformedError('a string does not end in a zero byte')
-        return self._data[begin:self._at][:-1]
-
-    def doubles(self) -> slice:
-        """Return where the numbers of a sequence are."""
-        number = self.count()
-        # the first of them is aligned, counted from the end of the encapsulation
-        begin = (self._at + 3 & ~7) + 4 if number else self._at
-        if begin + 8 * number > len(self._data):
-            raise MalformedError(f'{len(self._data)} bytes: too few for {number} numbers')
-        self._at = begin + 8 * number
-        return slice(begin, self._at)
-
-    def _fix(self, begin: int, size: int) -> int:
-        end = begin + size
-        if end > len(self._data):
-            raise MalformedError(f'{len(self._data)} bytes: must be at least {end}')
-        self.fixed[begin:end] = 255
-        return end
 
 
 class _Read(NamedTuple):
@@ -239,7 +193,7 @@ class Efforts:
             begin, length = int(begins[left[0]]), int(lengths[left[0]])
             try:
                 layout = _Layout.of(whole[begin:begin + length].tobytes(), self._joints)
-            except MalformedError:
+            except cdr.MalformedError:
                 read.refused[MALFORMED] += 1
                 left = left[1:]
                 continue

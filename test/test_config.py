@@ -1,0 +1,244 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What config/ has for other programs: RViz, Foxglove and the controller manager."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+import re
+from typing import Any
+
+import pytest
+from referees import ROOT
+import yaml
+
+from stewart_dynamics import Parameters
+
+CONFIG = ROOT / 'config'
+JOINTS = list(Parameters.from_yaml(CONFIG / 'platform.yaml')['joints'])
+CONTROLLERS = sorted((CONFIG / 'controllers').glob('*.yaml'))
+
+# Published only with ~/measured_legs connected.
+MONITOR = '/stewart_dynamics/external_wrench'
+
+
+def rviz() -> dict[str, Any]:
+    """Return RViz's configuration."""
+    document: dict[str, Any] = yaml.safe_load(
+        (CONFIG / 'stewart_dynamics.rviz').read_text(encoding='utf-8'))
+    return document['Visualization Manager']
+
+
+def foxglove() -> dict[str, Any]:
+    """Return Foxglove's layout."""
+    layout: dict[str, Any] = json.loads((CONFIG / 'foxglove.json').read_text(encoding='utf-8'))
+    return layout
+
+
+# Displays of rviz_default_plugins in Jazzy (its plugins_description.xml) and what they take.
+DISPLAYS = {
+    'Grid': None, 'Axes': None, 'MarkerArray': 'visualization_msgs/msg/MarkerArray',
+    'Wrench': 'geometry_msgs/msg/WrenchStamped'}
+# What Foxglove's panels take of the topics that are named in them; the field that a Plot shows.
+MARKERS = 'visualization_msgs/msg/MarkerArray'
+DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+FIELDS = {'data': 'std_msgs/msg/Float64', 'data[n]': 'std_msgs/msg/Float64MultiArray'}
+
+
+def topics_of_rviz() -> dict[str, str]:
+    """Return the topics that RViz is to show, and of which type."""
+    found = {}
+    for display in rviz()['Displays']:
+        package, name = display['Class'].split('/')
+        assert package == 'rviz_default_plugins'
+        kind = DISPLAYS[name]
+        assert ('Topic' in display) == (kind is not None)
+        if kind is not None:
+            found[display['Topic']['Value']] = kind
+    return found
+
+
+def topics_of_foxglove() -> dict[str, str]:
+    """Return the topics that Foxglove is to show, and of which type."""
+    found = {}
+    for name, panel in foxglove()['configById'].items():
+        kind = name.partition('!')[0]
+        if kind == '3D':
+            found.update(dict.fromkeys(panel['topics'], MARKERS))
+        elif kind in ('DiagnosticSummary', 'DiagnosticStatusPanel'):
+            found[panel['topicToRender']] = DIAGNOSTICS
+        else:
+            assert kind == 'Plot'
+            for path in panel['paths']:
+                match = re.fullmatch(r'(/[a-z_/]+)\.(data(?:\[[0-5]\])?)', path['value'])
+                if match is None:
+                    assert path['value'] == '0'  # a line at zero
+                    continue
+                topic, field = match.groups()
+                kind = FIELDS[re.sub(r'\[\d\]', '[n]', field)]
+                assert found.setdefault(topic, kind) == kind
+    return found
+
+
+def leaves(layout: Any) -> Iterator[str]:
+    """Yield the panels in a layout, and check how it is divided."""
+    if isinstance(layout, str):
+        yield layout
+        return
+    assert set(layout) == {'direction', 'splitPercentage', 'first', 'second'}
+    assert layout['direction'] in ('row', 'column')
+    assert 0 < layout['splitPercentage'] < 100
+    yield from leaves(layout['first'])
+    yield from leaves(layout['second'])
+
+
+def test_each_panel_of_foxglove_has_its_place() -> None:
+    layout = foxglove()
+    assert set(layout) == {'configById', 'globalVariables', 'userNodes', 'playbackConfig',
+                           'layout'}
+    assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
+    plotted = [path['value'] for panel in layout['configById'].values()
+               for path in panel.get('paths', ())]
+    for topic in ('leg_forces', 'leg_lengths'):
+        assert [value for value in plotted if f'/{topic}.' in value] == [
+            f'/stewart_dynamics/{topic}.data[{n}]' for n in range(6)]
+    frames = [panel['followTf'] for panel in layout['configById'].values() if 'followTf' in panel]
+    assert frames == ['base']
+
+
+def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
+    rclpy = pytest.importorskip('rclpy.serialization')
+    from visualization_msgs.msg import MarkerArray
+
+    from stewart_dynamics.markers import Markers
+    from stewart_dynamics.step import Setpoint, Step
+    parameters = Parameters.from_yaml(CONFIG / 'platform.yaml')
+    motion = (0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) + (0.0,) * 12
+    output = Step(parameters)(Setpoint(1, motion), None)
+    assert output is not None
+    message = rclpy.deserialize_message(Markers(parameters).write(motion, output), MarkerArray)
+    display, = (each for each in rviz()['Displays'] if each['Class'].endswith('/MarkerArray'))
+    assert display['Namespaces'] == dict.fromkeys(
+        {marker.ns for marker in message.markers}, True)
+    assert {rviz()['Global Options']['Fixed Frame']} == {
+        marker.header.frame_id for marker in message.markers} == {parameters['base_frame']}
+
+
+def test_topics_are_those_that_the_node_publishes(node: Any) -> None:
+    node.answer()
+    published = dict(
+        node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/'))
+    shown = {**topics_of_rviz(), **topics_of_foxglove()}
+    assert {'/stewart_dynamics/markers', '/stewart_dynamics/leg_forces',
+            '/stewart_dynamics/jacobian_determinant', '/diagnostics', MONITOR} <= set(shown)
+    for topic, kind in shown.items():
+        if topic != MONITOR or MONITOR in published:
+            assert published[topic] == [kind]
+    panel = foxglove()['configById']['DiagnosticStatusPanel!singularity']
+    assert panel['selectedName'] == node.status('singularity').name
+    assert panel['selectedHardwareId'] == node.status('singularity').hardware_id
+
+
+# Controllers. What may be in a file, and the version of it: src/*_parameters.yaml of
+# ros2_controllers 4.42.1 and of ros2_control 4.46.0, branches jazzy.
+
+OF_MANAGER = {'update_rate': int}
+TYPES = {'joint_state_broadcaster/JointStateBroadcaster',
+         'effort_controllers/JointGroupEffortController',
+         'joint_trajectory_controller/JointTrajectoryController'}
+OF_GROUP = {'joints': list}
+OF_TRAJECTORY = {
+    'joints': list, 'command_joints': list, 'command_interfaces': list, 'state_interfaces': list,
+    'allow_partial_joints_goal': bool, 'interpolate_from_desired_state': bool,
+    'allow_integration_in_goal_trajectories': bool,
+    'set_last_command_interface_value_as_state_on_activation': bool,
+    'action_monitor_rate': float, 'interpolation_method': str,
+    'allow_nonzero_velocity_at_trajectory_end': bool, 'cmd_timeout': float,
+    'constraints.stopped_velocity_tolerance': float, 'constraints.goal_time': float,
+    'constraints.decelerate_on_cancel': bool,
+    **{f'constraints.JOINT.{name}': float for name in (
+        'trajectory', 'goal', 'max_deceleration_on_cancel')},
+    **{f'gains.JOINT.{name}': float for name in (
+        'p', 'i', 'd', 'i_clamp_max', 'i_clamp_min', 'ff_velocity_scale', 'u_clamp_max',
+        'u_clamp_min', 'tracking_time_constant', 'error_deadband')},
+    'gains.JOINT.antiwindup_strategy': str}
+# joint_trajectory_controller/validate_jtc_parameters.hpp, with effort in it.
+COMMANDS = (['effort'], ['position', 'effort'])
+ANTIWINDUP = ('back_calculation', 'conditional_integration', 'legacy', 'none')
+
+
+def flat(tree: dict[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield dotted names and values."""
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from flat(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}', value
+
+
+def sections(path: Any) -> tuple[dict[str, str], dict[str, dict[str, Any]]]:
+    """Return the controllers' types, and the parameters of those that have some."""
+    document = yaml.safe_load(path.read_text(encoding='utf-8'))
+    for section in document.values():
+        assert set(section) == {'ros__parameters'}
+    given = {name: section['ros__parameters'] for name, section in document.items()}
+    manager = given.pop('controller_manager')
+    types = {name: value.pop('type') for name, value in manager.items() if isinstance(value, dict)}
+    assert not any(value for value in manager.values() if isinstance(value, dict))
+    for name, value in manager.items():
+        if name not in types:
+            assert type(value) is OF_MANAGER[name]
+    return types, given
+
+
+@pytest.mark.parametrize('path', CONTROLLERS, ids=lambda path: path.name)
+def test_controllers_have_parameters_that_they_know(path: Any) -> None:
+    types, given = sections(path)
+    assert set(types.values()) <= TYPES
+    assert types['joint_state_broadcaster'] == 'joint_state_broadcaster/JointStateBroadcaster'
+    name, = given
+    known = OF_GROUP if types[name].startswith('effort_controllers/') else OF_TRAJECTORY
+    parameters = dict(flat(given[name]))
+    for key, value in parameters.items():
+        general = '.'.join('JOINT' if part in JOINTS else part for part in key.split('.'))
+        assert type(value) is known[general], key
+    assert parameters['joints'] == JOINTS
+    if known is OF_TRAJECTORY:
+        assert parameters['command_interfaces'] in COMMANDS
+        assert parameters['state_interfaces'] == ['position', 'velocity']
+        has_gains = parameters['command_interfaces'] == ['effort']
+        assert set(given[name].get('gains', {})) == (set(JOINTS) if has_gains else set())
+        assert JOINTS == [key for key in given[name]['constraints'] if key in JOINTS]
+        assert {value for key, value in parameters.items()
+                if key.endswith('antiwindup_strategy')} <= set(ANTIWINDUP)
+
+
+@pytest.mark.parametrize('path', CONTROLLERS, ids=lambda path: path.name)
+def test_commands_in_the_comments_fit_the_file(path: Any) -> None:
+    types, (name,) = sections(path)[0], sections(path)[1]
+    text = path.read_text(encoding='utf-8')
+    assert f'spawner joint_state_broadcaster {name} ' in text
+    assert f'--param-file {path.name}' in text
+    topic = 'commands' if types[name].startswith('effort_') else 'joint_trajectory'
+    assert f":=/{name}/{topic}'" in text
+
+
+def test_there_is_a_controller_of_each_kind() -> None:
+    kinds = [(types[name], given[name].get('command_interfaces')) for path in CONTROLLERS
+             for types, given in [sections(path)] for name in given]
+    trajectory = 'joint_trajectory_controller/JointTrajectoryController'
+    assert kinds == [('effort_controllers/JointGroupEffortController', None),
+                     (trajectory, ['effort']), (trajectory, ['position', 'effort'])]

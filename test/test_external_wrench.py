@@ -1,0 +1,454 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The external wrench: known loads found again, its filter, its noise, and where it gives up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    random_motion, random_parameters, random_wrench, relative, rng, ROOT, smooth_motion)
+
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.errors import MotionError, PoseError, SingularityError
+from stewart_dynamics.external_wrench import Estimate, ExternalWrench, Measurement, Overload
+from stewart_dynamics.parameters import read_yaml
+from stewart_dynamics.plant import Plant, SimulatorParameters
+from stewart_dynamics.step import NO_WRENCH, Six
+
+Array = NDArray[np.float64]
+
+MACHINE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+HOME = Motion([0.0, 0.0, 1.1], np.eye(3))
+LOAD = (150.0, -100.0, 250.0, 60.0, -40.0, 80.0)
+BEGIN = 1_700_000_000_000_000_000
+MILLISECOND = 1_000_000
+# So high that nothing is left of the filter.
+UNFILTERED = {'external_wrench.cutoff': 1e9}
+
+
+def six(values: Any) -> Six:
+    a, b, c, d, e, f = np.asarray(values, dtype=float).tolist()
+    return a, b, c, d, e, f
+
+
+def measured(parameters: Parameters, motion: Motion, loads: Any, stamps: Sequence[int],
+             ) -> list[Measurement]:
+    """Return what is measured of a machine that moves so under these loads, (N, ...) of each."""
+    result = StewartPlatform(parameters).inverse_dynamics(motion, loads)
+    return [Measurement(stamp, six(lengths), six(rates), six(forces))
+            for stamp, lengths, rates, forces in zip(
+                stamps, result.lengths, result.rates, result.forces, strict=True)]
+
+
+def resting(parameters: Parameters, motion: Motion, load: Any, stamps: Sequence[int],
+            ) -> list[Measurement]:
+    """Return the same of a machine that rests in the pose of a motion under a load."""
+    still = Motion(motion.position, motion.rotation)
+    result = StewartPlatform(parameters).inverse_dynamics(still, load)
+    return [Measurement(stamp, six(result.lengths), six(result.rates), six(result.forces))
+            for stamp in stamps]
+
+
+def estimates(step: ExternalWrench, measurements: Sequence[Measurement], target: Motion = HOME,
+              known: Any = NO_WRENCH) -> list[Estimate]:
+    """Return what comes of measurements one after the other."""
+    found: list[Estimate] = []
+    row = tuple(target.rows.reshape(-1).tolist())
+    for each in measurements:
+        found.append(step(each, found[-1] if found else None, six(known), row))
+    return found
+
+
+def wrenches(found: Sequence[Estimate]) -> Array:
+    """Return the wrenches of all but the first, which has none, (N - 1, 6)."""
+    assert found[0].wrench is None
+    return np.array([each.wrench for each in found[1:]])
+
+
+def times(random: np.random.Generator, many: int) -> list[int]:
+    """Return stamps that are anything but regular, a microsecond to 50 ms apart."""
+    gaps = 10.0 ** random.uniform(3.0, math.log10(5e7), many)
+    return (BEGIN + np.cumsum(gaps).astype(int)).tolist()
+
+
+# Known loads
+
+def test_a_static_load_is_found() -> None:
+    """On random machines, beside a load that is known and not external."""
+    random = rng(1)
+    for _ in range(20):
+        parameters = random_parameters(random).replaced(UNFILTERED)
+        pose = random_motion(parameters, random, 1)
+        pose = Motion(pose.position[0], pose.rotation[0])
+        load, known = random_wrench(parameters, random, 2)
+        found = estimates(
+            ExternalWrench(parameters),
+            resting(parameters, pose, load + known, times(random, 3)), pose, known)
+        assert relative(wrenches(found), [load, load]) < 1e-9
+        assert relative(found[-1].motion[:3], pose.position) < 1e-9
+        differences = np.linalg.solve(
+            StewartPlatform(parameters).jacobian(pose.position, pose.rotation).T, -load)
+        assert relative(found[-1].differences, differences) < 1e-9
+
+
+def test_without_a_load_there_is_none() -> None:
+    found = estimates(ExternalWrench(MACHINE), resting(MACHINE, HOME, None, times(rng(2), 50)))
+    assert np.max(np.abs(wrenches(found))) < 1e-8  # of forces of 300 N
+
+
+def test_in_motion_it_is_what_the_equation_of_motion_leaves() -> None:
+    """
+    Not filtered, it is the mean over both ends of M dX'/dt + C X' + G - J_inv^T f - known.
+
+    Of forces that are not held but measured at the end this is off by an error of first order.
+    """
+    random = rng(3)
+    for _ in range(5):
+        parameters = random_parameters(random, actuators=False).replaced(UNFILTERED)
+        platform = StewartPlatform(parameters)
+        motion_at = smooth_motion(parameters, random)
+        load, known = random_wrench(parameters, random, 2)
+        largest = []
+        for interval in (4 * MILLISECOND, 2 * MILLISECOND, MILLISECOND):
+            stamps = list(range(BEGIN, BEGIN + 200 * MILLISECOND, interval))
+            motion = motion_at(np.subtract(stamps, BEGIN) * 1e-9)
+            data = measured(parameters, motion, load + known, stamps)
+            found = wrenches(estimates(ExternalWrench(parameters), data, motion_at(0.0), known))
+            pose = motion.position, motion.rotation
+            twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=1)
+            acceleration = np.diff(twist, axis=0) / (interval * 1e-9)
+            mass, jacobian = platform.mass_matrix(*pose), platform.jacobian(*pose)
+            rest = platform.gravity_vector(*pose) - known + np.einsum(
+                'nij,nj->ni', platform.coriolis_matrix(
+                    *pose, motion.linear_velocity, motion.angular_velocity), twist)
+            forces = np.array([each.forces for each in data[1:]])
+            left = sum(np.einsum('nij,nj->ni', mass[end], acceleration) + rest[end]
+                       - np.einsum('nji,nj->ni', jacobian[end], forces)
+                       for end in (slice(None, -1), slice(1, None)))
+            assert relative(found, 0.5 * left) < 1e-9
+            largest.append(np.max(np.abs(found - load)))
+        orders = np.log2(np.divide(largest[:-1], largest[1:]))
+        assert np.all(np.abs(orders - 1.0) < 0.1)
+
+
+# The filter
+
+def test_it_follows_a_step_by_the_closed_form_at_irregular_times() -> None:
+    """And back: 1 - exp(-2 pi cutoff t), then the decay of what it had."""
+    random = rng(4)
+    cutoff = 3.0
+    step = ExternalWrench(MACHINE.replaced({'external_wrench.cutoff': cutoff}))
+    stamps = times(random, 400)
+    found = estimates(step, [*resting(MACHINE, HOME, LOAD, stamps[:200]),
+                             *resting(MACHINE, HOME, None, stamps[200:])])
+    since = 2.0 * math.pi * cutoff * np.subtract(stamps, stamps[0])[1:] * 1e-9
+    share = -np.expm1(-since[:199])
+    share = np.concatenate([share, share[-1] * np.exp(since[198] - since[199:])])
+    assert relative(wrenches(found), share[:, None] * LOAD) < 1e-9
+
+
+def noisy(parameters: Parameters, interval: int, many: int, deviation: float, seed: int,
+          ) -> tuple[list[Measurement], Array]:
+    """Return a machine at rest whose rates have noise, and that noise (many, 6) [m/s]."""
+    stamps = range(BEGIN, BEGIN + many * interval, interval)
+    rest = resting(parameters, HOME, None, stamps)
+    noise = deviation * rng(seed).standard_normal((many, 6))
+    return [each._replace(rates=six(rate))
+            for each, rate in zip(rest, noise, strict=True)], noise
+
+
+@pytest.mark.parametrize('interval', [10_000_000, 1_000_000, 100_000])
+def test_noise_is_bounded_however_short_the_time_between_measurements(interval: int) -> None:
+    """
+    White noise in the rates comes out as at most K M J_inv^-1 times itself, K = 2 pi cutoff.
+
+    The gain is K x (1 - exp(-x)) sqrt(2 / (1 + exp(-x))) / x^2 with x = K dt, from the filter's
+    transfer function, K (1 - z^-1) (1 - a) / x / (1 - a z^-1).
+    """
+    frictionless = MACHINE.replaced(
+        {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0})
+    deviation, many = 1e-4, 20_000
+    found = estimates(ExternalWrench(frictionless),
+                      noisy(frictionless, interval, many, deviation, 5)[0])
+    platform = StewartPlatform(frictionless)
+    per_rate = platform.mass_matrix(HOME.position, HOME.rotation) @ np.linalg.inv(
+        platform.jacobian(HOME.position, HOME.rotation))
+    gain = 2.0 * math.pi * 10.0
+    x = gain * interval * 1e-9
+    expected = deviation * gain * -math.expm1(-x) / x * math.sqrt(2.0 / (1.0 + math.exp(-x)))
+    deviations = np.std(np.linalg.solve(per_rate, wrenches(found).T), axis=1)
+    assert expected <= deviation * gain
+    assert np.all(np.abs(deviations - expected) < 0.05 * expected)
+    # The difference quotient alone.
+    raw = estimates(ExternalWrench(frictionless.replaced(UNFILTERED)),
+                    noisy(frictionless, interval, 1000, deviation, 5)[0])
+    rough = np.std(np.linalg.solve(per_rate, wrenches(raw).T), axis=1)
+    assert np.all(rough > 0.9 * math.sqrt(2.0) * deviation / (interval * 1e-9))
+
+
+def test_it_is_a_momentum_observer() -> None:
+    """De Luca's residual, r = K (p - integral(J_inv^T f - G + r)), of the same noisy data."""
+    frictionless = MACHINE.replaced(
+        {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0})
+    platform = StewartPlatform(frictionless)
+    interval, many = 100_000, 10_000
+    data, noise = noisy(frictionless, interval, many, 1e-4, 6)
+    touched = resting(frictionless, HOME, LOAD, [0])[0].forces
+    data = [each._replace(forces=touched) if 3000 <= n < 7000 else each
+            for n, each in enumerate(data)]
+    mass = platform.mass_matrix(HOME.position, HOME.rotation)
+    jacobian = platform.jacobian(HOME.position, HOME.rotation)
+    gravity = platform.gravity_vector(HOME.position, HOME.rotation)
+    momentum = np.linalg.solve(jacobian, noise.T).T @ mass
+    gain, dt = 2.0 * math.pi * 10.0, interval * 1e-9
+    residual, integral, observed = np.zeros(6), np.zeros(6), []
+    for n in range(1, many):
+        integral += dt * (jacobian.T @ data[n].forces - gravity + residual)
+        residual = gain * (momentum[n] - momentum[0] - integral)
+        observed.append(residual)
+    found = wrenches(estimates(ExternalWrench(frictionless), data))
+    # Euler's rule for the integral: off by K dt / 2 of what there is.
+    assert relative(found, observed) < gain * dt
+    assert relative(np.std(found[:2900], axis=0), np.std(observed[:2900], axis=0)) < gain * dt
+
+
+# Time
+
+def test_there_is_no_wrench_before_two_measurements_and_after_a_gap() -> None:
+    step = ExternalWrench(MACHINE)
+    gap = 100 * MILLISECOND
+    stamps = [0, gap, 2 * gap + 1, 2 * gap + 2, MILLISECOND, 2 * MILLISECOND]
+    found = estimates(step, resting(MACHINE, HOME, LOAD, stamps))
+    assert [each.wrench is None for each in found] == [True, False, True, False, True, False]
+    assert [each.differences is None for each in found] == [each.wrench is None for each in found]
+    # The filter has begun anew: of a nanosecond there is next to nothing.
+    assert found[1].force > 200.0
+    assert 0.0 < found[3].force < 1e-4
+
+
+def test_the_acceleration_is_the_mean_one() -> None:
+    motion_at = smooth_motion(MACHINE, rng(7))
+    motion = motion_at([0.0, 0.01])
+    found = estimates(ExternalWrench(MACHINE), measured(
+        MACHINE, motion, None, [BEGIN, BEGIN + 10 * MILLISECOND]), motion_at(0.0))
+    assert relative(found[1].motion[12:18], np.concatenate(
+        [motion.linear_velocity[1], motion.angular_velocity[1]])) < 1e-9
+    assert relative(found[1].motion[18:21], np.diff(motion.linear_velocity, axis=0) / 0.01) < 1e-9
+    assert found[0].motion[18:] == NO_WRENCH
+
+
+# The pose to begin with
+
+def test_it_begins_at_home_where_nothing_is_known() -> None:
+    for parameters in (MACHINE, random_parameters(rng(8))):
+        size = float(np.mean(np.linalg.norm(parameters['geometry.base_joints'], axis=1)))
+        pose = HOME if parameters is MACHINE else Motion([0.0, 0.0, size], np.eye(3))
+        at = resting(parameters, pose, None, [BEGIN])[0]
+        found = ExternalWrench(parameters)(at, None, NO_WRENCH, None)
+        assert relative(found.motion[:3], pose.position) < 1e-9
+
+
+def test_it_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
+    """Below the base there is a pose of the same lengths."""
+    below = Motion([0.0, 0.0, -1.1], np.eye(3))
+    step = ExternalWrench(MACHINE)
+    at = resting(MACHINE, HOME, None, [BEGIN])[0]
+    found = step(at, None, NO_WRENCH, below.rows.tolist())
+    assert relative(found.motion[:3], below.position) < 1e-9
+    again = step(at, found._replace(stamp=BEGIN + 10 ** 12), NO_WRENCH, HOME.rows.tolist())
+    assert relative(again.motion[:3], below.position) < 1e-9
+    # From a last pose that leads nowhere: the setpoint is asked.
+    flat = found._replace(stamp=0, motion=tuple(Motion([0.0, 0.0, 0.0], np.eye(3)).rows.tolist()))
+    assert relative(step(at, flat, NO_WRENCH, HOME.rows.tolist()).motion[:3],
+                    HOME.position) < 1e-9
+    # But not within a series.
+    with pytest.raises(SingularityError, match=r'lengths \['):
+        step(at, flat._replace(stamp=BEGIN - 1), NO_WRENCH, HOME.rows.tolist())
+
+
+# What cannot be
+
+def test_lengths_of_no_pose_are_an_error() -> None:
+    at = resting(MACHINE, HOME, None, [BEGIN])[0]
+    step = ExternalWrench(MACHINE)
+    for lengths in ((0.1, *at.lengths[1:]), (-1.0,) * 6, (1e300,) * 6):
+        with pytest.raises((PoseError, SingularityError), match=r'lengths \['):
+            step(at._replace(lengths=six(lengths)), None, NO_WRENCH, HOME.rows.tolist())
+    with pytest.raises(PoseError, match=r'after \d+ steps a length is .* m off'):
+        step(at._replace(lengths=(9.0, *at.lengths[1:])), None, NO_WRENCH, HOME.rows.tolist())
+
+
+@pytest.mark.parametrize('changed', [
+    {'rates': (1e308,) * 6}, {'forces': (1e308,) * 6}], ids=str)
+def test_numbers_that_overflow_are_an_error(changed: dict[str, Any]) -> None:
+    step = ExternalWrench(MACHINE)
+    first, second = resting(MACHINE, HOME, None, [BEGIN, BEGIN + 1])
+    before = estimates(step, [first])[0]
+    with pytest.raises(MotionError, match=f'stamp {BEGIN + 1} ns'):
+        step(second._replace(**changed), before, NO_WRENCH, None)
+    # It leaves nothing behind.
+    assert step(second, before, NO_WRENCH, None) == estimates(step, [first, second])[1]
+
+
+# Thresholds
+
+def test_what_is_beyond_a_threshold_is_said() -> None:
+    parameters = MACHINE.replaced({**UNFILTERED, 'external_wrench.force_max': 50.0})
+    rest = resting(MACHINE, HOME, (30.0, 0.0, 40.1, 3.0, 0.0, 4.0), [0, MILLISECOND])
+    found = estimates(ExternalWrench(parameters), rest)[1]
+    assert found.overloads == (Overload('external_wrench.force_max', found.force, 50.0),)
+    assert (found.force, found.moment) == pytest.approx((math.hypot(30.0, 40.1), 5.0))
+    both = MACHINE.replaced({**UNFILTERED, 'external_wrench.force_max': 51.0,
+                             'external_wrench.moment_max': 4.9})
+    found = estimates(ExternalWrench(both), rest)[1]
+    assert [each.limit for each in found.overloads] == ['external_wrench.moment_max']
+    assert estimates(ExternalWrench(MACHINE), rest)[1].overloads == ()
+
+
+# In the simulator
+
+@dataclass
+class Course:
+    """What the plant did under control, and what was estimated of it."""
+
+    applied: Array
+    found: Array
+    """(N, 6), nan of the first."""
+    poses: float
+    """The largest distance of an estimated pose from the true one [m]."""
+
+
+def controlled(seconds: float, load_at: Callable[[float], Any], **changes: Any) -> Course:
+    """Let the plant follow a motion by PD and feed-forward, under loads, and measure it."""
+    given = {**read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator'),
+             'initial_pose': [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]}
+    simulated = SimulatorParameters({**given, **{
+        name.replace('__', '.'): value for name, value in changes.items()}})
+    plant = Plant(simulated)
+    rate = simulated['rate']
+    seconds_at = np.arange(round(seconds * rate)) / rate
+    wanted = StewartPlatform(MACHINE).inverse_dynamics(swing(seconds_at))
+    noise = rng(9)
+    deviations = [simulated[f'noise.{what}'] for what in ('length', 'rate', 'force')]
+    step, last = ExternalWrench(MACHINE), None
+    applied, found = np.empty((len(seconds_at), 6)), np.full((len(seconds_at), 6), np.nan)
+    off = 0.0
+    for n, now in enumerate(seconds_at.tolist()):
+        state = plant.state
+        command = (wanted.forces[n] + 61.0 * 900.0 * (wanted.lengths[n] - state.lengths)
+                   + 61.0 * 42.0 * (wanted.rates[n] - state.rates))
+        applied[n] = load_at(now)
+        state = plant.advance(six(command), six(applied[n]))
+        spoilt = [six(np.array(part) + deviation * noise.standard_normal(6)) for part, deviation
+                  in zip((state.lengths, state.rates, state.forces), deviations, strict=True)]
+        last = step(Measurement(BEGIN + round((n + 1) * 1e9 / rate), *spoilt), last, NO_WRENCH,
+                    None)
+        if last.wrench is not None:
+            found[n] = last.wrench
+        off = max(off, math.dist(last.motion[:3], state.pose[:3]))
+    assert not plant.fault
+    return Course(applied, found, off)
+
+
+def swing(seconds: Any) -> Motion:
+    """Return a bounded motion of all six coordinates, at rest at first."""
+    t = np.asarray(seconds, dtype=float)[..., None]
+    amplitudes = np.array([0.05, 0.04, 0.06, 0.1, 0.08, 0.12])
+    rates = 2.0 * np.pi * np.array([0.5, 0.7, 0.6, 0.45, 0.55, 0.65])
+    # (1 - cos) / 2 has no velocity at the start; its acceleration is the motor's to give.
+    pose = 0.5 * amplitudes * (1.0 - np.cos(rates * t))
+    rate = 0.5 * amplitudes * rates * np.sin(rates * t)
+    acceleration = 0.5 * amplitudes * rates ** 2 * np.cos(rates * t)
+    return Motion.from_euler(pose[..., :3] + [0.0, 0.0, 1.1], pose[..., 3:], rate[..., :3],
+                             rate[..., 3:], acceleration[..., :3], acceleration[..., 3:])
+
+
+def found_within(course: Course, rate: float, begin: float, end: float) -> float:
+    """Return the largest error of force or moment by the load's, once the filter has settled."""
+    # exp(-2 pi 10 Hz 0.1 s) is 0.2 %.
+    settled = slice(round((begin + 0.1) * rate), round(end * rate))
+    found, load = course.found[settled], course.applied[settled]
+    return max(float(np.max(np.linalg.norm((found - load)[:, part], axis=1)
+                            / np.linalg.norm(load[:, part], axis=1)))
+               for part in (slice(0, 3), slice(3, 6)))
+
+
+@pytest.mark.parametrize('rate', [1000.0, 500.0, 100.0])
+def test_a_wrench_on_the_moving_plant_is_found_within_5_percent(rate: float) -> None:
+    """Force and moment at every moment from 0.1 s after it came; and gone again when it goes."""
+    course = controlled(4.0, lambda now: LOAD if 1.0 <= now < 3.0 else NO_WRENCH, rate=rate)
+    assert found_within(course, rate, 1.0, 3.0) < 0.05
+    assert course.poses < 1e-9
+    before, after = (course.found[round(begin * rate):round(end * rate)]
+                     for begin, end in ((0.1, 1.0), (3.1, 4.0)))
+    for rest in (before, after):
+        assert np.max(np.linalg.norm(rest[:, :3], axis=1)) < 0.05 * np.linalg.norm(LOAD[:3])
+        assert np.max(np.linalg.norm(rest[:, 3:], axis=1)) < 0.05 * np.linalg.norm(LOAD[3:])
+
+
+def test_and_with_noise() -> None:
+    """Of 0.01 mm, 0.1 mm/s and 5 N in each leg, at 1 kHz."""
+    course = controlled(
+        4.0, lambda now: LOAD if 1.0 <= now < 3.0 else NO_WRENCH, rate=1000.0,
+        noise__length=1e-5, noise__rate=1e-4, noise__force=5.0)
+    assert found_within(course, 1000.0, 1.0, 3.0) < 0.05
+
+
+def test_held_forces_leave_an_error_of_second_order() -> None:
+    """Not filtered, of a machine that is let go under held forces and a load, no friction."""
+    frictionless = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
+    held = six(0.8 * StewartPlatform(MACHINE).inverse_dynamics(HOME).forces)
+    largest = []
+    for rate in (50.0, 100.0, 200.0):
+        plant = Plant(SimulatorParameters({
+            **read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator'), **frictionless,
+            'initial_pose': [0.0, 0.0, 1.1, 0.1, 0.05, 0.1], 'rate': rate}))
+        data = []
+        for n in range(round(0.2 * rate)):
+            state = plant.advance(held, LOAD)
+            data.append(Measurement(
+                round(n * 1e9 / rate), state.lengths, state.rates, state.forces))
+        found = wrenches(estimates(
+            ExternalWrench(MACHINE.replaced({**UNFILTERED, **frictionless})), data))
+        largest.append(np.max(np.abs(found - LOAD)))
+    orders = np.log2(np.divide(largest[:-1], largest[1:]))
+    assert np.all(np.abs(orders - 2.0) < 0.2)
+
+
+CODE = """
+from test_external_wrench import *
+found = estimates(ExternalWrench(MACHINE), [*measured(
+    MACHINE, swing(np.arange(20) * 1e-3), LOAD, range(BEGIN, BEGIN + 20_000_000, 1_000_000))])
+print([np.array(each.wrench).tobytes().hex() for each in found[1:]], found[-1])
+"""
+
+
+def test_compiled_and_not_gives_the_same_bits() -> None:
+    printed = {subprocess.run(
+        [sys.executable, '-c', CODE], check=True, stdout=subprocess.PIPE, text=True,
+        cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': off}).stdout
+        for off in ('0', '1')}
+    assert len(printed) == 1
+    assert len(printed.pop()) > 1000

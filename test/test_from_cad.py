@@ -1,0 +1,164 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page from CAD to the controller: its program runs, its numbers and words are the code's."""
+
+from __future__ import annotations
+
+from contextlib import redirect_stdout
+import io
+from pathlib import Path
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import ROOT
+
+from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.plausibility import doubts
+
+PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
+MACHINE, = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
+
+
+@pytest.fixture(scope='module')
+def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Run the page's program, compare what it prints, and return its names."""
+    folder = tmp_path_factory.mktemp('machine')
+    (folder / 'my_machine.yaml').write_text(MACHINE, encoding='utf-8')
+    parts = re.findall(r'```python\n(.*?)```\n```text\n(.*?)```', PAGE, flags=re.DOTALL)
+    assert len(parts) == PAGE.count('```python') == 5
+    program: dict[str, Any] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for code, expected in parts:
+            with redirect_stdout(io.StringIO()) as printed:
+                exec(compile(code, 'from_cad_to_controller.md', 'exec'), program)
+            assert printed.getvalue() == expected
+    return program
+
+
+def test_the_file_on_the_page_is_the_machine_that_is_computed(names: dict[str, Any]) -> None:
+    assert names['platform'].parameters == names['parameters']
+    assert doubts(names['parameters']) == ()
+
+
+def test_the_node_gives_the_forces_on_the_page(
+        names: dict[str, Any], start: Any, tmp_path: Path) -> None:
+    pytest.importorskip('rclpy')
+    from running import log_lines, Sample
+    file = tmp_path / 'my_machine.yaml'
+    file.write_text(MACHINE, encoding='utf-8')
+    node = start('setpoint.source:=pose', file=file)
+    node.until_active()
+    state = node.answer(Sample(tuple(names['home'].tolist())))
+    assert list(state.effort) == pytest.approx(names['at_rest'].forces.tolist(), abs=1e-9)
+    strokes = re.findall(r'`position` is (\d\.\d+) six times', PAGE)
+    assert [f'{position:.4f}' for position in state.position] == strokes * 6
+    node.stop()
+    assert log_lines(node.program.stderr, 'WARN') == []
+
+
+# What the node says of a mistake: the words on the page, and what is done wrong.
+def mistakes(names: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Return of each mistake that is told the changes that make it."""
+    p = names['parameters']
+    in_mm = {name: 1e3 * p[name] for name in ('geometry.base_joints', 'geometry.platform_joints')}
+    moments = names['inertia'][np.diag_indices(3)]
+    products = names['inertia'][np.triu_indices(3, 1)]
+    return {
+        'joints in mm': [in_mm],
+        'inertia in g mm^2 or kg mm^2': [
+            {'platform.inertia': factor * p['platform.inertia']} for factor in (1e9, 1e6)],
+        '`zero_length` or limits in mm': [
+            {'limits.length_min': 620.0, 'limits.length_max': 920.0,
+             'geometry.zero_length': 620.0}],
+        '`force_max` in kN': [{'limits.force_max': 2.49}],
+        'a number without a point': [{'platform.mass': 21}],
+        'moments first, then products: ixx iyy izz ixy ixz iyz': [
+            {'platform.inertia': np.concatenate([moments, products])}],
+        'platform joints that begin with another leg': [
+            {'geometry.platform_joints': np.roll(p['geometry.platform_joints'], by, axis=0)}
+            for by in (1, 3, 5)],
+        "center of mass from CAD's origin": [
+            {'platform.center_of_mass': names['axes'] @ names['center_cad']}]}
+
+
+def _rows() -> dict[str, tuple[str, ...]]:
+    section = PAGE.split('## 6. ')[1].split('## 7. ')[0]
+    cells = [tuple(cell.strip() for cell in line.strip('|').split('|'))
+             for line in section.splitlines() if line.startswith('|')][2:]
+    return {mistake: rest for mistake, *rest in cells}
+
+
+def test_what_the_node_says_of_mistakes_is_what_the_page_says(names: dict[str, Any]) -> None:
+    rows = _rows()
+    told = mistakes(names)
+    assert set(told) == {mistake for mistake, (said, _) in rows.items()
+                         if not said.startswith('nothing')}
+    for mistake, changes in told.items():
+        for change in changes:
+            try:
+                said = '\n'.join(doubts(names['parameters'].replaced(change)))
+            except ParameterError as exc:
+                said = str(exc)
+                assert 'does not start' in rows[mistake][0]
+            for words in re.findall('`([^`]+)`', rows[mistake][0]):
+                assert words in said, (mistake, said)
+
+
+def test_what_the_node_cannot_see_shows_as_the_page_says(names: dict[str, Any]) -> None:
+    p, axes = names['parameters'], names['axes']
+    mirrored = {name: p[name] * [1.0, -1.0, 1.0] for name in (
+        'geometry.base_joints', 'geometry.platform_joints')}
+    by_two = {'geometry.platform_joints': np.roll(p['geometry.platform_joints'], 2, axis=0)}
+    for change in (mirrored, by_two, {'geometry.zero_length': 0.77},
+                   {'platform.inertia': p['platform.inertia'] * [1, -1, -1, 1, -1, 1]},
+                   {'actuator.reflected_mass': 1.4e-5}):
+        assert doubts(p.replaced(change)) == ()
+
+    # The other three legs become longer in the mirror image.
+    mirror = StewartPlatform(p.replaced(mirrored))
+    turned = names['turned']
+    change = mirror.inverse_kinematics(turned.position, turned.rotation) - names['lengths']
+    longer = {n for n in range(6) if names['change'][n] > 0.0}
+    assert {n for n in range(6) if change[n] > 0.0} == set(range(6)) - longer
+    # Forces do not depend on the zero length.
+    other = StewartPlatform(p.replaced({'geometry.zero_length': 0.77}))
+    at_rest = other.inverse_dynamics(Motion(names['home'], np.eye(3)))
+    assert np.array_equal(at_rest.forces, names['at_rest'].forces)
+
+    c = 1e-3 * axes @ names['center_cad']
+    about_origin = names['inertia'] + names['mass'] * (c @ c * np.eye(3) - np.outer(c, c))
+    largest = np.linalg.eigvalsh(about_origin)[-1]
+    assert f'{largest:.1f} kg m^2' in PAGE
+    assert np.sqrt(largest / names['mass']) == pytest.approx(1.0, abs=0.05)
+    inertia = names['rotor'] + names['screw']
+    for lead, unit in ((10.0, 1.0), (0.010, 1.0 / (2.0 * np.pi))):
+        mass = inertia * (2.0 * np.pi * unit / lead) ** 2
+        assert f'{mass:.2g} kg'.replace('e-05', 'e-5') in PAGE
+    assert 6 * names['reflected_mass'] > names['mass']
+    assert names['reflected_mass'] == pytest.approx(2 / 3 * names['mass'], rel=0.05)
+
+
+def test_the_page_is_one_that_is_read_in_ten_minutes() -> None:
+    assert len(PAGE.split()) < 2000
+
+
+def test_controllers_of_the_page_are_those_of_the_files() -> None:
+    section = PAGE.split('## 7. ')[1]
+    for path in sorted((ROOT / 'config' / 'controllers').glob('*.yaml')):
+        assert f'](../config/controllers/{path.name})' in section

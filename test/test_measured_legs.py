@@ -1,0 +1,229 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages on ~/measured_legs: any layout, any order of names, and every reason of refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import math
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from messages import STORE
+import numpy as np
+import pytest
+from test_external_wrench import (
+    BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, six, swing)
+
+from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.external_wrench import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.measured_legs import (
+    LACKING, MEASURED_LEGS, MeasuredLegs, NO_POSE, SINGULAR, UNEVEN, UNSTAMPED, WITHOUT)
+from stewart_dynamics.setpoints import (
+    MALFORMED, NOT_FINITE, OUT_OF_RANGE, Refusal, TOO_OLD, TWICE)
+from stewart_dynamics.step import NO_WRENCH
+
+KIND = 'sensor_msgs/msg/JointState'
+JOINTS = list(MACHINE['joints'])
+TARGET = tuple(HOME.rows.tolist())
+ZERO_LENGTHS = MACHINE['geometry.zero_length']
+
+
+def joint_state(stamp: int, names: Sequence[str], position: Any, velocity: Any, effort: Any,
+                frame: str = '', little_endian: bool = True) -> bytes:
+    """Return a JointState, serialized by rosbags."""
+    header = STORE.types['std_msgs/msg/Header'](
+        STORE.types['builtin_interfaces/msg/Time'](*divmod(stamp, 1_000_000_000)), frame)
+    message = STORE.types[KIND](header, list(names), *(
+        np.array(numbers, dtype=float) for numbers in (position, velocity, effort)))
+    return bytes(STORE.serialize_cdr(message, KIND, little_endian=little_endian))
+
+
+def message_of(at: Measurement, **options: Any) -> bytes:
+    """Return the message that says a measurement of MACHINE."""
+    return joint_state(at.stamp, JOINTS, at.lengths - ZERO_LENGTHS, at.rates, at.forces, **options)
+
+
+class Followed:
+    """Measured legs, and what was said of them."""
+
+    def __init__(self, parameters: Parameters = MACHINE) -> None:
+        self.refused: list[tuple[Refusal, str]] = []
+        self.noticed: list[str] = []
+        self._legs = MeasuredLegs(
+            parameters, ExternalWrench(parameters),
+            lambda refusal, details: self.refused.append((refusal, details)), self.noticed.append)
+
+    def take(self, data: bytes) -> Estimate | None:
+        return self._legs.take(data, NO_WRENCH, TARGET)
+
+    def refuses(self, data: bytes, reason: str, details: str) -> None:
+        """Check that a message is refused, for which reason and with which details."""
+        many = len(self.refused)
+        assert self.take(data) is None
+        assert len(self.refused) == many + 1
+        refusal, said = self.refused[-1]
+        assert refusal == (MEASURED_LEGS, reason)
+        assert details in said
+        assert '\n' not in said
+
+
+REST = resting(MACHINE, HOME, LOAD, range(BEGIN, BEGIN + 50 * MILLISECOND, MILLISECOND))
+EXPECTED = estimates(ExternalWrench(MACHINE), [
+    each._replace(lengths=six(each.lengths - ZERO_LENGTHS + ZERO_LENGTHS))
+    for each in REST])
+
+
+def test_what_comes_of_messages_is_what_the_step_makes_of_their_numbers() -> None:
+    followed = Followed()
+    assert [followed.take(message_of(each)) for each in REST] == EXPECTED
+    assert not followed.refused
+    assert not followed.noticed
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(st.data())
+def test_any_order_of_names_with_others_among_them(data: st.DataObject) -> None:
+    """Others' numbers may be anything; the layout may change from message to message."""
+    text = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=9)
+    followed = Followed()
+    names: list[str] = []
+    frame, little_endian = '', True
+    for n, at in enumerate(REST[:6]):
+        if n % 2 == 0:
+            more = data.draw(st.lists(text.filter(lambda name: name not in JOINTS), max_size=4))
+            names = data.draw(st.permutations([*JOINTS, *more]))
+            frame, little_endian = data.draw(text), data.draw(st.booleans())
+        arrays = []
+        for numbers in (at.lengths - ZERO_LENGTHS, at.rates, at.forces):
+            of = dict(zip(JOINTS, np.asarray(numbers).tolist(), strict=True))
+            arrays.append([of.get(name, math.nan) for name in names])
+        assert followed.take(joint_state(
+            at.stamp, names, *arrays, frame=frame, little_endian=little_endian)) == EXPECTED[n]
+    assert not followed.refused
+
+
+def test_bytes_that_only_fill_are_not_looked_at() -> None:
+    """Fast DDS fills messages up to four bytes, and what aligns numbers may be anything."""
+    followed = Followed()
+    for at, filling in zip(REST[:8], (b'', b'\0', b'\0', b'\xff\xff\xff', b'', b'\1', b'\2', b''),
+                           strict=True):
+        assert followed.take(message_of(at, frame='abc') + filling) is not None
+    assert not followed.refused
+
+
+# Refusals
+
+def changed(**fields: Any) -> Callable[[Measurement], bytes]:
+    """Return what makes a message with other fields of a measurement."""
+    def make(at: Measurement) -> bytes:
+        given = {'names': JOINTS, 'position': at.lengths - ZERO_LENGTHS, 'velocity': at.rates,
+                 'effort': at.forces, **fields}
+        return joint_state(at.stamp, **given)
+    return make
+
+
+@pytest.mark.parametrize(('make', 'reason', 'details'), [
+    (changed(names=[*JOINTS[:5], 'elbow']), LACKING,
+     'leg_6; there are leg_1, leg_2, leg_3, leg_4, leg_5, elbow'),
+    (changed(names=[], position=[], velocity=[], effort=[]), LACKING, 'there are none'),
+    (changed(position=[]), WITHOUT, 'no position'),
+    (changed(velocity=[], effort=[]), WITHOUT, 'no velocity and no effort'),
+    (changed(effort=[1.0] * 5), UNEVEN, '6 names, 5 of effort'),
+    (changed(names=[*JOINTS, 'elbow']), UNEVEN,
+     '7 names, 6 of position, 6 of velocity, 6 of effort'),
+    (changed(position=[math.nan] + [0.3] * 5), NOT_FINITE, 'nan'),
+    (changed(velocity=[0.0] * 5 + [math.inf]), NOT_FINITE, 'inf'),
+    (changed(effort=[-math.inf] + [0.0] * 5), NOT_FINITE, '-inf'),
+    (changed(velocity=[1e308] * 6), OUT_OF_RANGE, f'stamp {BEGIN + MILLISECOND} ns'),
+    (changed(position=[9.0, 0.3, 0.3, 0.3, 0.3, 0.3]), NO_POSE,
+     'lengths [9.95, 1.25, 1.25, 1.25, 1.25, 1.25] m: after '),
+    (changed(position=[-3.0] * 6), NO_POSE, ' m off'),
+    (lambda at: message_of(at._replace(stamp=0)), UNSTAMPED, 'the time between'),
+    (lambda at: message_of(at)[:-9], MALFORMED, ' bytes: '),
+    (lambda at: b'', MALFORMED, '0 bytes'),
+    (lambda at: b'\0\2' + message_of(at)[2:], MALFORMED, ' bytes: '),
+    (lambda at: b'\1\1' + message_of(at)[2:], MALFORMED, 'encapsulation 0101'),
+    (lambda at: message_of(at)[:8] + b'\xff' * 4 + message_of(at)[12:], MALFORMED,
+     'stamp of 4294967295 ns'),
+    (lambda at: message_of(at._replace(stamp=BEGIN)), TWICE, f'stamp {BEGIN} ns'),
+    (lambda at: message_of(at._replace(stamp=BEGIN - 2 * MILLISECOND)), TOO_OLD,
+     'is 0.002 s older than the last used'),
+])
+def test_what_is_refused_is_as_if_it_never_came(
+        make: Callable[[Measurement], bytes], reason: str, details: str) -> None:
+    followed = Followed()
+    assert followed.take(message_of(REST[0])) == EXPECTED[0]
+    followed.refuses(make(REST[1]), reason, details)
+    assert followed.take(message_of(REST[2])) == estimates(
+        ExternalWrench(MACHINE), [REST[0], REST[2]])[1]
+    assert len(followed.refused) == 1
+
+
+def test_a_machine_that_is_singular_everywhere_is_refused() -> None:
+    """Base and platform are similar hexagons."""
+    similar = MACHINE.replaced({
+        'geometry.base_joints': (1.5 * MACHINE['geometry.platform_joints']).ravel()})
+    followed = Followed(similar)
+    lengths = StewartPlatform(similar).inverse_kinematics([0.0, 0.0, 1.1], np.eye(3))
+    followed.refuses(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(st.binary(max_size=120), st.integers(0, 400), st.integers(0, 255))
+def test_whatever_comes_a_wrench_is_of_numbers(noise: bytes, at: int, byte: int) -> None:
+    followed = Followed()
+    sound = message_of(REST[0])
+    for data in (noise, sound[:at] + noise, sound[:at] + bytes([byte]) + sound[at + 1:],
+                 message_of(REST[1]), message_of(REST[2])):
+        found = followed.take(data)
+        if found is not None and found.wrench is not None:
+            assert np.all(np.isfinite(found.wrench))
+
+
+# Time
+
+def test_a_jump_back_is_a_restart() -> None:
+    followed = Followed()
+    late = 10 ** 12
+    for at in REST[:3]:
+        assert followed.take(message_of(at._replace(stamp=at.stamp + late))) is not None
+    assert [followed.take(message_of(each)) for each in REST] == EXPECTED
+    assert followed.noticed == [
+        'measured_legs: stamps jumped back by 1000 s: followed as a restart']
+    assert not followed.refused
+
+
+def test_after_a_gap_it_begins_anew() -> None:
+    followed = Followed()
+    for at in REST[:3]:
+        followed.take(message_of(at._replace(stamp=at.stamp - 10 ** 12)))
+    assert [followed.take(message_of(each)) for each in REST] == EXPECTED
+    assert not followed.refused
+
+
+def test_where_no_pose_is_found_for_long_the_setpoint_is_asked() -> None:
+    """Such a machine was moved meanwhile; until then only the last pose is believed."""
+    followed = Followed()
+    assert followed.take(message_of(REST[0])) is not None
+    away = StewartPlatform(MACHINE).inverse_dynamics(swing(0.9))
+    for n in range(1, 4):
+        followed.refuses(changed(position=[5.0, 0.3, 0.3, 0.3, 0.3, 0.3])(
+            REST[0]._replace(stamp=BEGIN + n * 30 * MILLISECOND)), NO_POSE, ' m off')
+    found = followed.take(changed(position=away.lengths - ZERO_LENGTHS)(
+        REST[0]._replace(stamp=BEGIN + 120 * MILLISECOND)))
+    assert found is not None
+    assert found.wrench is None

@@ -1,0 +1,159 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Planned motions over real topics: answered beside the setpoints, and never half."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+import numpy as np
+from rclpy.serialization import deserialize_message
+from running import (
+    bits, DynamicsNode, HOME, log_lines, nanoseconds, NODE, Planner, Sample, wrench_message)
+from trajectory_msgs.msg import JointTrajectory
+
+from stewart_dynamics import StewartPlatform
+
+Start = Callable[..., DynamicsNode]
+
+OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
+
+RISEN = HOME._replace(position=(0.01, -0.02, 1.13))
+MOTION = [HOME, RISEN, HOME._replace(position=(0.02, 0.0, 1.1)), HOME]
+TOO_HIGH = HOME._replace(position=(0.0, 0.0, 1.9))
+
+
+def check(answer: JointTrajectory, samples: list[Sample], platform: StewartPlatform,
+          wrench: tuple[float, ...] | None = None) -> None:
+    """Check all bits of an answer against the library's."""
+    parameters = platform.parameters
+    assert list(answer.joint_names) == list(parameters['joints'])
+    assert answer.header.frame_id == ''
+    assert len(answer.points) == len(samples)
+    for point, sample in zip(answer.points, samples, strict=True):
+        result = platform.inverse_dynamics(sample.motion(), wrench)
+        assert bits(point.positions) == bits(result.lengths - parameters['geometry.zero_length'])
+        assert bits(point.velocities) == bits(result.rates)
+        assert bits(point.effort) == bits(result.forces)
+        assert len(point.accelerations) == 0
+
+
+def test_a_motion_is_answered_with_the_librarys_bits(start: Start) -> None:
+    node = start()
+    node.until_active()
+    planner = Planner(node)
+    planner.send(MOTION, step=500_000_000, stamp=123_456_789_012)
+    answer = planner.until_answered(1)
+    check(answer, MOTION, node.platform)
+    assert nanoseconds(answer.header.stamp) == 123_456_789_012
+    assert [nanoseconds(point.time_from_start) for point in answer.points] == [
+        0, 500_000_000, 1_000_000_000, 1_500_000_000]
+    node.until_status('trajectory', OK, 'answered: 4 points over 1.5 s')
+    assert node.values('trajectory')['answered'] == '1'
+    # The load that ~/wrench last gave holds for it as for setpoints.
+    load = (100.0, -50.0, -300.0, 20.0, 10.0, -5.0)
+    node.publish('wrench', wrench_message(load))
+    expected = node.result_of(HOME, load)
+    node.until(lambda: bits(node.state_of(node.send()).effort) == bits(expected.forces),
+               'the load has come')
+    planner.send(MOTION, step=500_000_000)
+    check(planner.until_answered(2), MOTION, node.platform, load)
+    node.stop()
+
+
+def test_without_effort_there_is_none(start: Start) -> None:
+    node = start('trajectory.effort:=false', 'singularity.warn_condition:=2.0')
+    node.until_active()
+    planner = Planner(node)
+    planner.send(MOTION, step=500_000_000)
+    answer = planner.until_answered(1)
+    assert [len(point.effort) for point in answer.points] == [0] * 4
+    assert [len(point.velocities) for point in answer.points] == [6] * 4
+    node.until_status('trajectory', WARN, 'singularity.warn_condition, 2')
+    node.until(lambda: any('warn_condition, 2' in line for line in log_lines(
+        node.program.stderr, 'WARN')), 'it is logged')
+
+
+def test_a_refused_motion_is_not_answered_and_the_next_one_is(start: Start) -> None:
+    node = start()
+    node.until_active()
+    planner = Planner(node)
+    for number in (1, 2):
+        planner.send([HOME, TOO_HIGH], step=1_000_000_000)
+        planner.until_refused('refused: at ', number)
+        values = node.values('trajectory')
+        assert values['refused: a limit is broken'] == str(number)
+        assert values['answered'] == str(number - 1)
+        assert 0.0 < float(values['refused at (s)']) < 1.0
+        assert values['leg'] in node.status('trajectory').message
+        planner.send(MOTION, step=500_000_000)
+        check(planner.until_answered(number), MOTION, node.platform)
+        node.until_status('trajectory', OK, 'answered')
+    line = log_lines(node.program.stderr, 'ERROR')[0]
+    assert 'trajectory refused: at ' in line
+    assert 'beyond limits.' in line
+
+
+def test_setpoints_are_answered_while_motions_are_in_work(start: Start) -> None:
+    """By order: of those sent one after the other many are answered before the next motion is."""
+    node = start()
+    node.until_active()
+    planner = Planner(node)
+    planner.fill()
+    before, between = len(planner.raw), 0
+    while len(planner.raw) < before + 4:
+        stamp = node.send()
+        assert nanoseconds(node.state_of(stamp).header.stamp) == stamp
+        between += 1
+    # One for each motion could be answered if none were in work in pieces.
+    assert between > 3 * 4
+    assert len(deserialize_message(planner.raw[-1], JointTrajectory).points) == 20_000
+
+
+def test_a_motion_is_answered_with_one_set_of_parameters(start: Start) -> None:
+    node = start()
+    node.until_active()
+    planner = Planner(node)
+    planner.send_long(20_000)
+    planner.send_long(20_000)
+    planner.until_answered(1)
+    assert node.set_parameters(platform__mass=200.0).successful
+    assert node.set_parameters(singularity__stop_condition=20.0).successful
+    answer = planner.until_answered(2)
+    efforts = np.array([point.effort for point in answer.points])
+    heavy = StewartPlatform(node.platform.parameters.replaced({'platform.mass': 200.0}))
+    assert np.all(efforts == efforts[0])
+    assert bits(efforts[0]) in [bits(node.result_of(HOME, platform=platform).forces)
+                                for platform in (node.platform, heavy)]
+    planner.send([HOME])
+    check(planner.until_answered(3), [HOME], heavy)
+
+
+def test_what_is_in_work_ends_with_the_node(start: Start) -> None:
+    node = start()
+    node.until_active()
+    planner = Planner(node)
+    planner.fill()
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+        assert node.call('change_state', ChangeState.Request(
+            transition=Transition(id=transition))).success
+    node.until(lambda: f'{NODE}/leg_trajectory' not in dict(
+        node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/')),
+        'its topic is closed')
+    node.stop()
+    assert any('given up' in line for line in log_lines(node.program.stderr, 'WARN'))
