@@ -101,7 +101,7 @@ class SimulatorNode(Node):
         if self._stepped:
             self._clock_output = self.create_publisher(Clock, '/clock', qos)
             self._messages = self._messages_now()
-            self._announcing = self._timer(_ANNOUNCE_SECONDS, self._publish)
+            self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
         else:
             self._start: int | None = None
             self._timer(1.0 / self._rate, self._on_time)
@@ -130,7 +130,6 @@ class SimulatorNode(Node):
         first, second, third, fourth, fifth, sixth = values
         self._commands = first, second, third, fourth, fifth, sixth
         if self._stepped:
-            # /clock is best effort: what is not answered is said again.
             self._announcing.reset()
             self._advance()
 
@@ -167,11 +166,21 @@ class SimulatorNode(Node):
     def _messages_now(self) -> list[tuple[str, bytes]]:
         return list(self._plant.messages(self._stamp + self._time_of(self._index)))
 
+    def _announce(self) -> None:
+        """Say again what is not answered: all of it at first, when not all may be heard yet."""
+        if self._commands is None:
+            self._publish()
+        else:
+            self._publish_clock()  # those who follow it do so best effort
+
     def _publish(self) -> None:
         for topic, message in self._messages:
             self._outputs[topic].publish(message)
         if self._stepped:
-            self._clock_output.publish(cdr.clock(self._stamp + self._time_of(self._index)))
+            self._publish_clock()
+
+    def _publish_clock(self) -> None:
+        self._clock_output.publish(cdr.clock(self._stamp + self._time_of(self._index)))
 
     # -- words ----------------------------------------------------------------------------
 

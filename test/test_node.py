@@ -453,7 +453,18 @@ def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
     node.until(lambda: not node.received('singularity_warning')[-1].data, 'the warning ends')
 
 
-# Other writers
+# Other writers and readers
+
+def test_who_reads_the_answers_is_counted(start: Start) -> None:
+    node = start()
+    readers = {f'leg_{of}: readers': '1' for of in ('states', 'forces')}
+    node.until(lambda: readers.items() <= node.values('setpoints').items(), 'this one is known')
+    second = node.peer.node.create_subscription(
+        OUTPUTS['leg_forces'], f'{NODE}/leg_forces', lambda message: None, 10)
+    node.until(lambda: node.values('setpoints').get('leg_forces: readers') == '2', 'another is')
+    node.peer.node.destroy_subscription(second)
+    node.until(lambda: readers.items() <= node.values('setpoints').items(), 'it has gone')
+
 
 def test_with_exclusive_setpoints_a_second_writer_is_told_and_refused(start: Start) -> None:
     node = start('setpoint.exclusive:=true')
