@@ -310,7 +310,10 @@ class Step:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
-        self._settings = np.empty(_SETTINGS)
+        self._numbers = np.zeros(_ONE)
+        self._memory = self._numbers.data  # the same as bytes
+        self._numbers[:_ONE_SETTINGS] = self._platform.machine
+        self._settings = self._numbers[_ONE_SETTINGS:_ONE_MOTION]
         self._settings[:_SUPPRESS] = thresholds(parameters)
         self._settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
         self._limits = {name: parameters[name].tolist() for name in LIMITS
@@ -318,10 +321,6 @@ class Step:
         for n, name in enumerate(LIMITS):
             never = -math.inf if name == 'limits.length_min' else math.inf
             self._settings[_LIMITS + 6 * n:_LIMITS + 6 * n + 6] = self._limits.get(name, never)
-        self._numbers = np.zeros(_ONE)
-        self._memory = self._numbers.data  # the same as bytes
-        self._numbers[:_ONE_SETTINGS] = self._platform.machine
-        self._numbers[_ONE_SETTINGS:_ONE_MOTION] = self._settings
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
         self._joint_state = cdr.JointState(parameters['joints'])
         self._with_effort, self._without_effort = (

@@ -115,13 +115,18 @@ def test_setpoints_are_answered_while_motions_are_in_work(start: Start) -> None:
     node.until_active()
     planner = Planner(node)
     planner.fill()
-    before, between = len(planner.raw), 0
-    while len(planner.raw) < before + 4:
-        stamp = node.send()
-        assert nanoseconds(node.state_of(stamp).header.stamp) == stamp
+    # Five are in work or wait. One setpoint could be answered before each of their answers if
+    # they were not in work in pieces; those that are done already come before any.
+    longest = between = 0
+    for _ in range(5000):
+        before = len(planner.raw)
+        node.state_of(node.send())
         between += 1
-    # One for each motion could be answered if none were in work in pieces.
-    assert between > 3 * 4
+        if len(planner.raw) > before:
+            longest, between = max(longest, between), 0
+            if longest > 3:
+                break
+    assert longest > 3
     assert len(deserialize_message(planner.raw[-1], JointTrajectory).points) == 20_000
 
 
