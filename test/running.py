@@ -710,8 +710,8 @@ class Planner:
         """Send these bytes in the place of a message."""
         self._writer.publish(message)
 
-    def send_long(self, points: int, stamp: int = STEP) -> None:
-        """Send a motion that stays at home for so many points, 1 ms apart."""
+    def send_long(self, points: int, stamp: int = STEP, leap: float = 0.0) -> None:
+        """Send a motion that is at home for so many points, 1 ms apart, and leaps to the last."""
         point, = HOME.combined(0).points
         two = raw(MultiDOFJointTrajectory(header=header(stamp, ''), points=[point, point]))
         # Points are of 184 bytes, their times in the last eight.
@@ -720,17 +720,15 @@ class Planner:
         many = np.tile(np.frombuffer(each, np.uint8), (points, 1))
         times = np.arange(points)
         many[:, 176:].view('<i4')[:] = np.column_stack([times // 1000, times % 1000 * 1_000_000])
+        many[-1, 24:32].view('<f8')[:] += leap
         self._writer.publish(head[:-4] + points.to_bytes(4, 'little') + many.tobytes())
 
-    def fill(self) -> int:
-        """Send long motions until as many are in work as can wait; return how many."""
-        number = 0
+    def fill(self, leap: float = 0.0) -> None:
+        """Send long motions until as many are in work as can wait."""
         while not any('more than can wait' in line for line in log_lines(
                 self._node.program.stderr, 'ERROR')):
-            self.send_long(20_000)
-            number += 1
+            self.send_long(20_000, leap=leap)
             self._node.peer.spin(0.0)
-        return number
 
     def until_answered(self, number: int) -> JointTrajectory:
         """Return the last answer once so many have come."""
