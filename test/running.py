@@ -727,7 +727,7 @@ class Planner:
         """Send long motions until as many are in work as can wait."""
         while not any('more than can wait' in line for line in log_lines(
                 self._node.program.stderr, 'ERROR')):
-            self.send_long(20_000, leap=leap)
+            self.send_long(50_000, leap=leap)
             self._node.peer.spin(0.0)
 
     def until_answered(self, number: int) -> JointTrajectory:

@@ -903,7 +903,7 @@ def test_more_trajectories_than_can_wait_are_refused(begin: Start) -> None:
     planner = Planner(node)
     planner.fill()
     node.until_reported('trajectory', ERROR, 'refused: more than can wait: 5 are in work or wait')
-    node.until_status('trajectory', OK, 'answered: 20000 points')
+    node.until_status('trajectory', OK, 'answered: 50000 points')
     node.until(lambda: int(node.values('trajectory')['refused: more than can wait']) > 0,
                'they are counted')
 
