@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics import cdr
+from stewart_dynamics import cdr, forward_kinematics
 from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics.compiled import COMPILED
 from stewart_dynamics.interpolation import Cubics, Interpolation
@@ -88,7 +88,7 @@ class Outcome(NamedTuple):
 
 
 # Behind which points of a block samples are (M,), and how much of the way is done there (M,).
-_Samples = tuple[NDArray[np.int64], NDArray[np.floating[Any]]]
+_Samples = tuple[NDArray[np.int64], Array]
 
 
 class _Refused(Exception):
@@ -154,6 +154,7 @@ class _Work:
         self._answer = cdr.LegTrajectory(
             self._message.stamp, parameters['joints'], many, parameters['trajectory.effort'])
         self._checks = _Checks(parameters)
+        self._legs_checks = _Checks(parameters)
         self._times = np.empty(many, dtype=np.int64)  # [ns]
         self._motions = np.empty((many, runtime.MOTION))
         self._quaternions = np.empty((many, 4))
@@ -205,8 +206,8 @@ class _Work:
         for first in range(0, max(last, 1), PIECE):
             end = min(first + PIECE, last)
             yield from self._solve_block(first, end)
-            if self._checks.troubles:
-                raise self._in_trouble(min(self._checks.troubles))
+            if troubles := self._checks.troubles or self._legs_checks.troubles:
+                raise self._in_trouble(min(troubles))
 
     def _solve_block(self, first: int, end: int) -> Iterator[None]:
         """Do so from one point to another, both among them."""
@@ -223,6 +224,8 @@ class _Work:
         with np.errstate(all='ignore'):
             between = Interpolation(durations, motions, self._quaternions[block])
             many = self._samples_between(first, between)
+        legs = Cubics.between(lengths, results[:, runtime.RATES:runtime.RATES + 6],
+                              durations[:, None])
         near = many == 1.0
         dips = self._checks.take(times, durations, results, np.ones_like(near), near)
         self._count(_PARTS * len(dips))
@@ -235,13 +238,46 @@ class _Work:
                 rows = between.at(which, part)
             joined = which[1:] == which[:-1]
             way = np.diff(part)
+            at, after = times[which] + part * durations[which], way * durations[which[1:]]
+            self._take_legs_way(at, after, legs.chosen(which), part, durations[which], rows)
             for n in self._checks.take(
-                    times[which] + part * durations[which], way * durations[which[1:]],
-                    self._platform.solve(rows, self._wrench), joined, joined):
+                    at, after, self._platform.solve(rows, self._wrench), joined, joined):
                 if way[n] > _CLOSEST:
                     self._count(_PARTS)
                     closer.append((np.full(_PARTS + 1, which[n]), part[n] + way[n] * _IN_PARTS))
         yield
+
+    def _take_legs_way(self, times: Array, after: Array, legs: Cubics, part: Array,
+                       durations: Array, rows: Array) -> None:
+        """
+        Check that the platform keeps clear of singularities where the legs' cubics lead it.
+
+        Parameters
+        ----------
+        times, after : (M,), (M - 1,)
+            When samples are, and from each to the next [s].
+        legs, part, durations : Cubics of (M, 6), (M,), (M,)
+            Of the way between points that each is on, how much is done, how long it takes [s].
+        rows : (M, MOTION)
+            Where the platform is meant to be.
+
+        """
+        poses, many = rows.copy(), len(rows)
+        codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
+        machine = self._platform.machine
+        forward_kinematics.poses(
+            machine, legs.at(part[:, None]), poses, codes, steps, np.empty(many))
+        lost = np.flatnonzero(codes != forward_kinematics.FOUND)
+        found = int(lost[0]) if len(lost) else many
+        if found < many:
+            self._legs_checks.lose(float(times[found]))
+        if found:
+            poses = poses[:found]
+            forward_kinematics.twists(
+                machine, legs.rate_at(part[:, None])[:found] / durations[:found, None], poses)
+            self._legs_checks.take_singularities(
+                times[:found], after[:found - 1], self._platform.solve(poses),
+                after[:found - 1] > 0.0)
 
     def _samples_between(self, first: int, between: Interpolation) -> Array:
         """Return in how many parts the way from each point to the next is looked at."""
@@ -323,7 +359,7 @@ def _samples(many: Array) -> Iterator[_Samples]:
         yield which[of], (index - begins[of]) / many[which[of]]
 
 
-_IN_PARTS = np.linspace(0.0, 1.0, _PARTS + 1)
+_IN_PARTS: Array = np.linspace(0.0, 1.0, _PARTS + 1, dtype=np.float64)
 
 
 class _Checks:
@@ -368,12 +404,23 @@ class _Checks:
                 return []
             times, results = times[:n], results[:n]
             durations, joined, near = durations[:n - 1], joined[:n - 1], near[:n - 1]
-        self._note_worst(times, results)
+        self._take_forces(results)
         self._take_limits(times, results)
         self._take_cubics(times, durations, results, joined)
+        return self.take_singularities(times, durations, results, near)
+
+    def lose(self, time: float) -> None:
+        """Note that no pose has the lengths of the legs, clear of singularities."""
+        self.troubles.append(_Trouble(
+            time, -1, SINGULAR, ": the legs' way leads to no pose on this side of a singularity"))
+
+    def take_singularities(self, times: Array, durations: Array, results: Array,
+                           near: NDArray[np.bool_]) -> list[int]:
+        """Do what ``take`` does, for singularities alone."""
+        self._take_conditions(times, results)
         return self._take_determinants(times, durations, results, near)
 
-    def _note_worst(self, times: Array, results: Array) -> None:
+    def _take_conditions(self, times: Array, results: Array) -> None:
         condition = results[:, runtime.CONDITION]
         n = int(np.argmax(condition))
         if condition[n] > self.condition:
@@ -382,6 +429,9 @@ class _Checks:
             n = int(np.argmax(condition >= self._stop))
             self._singular(times[n], results[n], f'condition number {condition[n]:.4g} reaches '
                            f'singularity.stop_condition, {self._stop:g}')
+
+    def _take_forces(self, results: Array) -> None:
+        """Note the largest."""
         forces = np.abs(results[:, runtime.FORCES:runtime.FORCES + 6])
         largest = float(forces.max())
         if largest > self.force:

@@ -35,7 +35,7 @@ from stewart_dynamics import Motion, Parameters, planned, StewartPlatform
 from stewart_dynamics.interpolation import Interpolation
 from stewart_dynamics.inverse_dynamics import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.planned import Outcome
-from stewart_dynamics.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.step import NO_WRENCH, Six
 from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
 
@@ -204,7 +204,8 @@ def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> N
         times, rows = sampled('clear', step)
         total = 0
         for _ in planned.answer(PARAMETERS, NO_WRENCH, messages.trajectory(STAMP, times, rows)):
-            assert sum(solved) <= planned.PIECE + 1
+            # of what the platform does between points, and of where the legs lead it
+            assert sum(solved) <= 2 * (planned.PIECE + 1)
             total += sum(solved)
             solved.clear()
         assert total > len(times)
@@ -413,6 +414,16 @@ def yaw(angle: float, rate: float = 0.0, acceleration: float = 0.0) -> list[floa
             math.radians(rate), *(0.0,) * 5, math.radians(acceleration)]
 
 
+def parabola(start: float, top: float, duration: int, ways: int) -> tuple[list[int], Array]:
+    """Return times and points of a turn up to an angle [deg] and back, in so many ways."""
+    rate = 4.0 * (top - start) / (duration * 1e-9)
+    bend = -2.0 * rate / (duration * 1e-9)
+    times = [duration * n // ways for n in range(ways + 1)]
+    return times, np.array([
+        yaw(start + rate * t + 0.5 * bend * t * t, rate + bend * t, bend)
+        for t in (at * 1e-9 for at in times)])
+
+
 @pytest.mark.parametrize(('start', 'highest', 'duration'), [
     (80.0, 90.5, SECOND), (80.0, 90.05, SECOND), (85.0, 90.01, SECOND), (30.0, 90.1, SECOND),
     (89.9, 90.02, SECOND // 100), (89.5, 90.001, SECOND // 10)])
@@ -421,12 +432,10 @@ def test_a_double_crossing_between_two_points_is_found(
     """There and back: det(J) has the same sign, and the same value, at both points."""
     seconds = duration * 1e-9
 
-    def leap(top: float) -> tuple[bytes, Array, Array]:
-        rate = 4.0 * (top - start) / seconds  # a parabola
-        rows = np.array([yaw(start, rate, -2.0 * rate / seconds),
-                         yaw(start, -rate, -2.0 * rate / seconds)])
-        dense, motions = between_points([0, duration], rows)
-        return (messages.trajectory(STAMP, [0, duration], rows), dense,
+    def leap(top: float, ways: int = 1) -> tuple[bytes, Array, Array]:
+        times, rows = parabola(start, top, duration, ways)
+        dense, motions = between_points(times, rows)
+        return (messages.trajectory(STAMP, times, rows), dense,
                 legs_of(UNBOUND, motions)[:, DETERMINANT])
 
     # The singularity is not at 90 degrees to the last digit: the joints are rounded.
@@ -439,21 +448,47 @@ def test_a_double_crossing_between_two_points_is_found(
     assert 'det(J) passes zero' in outcome.message
     time = float(dict(outcome.values)['refused at (s)'])
     assert time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3 * seconds)
-    data, _, det = leap(90.0 - 2.0 * (highest - 90.0))
+    short_of = 90.0 - 2.0 * (highest - 90.0)
+    data, _, det = leap(short_of)
     assert np.all(det * det[0] > 0.0)
-    assert outcome_of(data, UNBOUND).answer
+    assert 'det(J) passes zero' not in outcome_of(data, UNBOUND).message
+    # With points so near to each other the legs lead the platform where it is meant to be.
+    assert outcome_of(leap(short_of, 200)[0], UNBOUND).answer
+
+
+def test_where_the_legs_lead_the_platform_to_a_singularity_is_found() -> None:
+    """
+    A second from point to point, the platform turns up to 89 degrees and back, short of 90.
+
+    The cubics of the legs, through the lengths and rates of both points, ask for lengths in
+    between that there are only beyond the singularity: for no pose at all on this side.
+    """
+    times, rows = parabola(80.0, 89.0, SECOND, 1)
+    motions = between_points(times, rows)[1]
+    determinants = legs_of(UNBOUND, motions)[:, DETERMINANT]
+    assert np.all(determinants * determinants[0] > 0.0)
+    squares = cubic_between(times, rows)[1] ** 2
+    apart = np.abs(squares[:, ::2].sum(axis=1) - squares[:, 1::2].sum(axis=1))
+    limit = StewartPlatform(UNBOUND).inverse_kinematics(
+        [0.0, 0.0, 0.8], from_euler([0.0, 0.0, np.pi / 2.0])) ** 2
+    assert apart.max() > abs(limit[::2].sum() - limit[1::2].sum())
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows), UNBOUND)
+    assert outcome.reason == planned.SINGULAR
+    assert "the legs' way leads to" in outcome.message
+    dense = messages.trajectory(STAMP, *parabola(80.0, 89.0, SECOND, 20))
+    assert outcome_of(dense, UNBOUND).answer
 
 
 def test_stop_condition_met_between_two_points_alone_is_found() -> None:
-    rows = np.array([yaw(80.0, 36.0, -72.0), yaw(80.0, -36.0, -72.0)])  # up to 89 degrees
-    dense, motions = between_points(TIMES, rows)
+    times, rows = parabola(80.0, 89.0, SECOND, 20)
+    dense, motions = between_points(times, rows)
     condition = legs_of(FREE, motions)[:, CONDITION]
     highest = condition.max()
     assert condition[0] < 0.5 * highest
     for stop, refused in ((0.99 * highest, True), (1.01 * highest, False)):
         parameters = FREE.replaced({'singularity.stop_condition': stop,
                                     'singularity.warn_condition': 20.0})
-        outcome = outcome_of(messages.trajectory(STAMP, TIMES, rows), parameters)
+        outcome = outcome_of(messages.trajectory(STAMP, times, rows), parameters)
         assert bool(outcome.reason) == refused
         if refused:
             time = float(dict(outcome.values)['refused at (s)'])
