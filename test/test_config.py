@@ -21,11 +21,12 @@ import json
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 from referees import ROOT
 import yaml
 
-from stewart_dynamics import Parameters
+from stewart_dynamics import Parameters, StewartPlatform
 
 CONFIG = ROOT / 'config'
 JOINTS = list(Parameters.from_yaml(CONFIG / 'platform.yaml')['joints'])
@@ -242,3 +243,23 @@ def test_there_is_a_controller_of_each_kind() -> None:
     trajectory = 'joint_trajectory_controller/JointTrajectoryController'
     assert kinds == [('effort_controllers/JointGroupEffortController', None),
                      (trajectory, ['effort']), (trajectory, ['position', 'effort'])]
+
+
+def test_the_example_gains_damp_every_mode_of_the_machine() -> None:
+    """
+    With p, i and d on each leg, m s^3 + d s^2 + p s + i = 0 for each mode of mass m.
+
+    The modes of the legs are those of J^-T M J^-1; no payload adds more to a mode than its share.
+    """
+    platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
+    home = [0.0, 0.0, 1.1], np.eye(3)
+    inverse = np.linalg.inv(platform.jacobian(*home))
+    masses = np.linalg.eigvalsh(inverse.T @ platform.mass_matrix(*home) @ inverse)
+    assert masses.round().astype(int).tolist()[::5] == [53, 338]  # as the file says
+    file, = (yaml.safe_load(path.read_text(encoding='utf-8')) for path in CONTROLLERS
+             if path.name == 'trajectory_effort.yaml')
+    for gains in file['leg_trajectory_controller']['ros__parameters']['gains'].values():
+        for factor, least in ((1.0, 0.7), (1.3, 0.6)):
+            for mass in factor * masses:
+                poles = np.roots([mass, gains['d'], gains['p'], gains['i']])
+                assert min(-poles.real / np.abs(poles)) > least
