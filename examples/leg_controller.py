@@ -23,11 +23,13 @@ with length q and rate v as measured, and q_d, v_d, effort_d as stewart_dynamics
 """
 
 import math
+import sys
 import time
 
 import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -120,6 +122,8 @@ def main() -> None:
             executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # SIGINT or SIGTERM
+    except (InvalidParameterTypeException, ValueError) as exc:
+        sys.exit(f'leg_controller: {exc}')
     finally:
         executor.shutdown()
         rclpy.try_shutdown()

@@ -149,10 +149,11 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'three topics, one combined topic, or the pose alone (quasi-static: no motion '
               'terms)', '', 'separate', choices=('separate', 'combined', 'pose')),
     Parameter('setpoint.sync_tolerance', 'double',
-              'how far the stamps of one setpoint may lie apart', 's', 0.0, minimum=0.0),
+              'how far the stamps of one setpoint may lie apart', 's', 0.0, minimum=0.0,
+              maximum=1e9),
     Parameter('setpoint.timeout', 'double',
               'silence after which setpoints are stale; a longer jump back in time is a '
-              'restart', 's', 0.1, minimum=0.0, above=True),
+              'restart', 's', 0.1, minimum=0.0, above=True, maximum=1e9),
     Parameter('setpoint.exclusive', 'bool',
               'refuse setpoints while a topic has more than one writer', default=False),
     Parameter('trajectory.effort', 'bool', 'give forces with the points of ~/leg_trajectory: a '

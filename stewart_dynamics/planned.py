@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,9 @@ PIECE = 256 if COMPILED else 1
 # straight line than this [m/s^2], a hundredth of gravity.
 _WAY = 0.01
 _BEND = 0.1
+# So much beyond a limit of length is none [m]: a machine that stands on its stop, its pose in
+# doubles or in a message of fewer digits, may go away from it.
+_LENGTH_TOLERANCE = 1e-9
 # |det(J)| that falls between two samples below this part of what it is there is looked at more
 # closely, in so many parts, down to this part of the way between two points.
 _DIP = 0.9
@@ -207,7 +210,9 @@ class _Work:
             end = min(first + PIECE, last)
             yield from self._solve_block(first, end)
             if troubles := self._checks.troubles or self._legs_checks.troubles:
-                raise self._in_trouble(min(troubles))
+                # Of one time the singularity first: limits are broken because of it.
+                raise self._in_trouble(min(troubles, key=lambda each: (
+                    each.time, each.reason != SINGULAR, each)))
 
     def _solve_block(self, first: int, end: int) -> Iterator[None]:
         """Do so from one point to another, both among them."""
@@ -373,6 +378,8 @@ class _Checks:
         self._shortest, self._longest, self._fastest, self._strongest = (
             np.full(6, -math.inf if name == 'limits.length_min' else math.inf)
             if parameters[name] is None else parameters[name] for name in LIMITS)
+        self._low, self._high = (
+            self._shortest - _LENGTH_TOLERANCE, self._longest + _LENGTH_TOLERANCE)
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
 
     def take(self, times: Array, durations: Array, results: Array, joined: NDArray[np.bool_],
@@ -443,8 +450,8 @@ class _Checks:
         lengths, rates, forces = (results[:, at:at + 6] for at in (
             runtime.LENGTHS, runtime.RATES, runtime.FORCES))
         for limit, values, bounds, broken in (
-                ('limits.length_min', lengths, self._shortest, lengths < self._shortest),
-                ('limits.length_max', lengths, self._longest, lengths > self._longest),
+                ('limits.length_min', lengths, self._shortest, lengths < self._low),
+                ('limits.length_max', lengths, self._longest, lengths > self._high),
                 ('limits.velocity_max', rates, self._fastest, np.abs(rates) > self._fastest),
                 ('limits.force_max', forces, self._strongest, np.abs(forces) > self._strongest)):
             self._take_broken(limit, values, bounds, broken, np.broadcast_to(
@@ -459,7 +466,7 @@ class _Checks:
         low, high = cubics.hull()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
-        suspect = np.flatnonzero(joined & ((low < self._shortest) | (high > self._longest)
+        suspect = np.flatnonzero(joined & ((low < self._low) | (high > self._high)
                                            | (middle > self._fastest)).any(axis=1))
         if not len(suspect):
             return
@@ -468,8 +475,8 @@ class _Checks:
         for part in cubics.extremes():
             values = cubics.at(part)
             for limit, bounds, broken in (
-                    ('limits.length_min', self._shortest, values < self._shortest),
-                    ('limits.length_max', self._longest, values > self._longest)):
+                    ('limits.length_min', self._shortest, values < self._low),
+                    ('limits.length_max', self._longest, values > self._high)):
                 self._take_broken(limit, values, bounds, broken, begin + part * duration)
         part = cubics.fastest()
         values = cubics.rate_at(part) / duration

@@ -78,9 +78,11 @@ _OWN = (
     Parameter('end_stops.damping_ratio', 'double', 'damping of the same; 1: no rebound', '', 0.5,
               minimum=0.0),
     Parameter('noise.length', 'double', 'standard deviation of the measured lengths', 'm', 0.0,
-              minimum=0.0),
-    Parameter('noise.rate', 'double', 'of the measured rates', 'm/s', 0.0, minimum=0.0),
-    Parameter('noise.force', 'double', 'of the measured forces', 'N', 0.0, minimum=0.0),
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.rate', 'double', 'of the measured rates', 'm/s', 0.0, minimum=0.0,
+              maximum=1e9),
+    Parameter('noise.force', 'double', 'of the measured forces', 'N', 0.0, minimum=0.0,
+              maximum=1e9),
     Parameter('noise.seed', 'double', 'another number gives other noise, the same the same',
               '', 0.0),
 )
@@ -89,6 +91,9 @@ SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
     # The node has no lifecycle, so none of the machine's may change either.
     **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
     **{own.name: own for own in _OWN}})
+
+# A leg that is so much beyond its stop stands on it [m]: a pose has no more digits than that.
+_ON_STOP = 1e-9
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
 _QUATERNION = 3

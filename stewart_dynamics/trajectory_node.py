@@ -117,8 +117,9 @@ class TrajectoryNode(Node):
         if not self._begun:
             return
         now = self.get_clock().now().nanoseconds - self._stamp
-        if now < 0:
-            self.get_logger().warning('/clock is before the start of the motion: it begins anew')
+        # A simulation that starts anew begins where the motion began.
+        if now < 0 or (now == 0 and jump.delta.nanoseconds < 0):
+            self.get_logger().warning('/clock is back at the start of the motion: it begins anew')
             self._stamp += now
             self._index = now = 0
         self._publish_due(now)

@@ -456,6 +456,38 @@ def test_a_double_crossing_between_two_points_is_found(
     assert outcome_of(leap(short_of, 200)[0], UNBOUND).answer
 
 
+def test_where_the_legs_fold_up_on_a_wide_way_is_found() -> None:
+    """Two points at rest, 20 s apart: the platform's own way between them is clear."""
+    motion = Motion.from_euler([[0.3157, -0.3343, 1.0948], [-0.3375, -0.0826, 0.9219]],
+                               [[-0.5036, 0.3398, 0.2156], [-0.5072, 0.5726, -1.1678]])
+    rows = np.column_stack([motion.position, to_quaternion(motion.rotation), np.zeros((2, 12))])
+    times = [0, 20 * SECOND]
+    conditions = legs_of(FREE, between_points(times, rows)[1])[:, CONDITION]
+    assert conditions.max() < 16.0
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows), FREE)
+    assert outcome.reason == planned.SINGULAR
+    assert float(dict(outcome.values)['refused at (s)']) == pytest.approx(10.1, abs=0.1)
+
+
+def test_a_machine_on_its_stops_may_go_away_from_them() -> None:
+    platform = StewartPlatform(PARAMETERS)
+    parked = platform.forward_kinematics(
+        PARAMETERS['limits.length_min'], ([0.0, 0.0, 0.8], np.eye(3)))
+    for digits, answered in ((12, True), (3, False)):  # 1e-3: beyond by more than rounding
+        position = [*parked.position.round(15).tolist()[:2],
+                    math.floor(parked.position[2] * 10.0 ** digits) / 10.0 ** digits]
+        rows = np.array([[*position, *to_quaternion(parked.rotation), *REST, *REST],
+                         [*HOME, *REST, *REST]])
+        outcome = outcome_of(messages.trajectory(STAMP, [0, 5 * SECOND], rows))
+        assert bool(outcome.answer) == answered, outcome.message
+
+
+def test_where_a_singular_point_breaks_limits_the_singularity_is_said() -> None:
+    rows = np.array([[0.0, 0.0, 0.0, *HOME[3:], *REST, *REST]])
+    outcome = outcome_of(messages.trajectory(STAMP, [0], rows))
+    assert outcome.reason == planned.SINGULAR
+
+
 def test_where_the_legs_lead_the_platform_to_a_singularity_is_found() -> None:
     """
     A second from point to point, the platform turns up to 89 degrees and back, short of 90.

@@ -557,7 +557,9 @@ def test_compiled_and_not_gives_the_same_bits() -> None:
       'geometry.platform_joints': MACHINE['geometry.base_joints']},
      'a leg would have no length there'),
     ({'platform.mass': -1.0}, 'platform.mass: -1.0 kg: must be more than 0'),
-    ({'noise.length': -1.0}, 'noise.length: -1.0 m: must be at least 0')], ids=str)
+    ({'noise.length': -1.0}, 'noise.length: -1.0 m: must be at least 0'),
+    ({'noise.force': 1e308}, 'noise.force: 1e+308 N: must be at least 0, at most 1e+09')],
+    ids=str)
 def test_a_broken_rule_is_named(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(ParameterError) as info:
         Plant(simulated(**changes))

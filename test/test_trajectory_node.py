@@ -236,14 +236,18 @@ def test_it_begins_anew_where_the_clock_does(start: Start, tmp_path: Path) -> No
     trajectory.at(7 * SECOND + 4 * PERIOD, 5)
     trajectory.at(SECOND, 6)
     trajectory.at(SECOND + PERIOD, 7)
+    # A simulation that starts anew begins where it began.
+    trajectory.at(SECOND, 8)
+    trajectory.at(SECOND + PERIOD, 9)
     assert trajectory.program.stop() == 0
     stamps, rows = _separate(trajectory)
-    times = np.array([0, 1, 2, 3, 4, 0, 1]) * PERIOD
-    assert stamps == (np.repeat([7, 1], [5, 2]) * SECOND + times).tolist()
+    times = np.array([0, 1, 2, 3, 4, 0, 1, 0, 1]) * PERIOD
+    assert stamps == (np.repeat([7, 1], [5, 4]) * SECOND + times).tolist()
     parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
     np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
-    warning, = log_lines(trajectory.program.stderr, 'WARN')
-    assert 'it begins anew' in warning
+    warnings = log_lines(trajectory.program.stderr, 'WARN')
+    assert len(warnings) == 2
+    assert all('it begins anew' in warning for warning in warnings)
 
 
 def test_it_waits_for_the_clock(start: Start) -> None:
