@@ -164,17 +164,22 @@ def main() -> None:
     parameters = Parameters.from_yaml(options.params)
     command = [Path(sys.executable).with_name('stewart_dynamics'), '--ros-args',
                '--params-file', options.params]
+    replay = ' '.join(map(os.path.relpath, (
+        Path(sys.executable).with_name('stewart_replay'), options.bag))) + (
+        f' --params {os.path.relpath(options.params)}')
     rclpy.init()
     with subprocess.Popen(command) as process:
         try:
             demo = Demo(options.bag)
             executor = SingleThreadedExecutor()
             executor.add_node(demo)
-            print(f'the node {NODE} computes for {options.params.name}; it compiles first')
+            print(f'the node {NODE} computes for {options.params.name}; it compiles first, which '
+                  'takes up to a minute the first time')
             _wait(executor, 'the node has not come up', 60.0, demo.connected, process)
             play(demo, executor, process)
             print()
             print(report(demo, parameters))
+            print(f'\nthe report of this bag, with figures and the machine in motion:\n  {replay}')
         except (KeyboardInterrupt, ExternalShutdownException):
             raise SystemExit(130) from None
         finally:

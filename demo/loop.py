@@ -242,7 +242,7 @@ class Loop:
     def __init__(self, machine: Path, motion: Path, seconds: float, bandwidth: float) -> None:
         parameters = Parameters.from_yaml(machine)
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
-                      'motion.duration': seconds}
+                      'motion.duration': seconds, 'base_frame': parameters['base_frame']}
         settings = TrajectoryParameters.from_yaml(motion).replaced(trajectory, str(motion))
         platform = StewartPlatform(parameters)
         self.times = sample_times(settings)
@@ -400,7 +400,7 @@ def main() -> None:
         options.output.mkdir(parents=True, exist_ok=True)
         rclpy.init()
         print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1 with the {loop.leg_mass:.0f} kg '
-              f'that it moves: {loop.gains["proportional_gain"]:.3g} N/m, '
+              f'that it moves alone: {loop.gains["proportional_gain"]:.3g} N/m, '
               f'{loop.gains["derivative_gain"]:.3g} N s/m')
         begun = time.monotonic()
         with tqdm(total=4 * options.seconds, unit='s', ncols=79, mininterval=0.5,

@@ -124,6 +124,9 @@ def main() -> None:
         pass  # SIGINT or SIGTERM
     except (InvalidParameterTypeException, ValueError) as exc:
         sys.exit(f'leg_controller: {exc}')
+    except Exception:
+        if rclpy.ok():  # else a signal has ended ROS in the middle of something
+            raise
     finally:
         executor.shutdown()
         rclpy.try_shutdown()

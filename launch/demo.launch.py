@@ -22,9 +22,8 @@ The machine in the loop, in real time: a motion, the node, the simulator and a c
 import sys
 
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
-from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -50,7 +49,7 @@ def simulator(context: LaunchContext) -> list[Node]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the four; their arguments add to those of the node's own launch file."""
+    """Return the four and their arguments."""
     share = FindPackageShare('stewart_dynamics')
     return LaunchDescription([
         DeclareLaunchArgument(
@@ -72,9 +71,21 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'feed_forward', default_value='true', choices=['true', 'false'],
             description='let the example controller add the forces of the node'),
-        # It declares params_file and namespace, for this file as well.
-        IncludeLaunchDescription(PythonLaunchDescriptionSource(
-            PathJoinSubstitution([share, 'launch', 'stewart_dynamics.launch.py']))),
+        DeclareLaunchArgument(
+            'params_file',
+            default_value=PathJoinSubstitution([share, 'config', 'platform.yaml']),
+            description='YAML file with the parameters of the machine'),
+        DeclareLaunchArgument(
+            'namespace', default_value='', description='namespace of all of them'),
+        # What the simulator measures is the node's, which says what touches the platform.
+        Node(
+            package='stewart_dynamics',
+            executable='stewart_dynamics',
+            name='stewart_dynamics',
+            namespace=LaunchConfiguration('namespace'),
+            parameters=[LaunchConfiguration('params_file')],
+            remappings=[('~/measured_legs', 'stewart_simulator/leg_states')],
+            output='screen'),
         OpaqueFunction(function=simulator),
         # No executable of the package, but a file to copy.
         Node(

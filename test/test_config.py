@@ -56,7 +56,10 @@ DISPLAYS = {
 # What Foxglove's panels take of the topics that are named in them; the field that a Plot shows.
 MARKERS = 'visualization_msgs/msg/MarkerArray'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
-FIELDS = {'data': 'std_msgs/msg/Float64', 'data[n]': 'std_msgs/msg/Float64MultiArray'}
+FIELDS = {
+    'data': 'std_msgs/msg/Float64', 'data[n]': 'std_msgs/msg/Float64MultiArray',
+    'wrench.force.x': 'geometry_msgs/msg/WrenchStamped',
+    'wrench.torque.x': 'geometry_msgs/msg/WrenchStamped'}
 
 
 def topics_of_rviz() -> dict[str, str]:
@@ -84,12 +87,14 @@ def topics_of_foxglove() -> dict[str, str]:
         else:
             assert kind == 'Plot'
             for path in panel['paths']:
-                match = re.fullmatch(r'(/[a-z_/]+)\.(data(?:\[[0-5]\])?)', path['value'])
+                match = re.fullmatch(
+                    r'(/[a-z_/]+)\.(data(?:\[[0-5]\])?|wrench\.(?:force|torque)\.[xyz])',
+                    path['value'])
                 if match is None:
                     assert path['value'] == '0'  # a line at zero
                     continue
                 topic, field = match.groups()
-                kind = FIELDS[re.sub(r'\[\d\]', '[n]', field)]
+                kind = FIELDS[re.sub(r'\.[xyz]$', '.x', re.sub(r'\[\d\]', '[n]', field))]
                 assert found.setdefault(topic, kind) == kind
     return found
 
@@ -116,6 +121,8 @@ def test_each_panel_of_foxglove_has_its_place() -> None:
     for topic in ('leg_forces', 'leg_lengths'):
         assert [value for value in plotted if f'/{topic}.' in value] == [
             f'/stewart_dynamics/{topic}.data[{n}]' for n in range(6)]
+    assert [value for value in plotted if value.startswith(MONITOR)] == [
+        f'{MONITOR}.wrench.{part}.{axis}' for part in ('force', 'torque') for axis in 'xyz']
     frames = [panel['followTf'] for panel in layout['configById'].values() if 'followTf' in panel]
     assert frames == ['base']
 

@@ -20,6 +20,7 @@ from contextlib import redirect_stdout
 import io
 from pathlib import Path
 import re
+import sys
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,12 @@ from referees import ROOT
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.plausibility import doubts
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
-MACHINE, = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
+MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
+# What is run, and what it prints: the last by itself, with the node.
+*PARTS, WITH_NODE = re.findall(r'```python\n(.*?)```\n```text\n(.*?)```', PAGE, flags=re.DOTALL)
 
 
 @pytest.fixture(scope='module')
@@ -39,12 +43,11 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Run the page's program, compare what it prints, and return its names."""
     folder = tmp_path_factory.mktemp('machine')
     (folder / 'my_machine.yaml').write_text(MACHINE, encoding='utf-8')
-    parts = re.findall(r'```python\n(.*?)```\n```text\n(.*?)```', PAGE, flags=re.DOTALL)
-    assert len(parts) == PAGE.count('```python') == 5
+    assert len(PARTS) + 1 == PAGE.count('```python') == 6
     program: dict[str, Any] = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        for code, expected in parts:
+        for code, expected in PARTS:
             with redirect_stdout(io.StringIO()) as printed:
                 exec(compile(code, 'from_cad_to_controller.md', 'exec'), program)
             assert printed.getvalue() == expected
@@ -57,19 +60,43 @@ def test_the_file_on_the_page_is_the_machine_that_is_computed(names: dict[str, A
 
 
 def test_the_node_gives_the_forces_on_the_page(
-        names: dict[str, Any], start: Any, tmp_path: Path) -> None:
+        names: dict[str, Any], domain: int, tmp_path: Path) -> None:
     pytest.importorskip('rclpy')
-    from running import log_lines, Sample
+    from running import executable, log_lines, Program
     file = tmp_path / 'my_machine.yaml'
     file.write_text(MACHINE, encoding='utf-8')
-    node = start('setpoint.source:=pose', file=file)
-    node.until_active()
-    state = node.answer(Sample(tuple(names['home'].tolist())))
-    assert list(state.effort) == pytest.approx(names['at_rest'].forces.tolist(), abs=1e-9)
-    strokes = re.findall(r'`position` is (\d\.\d+) six times', PAGE)
-    assert [f'{position:.4f}' for position in state.position] == strokes * 6
-    node.stop()
-    assert log_lines(node.program.stderr, 'WARN') == []
+    node = Program([executable('stewart_dynamics'), '--ros-args', '--params-file', file,
+                    '-p', 'setpoint.source:=pose'], domain, tmp_path / 'node')
+    code, expected = WITH_NODE
+    asking = Program([sys.executable, '-c', code], domain, tmp_path / 'asking')
+    try:
+        assert asking.wait() == 0, asking.stderr
+        assert asking.stdout == expected
+        assert f'forces {names["at_rest"].forces.round(1).tolist()} N' in expected
+        assert node.stop() == 0
+        # The page does not stamp its pose.
+        assert all('stamps are zero' in line for line in log_lines(node.stderr, 'WARN'))
+    finally:
+        asking.kill()
+        node.kill()
+
+
+def test_the_motion_on_the_page_begins_at_home_and_keeps_all_limits(
+        names: dict[str, Any], tmp_path: Path) -> None:
+    file = tmp_path / 'my_motion.yaml'
+    file.write_text(MOVEMENT, encoding='utf-8')
+    settings = TrajectoryParameters.from_yaml(file)
+    motion = motion_at(settings, sample_times(settings) * 1e-9)
+    assert motion.position[0] == pytest.approx(names['home'], abs=1e-12)
+    assert np.array_equal(motion.rotation[0], np.eye(3))
+    assert not motion.rows[[0, -1], 12:18].any()
+    platform, limits = names['platform'], names['parameters']
+    result = platform.inverse_dynamics(motion)
+    assert (result.lengths > limits['limits.length_min']).all()
+    assert (result.lengths < limits['limits.length_max']).all()
+    assert (np.abs(result.rates) < limits['limits.velocity_max']).all()
+    assert (np.abs(result.forces) < limits['limits.force_max']).all()
+    assert result.condition_number.max() < limits['singularity.warn_condition']
 
 
 # What the node says of a mistake: the words on the page, and what is done wrong.
@@ -159,6 +186,6 @@ def test_the_page_is_one_that_is_read_in_ten_minutes() -> None:
 
 
 def test_controllers_of_the_page_are_those_of_the_files() -> None:
-    section = PAGE.split('## 7. ')[1]
+    section = PAGE.split('## 8. ')[1]
     for path in sorted((ROOT / 'config' / 'controllers').glob('*.yaml')):
         assert f'](../config/controllers/{path.name})' in section

@@ -69,6 +69,30 @@ def test_links_lead_to_files(page: Path) -> None:
             assert (page.parent / link).exists(), f'{page.name}: {link}'
 
 
+def anchors(page: Path) -> set[str]:
+    """Return the anchors that GitHub gives the headings of a page."""
+    text = re.sub(r'^(?:```.*?^```|    .*?$)', '', page.read_text(encoding='utf-8'),
+                  flags=re.DOTALL | re.MULTILINE)
+    headings = re.findall(r'^#+ (.*)$', text, flags=re.MULTILINE)
+    return {re.sub(r'[^\w\- ]', '', heading).lower().replace(' ', '-') for heading in headings}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_headings(page: Path) -> None:
+    for link, anchor in re.findall(r'\]\(([^)#:]*)#([^)]+)\)', page.read_text(encoding='utf-8')):
+        assert anchor in anchors(page.parent / link if link else page), f'{link}#{anchor}'
+
+
+@pytest.mark.parametrize('page', [ROOT / 'README.md', ROOT / 'docs/from_cad_to_controller.md'],
+                         ids=lambda page: page.name)
+def test_files_in_commands_are_there(page: Path) -> None:
+    text = page.read_text(encoding='utf-8')
+    named = re.findall(r'(?<![\w./-])(?:bags|config|demo|docs|examples)/[\w./]+', text)
+    assert named
+    for path in named:
+        assert (ROOT / path.rstrip('.')).exists(), path
+
+
 def test_no_figure_is_left_to_be_filled_in() -> None:
     for page in PAGES:
         assert not re.search(r'@[A-Z]+@|TODO|FIXME|XXX', page.read_text(encoding='utf-8')), page

@@ -1,0 +1,145 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+An example: ask stewart_dynamics for the legs' way through a planned motion. Copy what you need.
+
+The motion goes from pose to pose, at rest at both ends. It is published as a whole on
+stewart_dynamics/platform_trajectory; the answer comes on stewart_dynamics/leg_trajectory, as a
+joint_trajectory_controller takes it. A refused motion has no answer: /diagnostics say why.
+Exit code: 0 answered, 1 not.
+"""
+
+import argparse
+from collections.abc import Callable
+import sys
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
+import numpy as np
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.time import Time
+from rclpy.utilities import remove_ros_args
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
+
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.rotation import to_quaternion
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+
+HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml
+
+
+def vector(three: np.ndarray) -> Vector3:
+    x, y, z = three.tolist()
+    return Vector3(x=x, y=y, z=z)
+
+
+def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajectory:
+    """Return a motion from pose to pose, X Y Z alpha beta gamma [m, rad], in so many seconds."""
+    parameters = TrajectoryParameters({
+        'motion.type': 'quintic', 'motion.initial': start, 'motion.final': end,
+        'motion.duration': duration, 'rate': 100.0})
+    times = sample_times(parameters)  # [ns], a point every 10 ms
+    motion = motion_at(parameters, times * 1e-9)
+    message = MultiDOFJointTrajectory(joint_names=['platform'])
+    message.header.frame_id = 'base'
+    # Its stamp stays zero: the controller begins at once.
+    for n, (x, y, z, w) in enumerate(to_quaternion(motion.rotation).tolist()):
+        message.points.append(MultiDOFJointTrajectoryPoint(
+            transforms=[Transform(translation=vector(motion.position[n]),
+                                  rotation=Quaternion(x=x, y=y, z=z, w=w))],
+            # Of the platform's origin, in the base's axes.
+            velocities=[Twist(linear=vector(motion.linear_velocity[n]),
+                              angular=vector(motion.angular_velocity[n]))],
+            accelerations=[Twist(linear=vector(motion.linear_acceleration[n]),
+                                 angular=vector(motion.angular_acceleration[n]))],
+            time_from_start=Time(nanoseconds=int(times[n])).to_msg()))
+    return message
+
+
+class Planner(Node):
+    """Sends motions, and keeps what comes of them."""
+
+    def __init__(self) -> None:
+        super().__init__('planner')
+        self.answers, self.heard, self.refused, self.why = [], False, 0, ''
+        self.motions = self.create_publisher(
+            MultiDOFJointTrajectory, 'stewart_dynamics/platform_trajectory', 1)
+        self.create_subscription(
+            JointTrajectory, 'stewart_dynamics/leg_trajectory', self.answers.append, 1)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self.on_diagnostics, 10)
+
+    def on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.heard |= status.name.startswith('stewart_dynamics: ')
+            if status.name == 'stewart_dynamics: trajectory':
+                values = {pair.key: pair.value for pair in status.values}
+                self.refused, self.why = int(values['refused']), status.message
+
+    def ready(self) -> bool:
+        """Return whether the node hears us and we hear it: it answers once."""
+        return (self.heard and self.motions.get_subscription_count() > 0
+                and self.count_publishers('stewart_dynamics/leg_trajectory') > 0)
+
+    def until(self, done: Callable[[], bool], timeout: float) -> bool:
+        end = time.monotonic() + timeout
+        while not done() and time.monotonic() < end:
+            rclpy.spin_once(self, timeout_sec=0.1)
+        return done()
+
+
+def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> JointTrajectory:
+    """Return the answer to a motion; end with one line where there is none."""
+    if not planner.until(planner.ready, timeout):
+        sys.exit(f'stewart_dynamics has not come up within {timeout:g} s')
+    before = planner.refused
+    planner.motions.publish(motion)
+    if not planner.until(lambda: planner.answers or planner.refused > before, timeout):
+        sys.exit(f'no answer within {timeout:g} s')
+    if not planner.answers:
+        sys.exit(planner.why)
+    return planner.answers[0]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    pose = {'nargs': 6, 'type': float, 'metavar': ('X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA')}
+    parser.add_argument('--from', dest='start', default=HOME, help='[m, rad]', **pose)
+    parser.add_argument('--to', default=[0.1, -0.05, 1.2, 0.0, 0.1, 0.3], help='[m, rad]', **pose)
+    parser.add_argument('--duration', type=float, default=2.0, help='[s]')
+    parser.add_argument('--timeout', type=float, default=10.0, help='of the node [s]')
+    rclpy.init()
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    try:
+        answer = ask(Planner(), trajectory(options.start, options.to, options.duration),
+                     options.timeout)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        sys.exit(130)
+    except StewartError as exc:
+        sys.exit(str(exc))
+    finally:
+        rclpy.try_shutdown()
+    last = answer.points[-1].time_from_start
+    line = f'answered: {len(answer.points)} points over {last.sec + 1e-9 * last.nanosec:g} s'
+    if len(answer.points[0].effort):  # the node's trajectory.effort
+        line += f', largest effort {max(np.abs(p.effort).max() for p in answer.points):.0f} N'
+    print(line)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,102 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+An example: push the simulated platform, and print what stewart_dynamics finds of it.
+
+The push goes to stewart_simulator/wrench; the node, its ~/measured_legs connected to
+stewart_simulator/leg_states, publishes stewart_dynamics/external_wrench. Run it while the machine
+is under control: brakes that hold are a load, too.
+"""
+
+import argparse
+import sys
+import time
+
+from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.time import Time
+from rclpy.utilities import remove_ros_args
+
+SETTLE = 1_000_000_000  # the push lasts so long by the stamps of the answers [ns]
+
+
+def vector(three: list) -> Vector3:
+    x, y, z = three
+    return Vector3(x=x, y=y, z=z)
+
+
+class Pusher(Node):
+    """Publishes loads, and keeps what the node finds."""
+
+    def __init__(self) -> None:
+        super().__init__('pusher')
+        self.found = None
+        self.loads = self.create_publisher(WrenchStamped, 'stewart_simulator/wrench', 1)
+        self.create_subscription(
+            WrenchStamped, 'stewart_dynamics/external_wrench', self.on_found, 1)
+
+    def on_found(self, found: WrenchStamped) -> None:
+        self.found = found
+
+    def wait(self, timeout: float) -> WrenchStamped:
+        """Return the next wrench that the node finds."""
+        self.found, end = None, time.monotonic() + timeout
+        while self.found is None or not self.loads.get_subscription_count():
+            if time.monotonic() > end:
+                sys.exit(f'no external wrench, or no simulator, within {timeout:g} s')
+            rclpy.spin_once(self, timeout_sec=0.1)
+        return self.found
+
+    def push(self, force: list, moment: list, timeout: float) -> WrenchStamped:
+        """Push at the platform's origin [N, N m], base axes; return what is found at the end."""
+        found = self.wait(timeout)
+        load = WrenchStamped(wrench=Wrench(force=vector(force), torque=vector(moment)))
+        load.header.frame_id = 'base'
+        self.loads.publish(load)
+        until = Time.from_msg(found.header.stamp).nanoseconds + SETTLE
+        while Time.from_msg(found.header.stamp).nanoseconds < until:
+            found = self.wait(timeout)
+        return found
+
+
+def text(found: WrenchStamped) -> str:
+    force, moment = ([round(number, 1) + 0.0 for number in (three.x, three.y, three.z)]
+                     for three in (found.wrench.force, found.wrench.torque))
+    return f'{force} N, {moment} N m'
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    three = {'nargs': 3, 'type': float, 'metavar': ('X', 'Y', 'Z')}
+    parser.add_argument('--force', default=[300.0, 0.0, -100.0], help='[N]', **three)
+    parser.add_argument('--moment', default=[0.0, 0.0, 50.0], help='[N m]', **three)
+    parser.add_argument('--timeout', type=float, default=10.0, help='of an answer [s]')
+    rclpy.init()
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    pusher = Pusher()
+    try:
+        print('before:', text(pusher.wait(options.timeout)))
+        print('pushed:', text(pusher.push(options.force, options.moment, options.timeout)))
+        print('after: ', text(pusher.push([0.0] * 3, [0.0] * 3, options.timeout)))
+    except (KeyboardInterrupt, ExternalShutdownException):
+        sys.exit(130)
+    finally:
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

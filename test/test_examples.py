@@ -1,0 +1,135 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The examples, as they stand, over real topics; the controller is tested in test_loop.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+import re
+import sys
+
+from geometry_msgs.msg import WrenchStamped
+import numpy as np
+import pytest
+from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT
+from trajectory_msgs.msg import JointTrajectory
+
+from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+
+EXAMPLES = ROOT / 'examples'
+
+HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
+THERE = [0.1, -0.05, 1.2, 0.0, 0.1, 0.3]
+
+Run = Callable[..., Program]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[Run]:
+    """Return a function that starts an example; it ends with the test."""
+    programs: list[Program] = []
+
+    def begin(name: str, domain: int, *arguments: object) -> Program:
+        programs.append(Program([sys.executable, EXAMPLES / name, *map(str, arguments)], domain,
+                                tmp_path / f'example_{len(programs)}'))
+        return programs[-1]
+
+    yield begin
+    for program in programs:
+        program.kill()
+
+
+def test_a_planned_motion_is_answered_or_its_refusal_is_said(
+        start: Callable[..., DynamicsNode], run: Run) -> None:
+    node = start()
+    node.until_active()
+    answers = node.peer.listen('/stewart_dynamics/leg_trajectory', JointTrajectory)
+
+    def planned(*arguments: object) -> Program:
+        return run('plan_motion.py', node.domain, '--timeout', '60.0', *arguments)
+
+    settings = TrajectoryParameters({
+        'motion.type': 'quintic', 'motion.initial': HOME, 'motion.final': THERE,
+        'motion.duration': 2.0, 'rate': 100.0})
+    expected = node.platform.inverse_dynamics(motion_at(settings, sample_times(settings) * 1e-9))
+    # Refused ones before and after it, which are not taken for its answer.
+    given = ['--from', *HOME, '--to', *THERE, '--duration', '2.0']
+    for n, arguments in enumerate((given, [])):  # which are those by default
+        program = planned('--duration', '0.3')
+        assert program.wait() == 1
+        assert program.stdout == ''
+        assert re.fullmatch(r'refused: at 0\.\d+ s leg_\d: rate .* beyond limits\.velocity_max\n',
+                            program.stderr)
+        program = planned(*arguments)
+        assert program.wait() == 0, program.stderr
+        assert program.stdout == ('answered: 201 points over 2 s, largest effort '
+                                  f'{np.abs(expected.forces).max():.0f} N\n')
+        node.until(lambda n=n: len(answers) == n + 1, 'the answer is heard here, too')
+    program = planned('--duration', '-1.0')
+    assert program.wait() == 1
+    assert 'motion.duration: -1.0 s: must be more than 0' in program.stderr
+
+
+@pytest.mark.parametrize('name', ['plan_motion.py', 'push_platform.py'])
+def test_where_nobody_is_there_it_says_so_and_ends(domain: int, run: Run, name: str) -> None:
+    program = run(name, domain, '--timeout', '0.5')
+    assert program.wait() == 1
+    line, = program.stderr.splitlines()
+    assert 'within 0.5 s' in line
+
+
+def test_a_push_is_found_in_the_loop(ros_environment: None, tmp_path: Path, run: Run) -> None:
+    """In the simulator's own time, so that it depends on no load of the computer."""
+    simulated = ['-p', 'use_sim_time:=true']
+    with own_domain() as domain:
+        peer = Peer(domain)
+        programs = [Program([*command, '--ros-args', *arguments], domain, tmp_path / str(n))
+                    for n, (command, arguments) in enumerate((
+                        ([executable('stewart_simulator')],
+                         ['--params-file', PLATFORM, '--params-file',
+                          ROOT / 'config' / 'simulator.yaml', *simulated]),
+                        ([executable('stewart_dynamics')],
+                         ['--params-file', PLATFORM,
+                          '-r', '~/measured_legs:=/stewart_simulator/leg_states']),
+                        ([sys.executable, EXAMPLES / 'leg_controller.py'], simulated)))]
+        try:
+            found = peer.listen('/stewart_dynamics/external_wrench', WrenchStamped)
+            known = ('/stewart_dynamics/leg_states', '/stewart_simulator/commands',
+                     '/stewart_simulator/leg_states', '/stewart_dynamics/measured_legs')
+            peer.until(lambda: peer.node.count_subscribers(known[0]) == 1
+                       and peer.node.count_subscribers(known[1]) == 1
+                       and peer.node.count_subscribers(known[2]) == 2, 'all are there')
+            programs.append(Program(
+                [executable('stewart_trajectory'), '--ros-args', '--params-file',
+                 ROOT / 'config' / 'trajectory_loop.yaml', *simulated, '-p',
+                 'start_timeout:=1000.0'], domain, tmp_path / 'trajectory'))
+            peer.until(lambda: len(found) > 500, 'the loop runs')
+            program = run('push_platform.py', domain, '--timeout', '60.0', '--force', 200.0,
+                          -100.0, 50.0, '--moment', 10.0, 0.0, -40.0)
+            assert program.wait() == 0, program.stderr
+        finally:
+            for each in programs:
+                each.kill()
+            peer.close()
+    rows = [[float(number) for number in re.findall(r'-?\d+\.\d+', line)]
+            for line in program.stdout.splitlines()]
+    assert [line.split(':')[0] for line in program.stdout.splitlines()] == [
+        'before', 'pushed', 'after']
+    # A second of a filter of 10 Hz leaves nothing of the step; the motion at 500 Hz leaves less
+    # than this.
+    for row, load in zip(rows, ([0.0] * 6, [200.0, -100.0, 50.0, 10.0, 0.0, -40.0], [0.0] * 6),
+                         strict=True):
+        assert row == pytest.approx(load, abs=1.0)
