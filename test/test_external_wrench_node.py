@@ -337,7 +337,7 @@ def test_a_wrench_on_the_simulator_in_motion_is_found_within_5_percent(
 
 def _step(simulator: Simulator) -> int:
     """Command the forces of the present moment and return the next one's stamp."""
-    state = deserialize_message(simulator.raw('leg_states')[-1], JointState)
+    state = simulator.last()
     stamp = nanoseconds(state.header.stamp)
     wanted = StewartPlatform(MACHINE).inverse_dynamics(swing((stamp - 10 ** 9) * 1e-9))
     return simulator.step(
