@@ -92,8 +92,11 @@ SERVICES: dict[str, Any] = {
 SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
 # What a program may say on stderr: lines of ROS's log. Fast DDS complains there of what other
-# programs, killed ones, have left in shared memory.
-LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RTPS_')
+# programs, killed ones, have left in shared memory; and rcl where a signal, which ends ROS from a
+# thread of its own, falls between a line on stderr and the same line on /rosout.
+LOG_LINE = re.compile(
+    r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RTPS_|'
+    r"Failed to publish log message to rosout: publisher's context is invalid")
 
 _DOMAINS = range(1, 101)
 
