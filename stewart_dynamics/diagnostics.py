@@ -15,7 +15,7 @@
 """
 What the node says of itself: one status each for setpoints, singularity, limits and timing.
 
-And one for planned motions, once there was one. A check knows no ROS: it is told what happened
+Other parts of the node add their own, see Part. A check knows no ROS: it is told what happened
 and returns words; the node makes messages.
 """
 

@@ -190,7 +190,7 @@ def _entry_point(source: str) -> Callable[[Array], None]:
 
 
 _one = _entry_point(source_digest(
-    'compiled', 'vectors', 'matrix6', 'inverse_dynamics', 'forward_kinematics',
+    'compiled', 'vectors', 'matrix6', 'inverse_dynamics', 'singularity', 'forward_kinematics',
     'external_wrench'))
 
 

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from stewart_dynamics.compiled import compiled, entry_point, inlined, source_digest
 from stewart_dynamics.inverse_dynamics import leg_line
 from stewart_dynamics.matrix6 import inverse_and_determinant, Rows
+from stewart_dynamics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.vectors import (
     add, cross, dot6, Matrix3, scale, Vector3, Vector6)
 
@@ -52,10 +53,6 @@ FOUND, NO_POSE, SINGULAR = range(3)
 _FARTHER = 16.0
 _LEAST_PART = 1e-3
 MOST_STEPS = 50
-
-# From this condition number on a step goes anywhere; see singularity.UNSOLVABLE_CONDITION. The
-# bound is on the product of Frobenius norms, which is at most six times the condition number.
-_UNSOLVABLE = 1e12
 
 
 @inlined
@@ -159,7 +156,8 @@ def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float
                                   * _squares((i0, i1, i2, i3, i4, i5)))
             residual = max(abs(miss[0]), abs(miss[1]), abs(miss[2]), abs(miss[3]), abs(miss[4]),
                            abs(miss[5]))
-            if not condition < _UNSOLVABLE:
+            # by Frobenius norms, at most six times the condition number: a step goes anywhere then
+            if not condition < UNSOLVABLE_CONDITION:
                 return SINGULAR, steps, residual
             from_position, from_rotation, before, side = position, rotation, missed, determinant
             way = dot6(i0, miss), dot6(i1, miss), dot6(i2, miss)
@@ -218,4 +216,5 @@ def _entry_points(source: str) -> tuple[Callable[..., None], Callable[..., None]
 
 
 poses, twists = _entry_points(source_digest(
-    'compiled', 'vectors', 'matrix6', 'inverse_dynamics', 'forward_kinematics'))
+    'compiled', 'vectors', 'matrix6', 'inverse_dynamics', 'singularity',
+    'forward_kinematics'))

@@ -27,7 +27,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -54,7 +53,6 @@ from stewart_dynamics.markers import Markers
 from stewart_dynamics.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.parameters import is_of_ros, Parameters
 from stewart_dynamics.planned_diagnostics import PlannedDiagnostics
-from stewart_dynamics.platform import StewartPlatform
 from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.ros import declare_parameters, run, until_shutdown
 from stewart_dynamics.series import Series
@@ -195,7 +193,7 @@ class DynamicsNode(LifecycleNode):
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
         self._step(Setpoint(0, (0.0,) * MOTION), None)
-        StewartPlatform(self._settings).solve(np.zeros((1, MOTION)))
+        planned.compile_ahead(self._settings)
         with suppress(StewartError):  # no legs have such lengths
             self._external_wrench(
                 Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)

@@ -101,6 +101,16 @@ class _Refused(Exception):
         self.outcome = Outcome(f'refused: {words}', reason, values=values)
 
 
+def compile_ahead(parameters: Parameters) -> None:
+    """Compile what the work on a trajectory calls: setpoints shall not wait for the first one."""
+    platform, rows = StewartPlatform(parameters), np.zeros((1, runtime.MOTION))
+    platform.solve(rows)
+    forward_kinematics.twists(platform.machine, np.zeros((1, 6)), rows)
+    codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
+    forward_kinematics.poses(
+        platform.machine, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
+
+
 def refused(reason: str, details: str) -> Outcome:
     """Return the outcome of a trajectory that is not worked on."""
     return _Refused(reason, f'{reason}: {details}').outcome

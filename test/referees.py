@@ -253,6 +253,14 @@ def uncompiled(code: str, given: Mapping[str, Array]) -> dict[str, Array]:
             return dict(arrays)
 
 
+def printed_compiled_and_not(code: str) -> set[str]:
+    """Return what code in the folder of the tests prints with the compiler and without it."""
+    return {subprocess.run(
+        [sys.executable, '-c', code], check=True, stdout=subprocess.PIPE, text=True,
+        cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': off}).stdout
+        for off in ('0', '1')}
+
+
 class PinocchioReferee:
     """
     Leg forces by the recursive Newton-Euler algorithm of Pinocchio.

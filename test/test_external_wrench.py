@@ -19,16 +19,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    random_motion, random_parameters, random_wrench, relative, rng, ROOT, smooth_motion)
+    printed_compiled_and_not, random_motion, random_parameters, random_wrench, relative, rng,
+    ROOT, smooth_motion)
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
@@ -446,9 +444,6 @@ print([np.array(each.wrench).tobytes().hex() for each in found[1:]], found[-1])
 
 
 def test_compiled_and_not_gives_the_same_bits() -> None:
-    printed = {subprocess.run(
-        [sys.executable, '-c', CODE], check=True, stdout=subprocess.PIPE, text=True,
-        cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': off}).stdout
-        for off in ('0', '1')}
+    printed = printed_compiled_and_not(CODE)
     assert len(printed) == 1
     assert len(printed.pop()) > 1000

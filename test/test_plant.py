@@ -17,9 +17,6 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 from typing import Any
 
 from messages import STORE
@@ -27,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    energies, friction, random_parameters, relative, rng, ROOT, rotation_about, size_of,
-    smooth_motion)
+    energies, friction, printed_compiled_and_not, random_parameters, relative, rng, ROOT,
+    rotation_about, size_of, smooth_motion)
 
 from stewart_dynamics import Motion, ParameterError, StewartPlatform
 from stewart_dynamics.parameters import Parameters, read_yaml
@@ -535,10 +532,7 @@ print([number.hex() for part in state for number in part])
 
 
 def test_compiled_and_not_gives_the_same_bits() -> None:
-    printed = {subprocess.run(
-        [sys.executable, '-c', CODE], check=True, stdout=subprocess.PIPE, text=True,
-        cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': off}).stdout
-        for off in ('0', '1')}
+    printed = printed_compiled_and_not(CODE)
     assert len(printed) == 1
     assert len(printed.pop()) > 1000
 

@@ -24,7 +24,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from stewart_dynamics import plant, setpoints, step
+from stewart_dynamics import planned, plant, setpoints, step
 from stewart_dynamics.parameters import PARAMETERS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -43,6 +43,7 @@ def test_tables_of_parameters_are_those_of_the_code(monkeypatch: pytest.MonkeyPa
 def test_topics_are_those_of_the_code() -> None:
     for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
                         ('markers', 'visualization_msgs/msg/MarkerArray'),
+                        (planned.INPUT, planned.INPUT_TYPE), (planned.OUTPUT, planned.OUTPUT_TYPE),
                         *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
 
