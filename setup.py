@@ -15,7 +15,7 @@
 
 from glob import glob
 
-from setuptools import setup
+from setuptools import find_packages, setup
 
 package_name = 'stewart_dynamics'
 share = f'share/{package_name}'
@@ -79,7 +79,7 @@ setup(
     maintainer='The stewart_dynamics developers',
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
-    packages=[package_name, f'{package_name}.replay'],
+    packages=find_packages(include=[package_name, f'{package_name}.*']),
     package_data={package_name: ['py.typed'], f'{package_name}.replay': ['*.html']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
@@ -100,10 +100,10 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'stewart_dynamics = stewart_dynamics.node:main',
+            'stewart_dynamics = stewart_dynamics.nodes.dynamics_node:main',
             'stewart_replay = stewart_dynamics.replay:main',
-            'stewart_simulator = stewart_dynamics.simulator_node:main',
-            'stewart_trajectory = stewart_dynamics.trajectory_node:main',
+            'stewart_simulator = stewart_dynamics.nodes.simulator_node:main',
+            'stewart_trajectory = stewart_dynamics.nodes.trajectory_node:main',
         ],
     },
 )

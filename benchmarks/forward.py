@@ -30,11 +30,11 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import root
 
-from stewart_dynamics import (
-    forward_dynamics, forward_kinematics, Motion, Pose, StewartPlatform)
-from stewart_dynamics import inverse_dynamics as runtime
-from stewart_dynamics.forward_kinematics import FOUND
-from stewart_dynamics.rotation import from_euler
+from stewart_dynamics import Motion, Pose, StewartPlatform
+from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics
+from stewart_dynamics.mechanics import kernel as runtime
+from stewart_dynamics.mechanics.forward_kinematics import FOUND
+from stewart_dynamics.mechanics.rotation import from_euler
 
 BEGIN, END = '<!-- forward: begin -->', '<!-- forward: end -->'
 

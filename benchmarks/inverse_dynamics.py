@@ -38,10 +38,11 @@ import numpy as np
 from numpy.typing import NDArray
 import pinocchio as pin
 
-from stewart_dynamics import inverse_dynamics as runtime
-from stewart_dynamics import lagrange, Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.mechanics import kernel as runtime
+from stewart_dynamics.mechanics import lagrange
+from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.parameters import inertia_matrix
-from stewart_dynamics.rotation import to_quaternion
 
 Array = NDArray[np.float64]
 

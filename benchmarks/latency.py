@@ -49,9 +49,10 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 from visualization_msgs.msg import MarkerArray
 
-from stewart_dynamics import cdr, Parameters, StewartPlatform
-from stewart_dynamics.rotation import to_quaternion
-from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
+from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.messages import cdr
 
 PARAMETERS = Path(__file__).resolve().parents[1] / 'config' / 'platform.yaml'
 QOS = QoSProfile(depth=2000)

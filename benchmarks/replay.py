@@ -46,8 +46,8 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics.rotation import to_quaternion
-from stewart_dynamics.trajectory import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.rotation import to_quaternion
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'
 PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
@@ -92,7 +92,7 @@ from pathlib import Path
 import sys
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.setpoints import Setpoints, SOURCES
+from stewart_dynamics.runtime.setpoints import Setpoints, SOURCES
 
 many = 0
 setpoints = Setpoints(Parameters.from_yaml({str(PARAMETERS)!r}), print, print)

@@ -30,13 +30,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import rclpy
 from rclpy.serialization import serialize_message
 
-from stewart_dynamics import cdr
-from stewart_dynamics.diagnostics import Diagnostics
-from stewart_dynamics.node import DynamicsNode
+from stewart_dynamics.messages import cdr
+from stewart_dynamics.nodes.dynamics_node import DynamicsNode
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.series import Series
-from stewart_dynamics.setpoints import SOURCES
-from stewart_dynamics.step import Setpoint, Step
+from stewart_dynamics.runtime.diagnostics import Diagnostics
+from stewart_dynamics.runtime.repeated_events import Series
+from stewart_dynamics.runtime.setpoints import SOURCES
+from stewart_dynamics.runtime.step import Setpoint, Step
 
 REPEATED = 21
 REFUSAL = 'setpoint/pose refused: not finite'

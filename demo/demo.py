@@ -42,11 +42,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 from tqdm import tqdm
 
-from stewart_dynamics import inverse_dynamics as runtime
+from stewart_dynamics.mechanics import kernel as runtime
+from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.singularity import CAUSE, STATE
-from stewart_dynamics.step import Batch, Outputs
-from stewart_dynamics.summary import Summary
+from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.runtime.step import Batch, Outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 NODE = '/stewart_dynamics'

@@ -51,11 +51,13 @@ from sensor_msgs.msg import JointState
 from tqdm import tqdm
 import yaml
 
-from stewart_dynamics import cdr, Motion, StewartPlatform
+from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.reference_motion import (
+    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.rotation import from_quaternion
-from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202

@@ -34,9 +34,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.lagrange import skew
+from stewart_dynamics.mechanics.lagrange import skew
+from stewart_dynamics.mechanics.rotation import (
+    euler_rate_matrix, euler_rate_matrix_rate, from_euler)
 from stewart_dynamics.parameters import inertia_matrix
-from stewart_dynamics.rotation import euler_rate_matrix, euler_rate_matrix_rate, from_euler
 
 Array = NDArray[np.float64]
 

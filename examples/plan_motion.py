@@ -38,8 +38,9 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.rotation import to_quaternion
-from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import (
+    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.rotation import to_quaternion
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml
 

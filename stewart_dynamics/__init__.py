@@ -14,12 +14,12 @@
 
 """Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs, for ROS 2."""
 
-from stewart_dynamics.causes import CAUSES, ForceCauses
 from stewart_dynamics.errors import (
     BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
-from stewart_dynamics.motion import Motion
+from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.stewart_platform import InverseDynamics, Pose, StewartPlatform
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.platform import InverseDynamics, Pose, StewartPlatform
 
 __all__ = [
     'BagError', 'CAUSES', 'ForceCauses', 'InverseDynamics', 'Motion', 'MotionError',

@@ -31,7 +31,7 @@ from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.ros_yaml import no_space, read_document, read_value, value_of
+from stewart_dynamics.parameters_yaml import no_space, read_document, read_value, value_of
 
 if TYPE_CHECKING:
     from typing_extensions import Self

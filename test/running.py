@@ -63,8 +63,8 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
 from stewart_dynamics import Motion, StewartPlatform
-from stewart_dynamics.platform import InverseDynamics
-from stewart_dynamics.rotation import from_quaternion
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 NODE = '/stewart_dynamics'

@@ -36,7 +36,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from stewart_dynamics import cdr
+from stewart_dynamics.messages import cdr
 
 SECOND = 1_000_000_000
 READERS = {

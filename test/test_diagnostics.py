@@ -24,11 +24,11 @@ import pytest
 from referees import symmetric_parameters
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
-from stewart_dynamics.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
-from stewart_dynamics.setpoints import (
+from stewart_dynamics.mechanics.singularity import Cause, Singularity
+from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.setpoints import (
     ACCEL, NOT_FINITE, NOT_JOINED, PASSED_OVER, POSE, Refusal, TWICE, TWIST)
-from stewart_dynamics.singularity import Cause, Singularity
-from stewart_dynamics.step import Excess, Output, Setpoint, Step
+from stewart_dynamics.runtime.step import Excess, Output, Setpoint, Step
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)

@@ -25,15 +25,16 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    printed_compiled_and_not, random_motion, random_parameters, random_wrench, relative, rng,
-    ROOT, smooth_motion)
+    printed_compiled_and_not, random_motion, random_parameters, random_wrench, relative, rng, ROOT,
+    smooth_motion)
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.external_wrench import Estimate, ExternalWrench, Measurement, Overload
 from stewart_dynamics.parameters import read_yaml
-from stewart_dynamics.plant import Plant, SimulatorParameters
-from stewart_dynamics.step import NO_WRENCH, Six
+from stewart_dynamics.runtime.external_wrench import (
+    Estimate, ExternalWrench, Measurement, Overload)
+from stewart_dynamics.runtime.plant import Plant, SimulatorParameters
+from stewart_dynamics.runtime.step import NO_WRENCH, Six
 
 Array = NDArray[np.float64]
 

@@ -791,7 +791,7 @@ def test_legs_and_inertias_that_no_machine_has_are_refused(
 
 MEASURED = """\
 import sys
-from stewart_dynamics.node import main
+from stewart_dynamics.nodes.dynamics_node import main
 code = main()
 print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))
 sys.exit(code)

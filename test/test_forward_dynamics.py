@@ -24,8 +24,9 @@ from referees import (
     each_relative, friction, PinocchioReferee, random_motion, random_parameters, random_wrench,
     rng, uncompiled)
 
-from stewart_dynamics import forward_dynamics, Motion, MotionError, Parameters, StewartPlatform
-from stewart_dynamics.compiled import COMPILED
+from stewart_dynamics import Motion, MotionError, Parameters, StewartPlatform
+from stewart_dynamics.mechanics import forward_dynamics
+from stewart_dynamics.mechanics.jit import COMPILED
 
 STATES = 20
 
@@ -169,7 +170,7 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     machine, wrench = StewartPlatform(p).machine, random_wrench(p, rng(), 10)
     given = {'machine': machine, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench}
     plain = uncompiled(
-        'from stewart_dynamics.forward_dynamics import solve\n'
+        'from stewart_dynamics.mechanics.forward_dynamics import solve\n'
         "solve(given['machine'], given['rows'], given['forces'], given['wrench'])\n", given)
     forward_dynamics.solve(machine, rows, forces, wrench)
     assert np.array_equal(plain['rows'], rows)

@@ -26,11 +26,11 @@ from referees import (
     uncompiled)
 
 from stewart_dynamics import (
-    forward_kinematics, lagrange, Motion, MotionError, Parameters, Pose, PoseError,
-    SingularityError, StewartPlatform)
-from stewart_dynamics.compiled import COMPILED
-from stewart_dynamics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
-from stewart_dynamics.rotation import from_euler
+    Motion, MotionError, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
+from stewart_dynamics.mechanics import forward_kinematics, lagrange
+from stewart_dynamics.mechanics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
+from stewart_dynamics.mechanics.jit import COMPILED
+from stewart_dynamics.mechanics.rotation import from_euler
 
 Array = NDArray[np.float64]
 
@@ -255,7 +255,7 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
              'rows': rows.copy(), 'codes': codes.copy(), 'steps': steps.copy(),
              'residuals': residuals.copy()}
     plain = uncompiled(
-        'from stewart_dynamics.forward_kinematics import poses, twists\n'
+        'from stewart_dynamics.mechanics.forward_kinematics import poses, twists\n'
         "poses(given['machine'], given['lengths'], given['rows'], given['codes'],\n"
         "      given['steps'], given['residuals'])\n"
         "twists(given['machine'], given['rates'], given['rows'])\n", given)

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 import pytest
 from referees import derivative, rng, rotation_about
 
-from stewart_dynamics.interpolation import Interpolation
-from stewart_dynamics.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.interpolation import Interpolation
+from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
 
 Array = NDArray[np.float64]
 

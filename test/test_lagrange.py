@@ -27,7 +27,8 @@ from referees import (
     derivative, each_relative, energies, friction, moved, random_motion, random_parameters,
     random_wrench, relative, rng, ROOT)
 
-from stewart_dynamics import lagrange, Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.mechanics import lagrange
 
 Array = NDArray[np.float64]
 

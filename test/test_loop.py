@@ -31,8 +31,7 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message
-from running import (
-    assert_only_log_lines, executable, own_domain, Peer, PLATFORM, Program, ROOT)
+from running import assert_only_log_lines, executable, own_domain, Peer, PLATFORM, Program, ROOT
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 

@@ -33,12 +33,12 @@ from referees import (  # noqa: E402
 from running import DynamicsNode, nanoseconds, NODE, PLATFORM, Sample  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
-from stewart_dynamics import markers as pictures  # noqa: E402
 from stewart_dynamics import Parameters, StewartPlatform  # noqa: E402
-from stewart_dynamics.diagnostics import ERROR, OK, WARN  # noqa: E402
-from stewart_dynamics.markers import Markers  # noqa: E402
-from stewart_dynamics.rotation import from_quaternion  # noqa: E402
-from stewart_dynamics.step import Output, Setpoint, Step  # noqa: E402
+from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
+from stewart_dynamics.nodes import markers as pictures  # noqa: E402
+from stewart_dynamics.nodes.markers import Markers  # noqa: E402
+from stewart_dynamics.runtime.diagnostics import ERROR, OK, WARN  # noqa: E402
+from stewart_dynamics.runtime.step import Output, Setpoint, Step  # noqa: E402
 
 Array = NDArray[np.float64]
 Start = Callable[..., DynamicsNode]

@@ -29,7 +29,7 @@ import pytest
 from referees import rng
 
 import stewart_dynamics
-from stewart_dynamics.matrix6 import SMALLEST_PIVOT
+from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def matrix6() -> Iterator[Any]:
             importlib.import_module(f'stewart_dynamics.{name}')
             patch.delitem(sys.modules, f'stewart_dynamics.{name}')
             patch.setattr(stewart_dynamics, name, None)
-        yield importlib.import_module('stewart_dynamics.matrix6')
+        yield importlib.import_module('stewart_dynamics.mechanics.matrix6')
 
 
 def rows(matrix: Any) -> list[tuple[float, ...]]:

@@ -30,7 +30,7 @@ from referees import random_parameters, rng, size_of
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.replay.measured import Comparison
-from stewart_dynamics.step import Batch, Outputs, Step
+from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
 

@@ -26,12 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    derivative, random_direction, random_parameters, relative, rng, rotation_about,
-    smooth_motion)
+    derivative, random_direction, random_parameters, relative, rng, rotation_about, smooth_motion)
 
 from stewart_dynamics import Motion, MotionError
-from stewart_dynamics.lagrange import skew
-from stewart_dynamics.rotation import (
+from stewart_dynamics.mechanics.lagrange import skew
+from stewart_dynamics.mechanics.rotation import (
     euler_rate_matrix, euler_rate_matrix_rate, from_euler, quaternion_of, to_quaternion)
 
 Array = NDArray[np.float64]

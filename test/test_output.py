@@ -42,10 +42,10 @@ from scipy.spatial.transform import Rotation
 import yaml  # type: ignore[import-untyped]
 
 from stewart_dynamics import Parameters
+from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.singularity import CAUSE, STATE
-from stewart_dynamics.step import Batch, OUTPUT_TYPES, Outputs, Step
+from stewart_dynamics.runtime.step import Batch, OUTPUT_TYPES, Outputs, Step
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
     {'singularity.action': 'suppress_forces'})

@@ -29,7 +29,7 @@ from referees import ROOT
 
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.parameters import PARAMETERS, read_yaml
-from stewart_dynamics.ros_yaml import read_document
+from stewart_dynamics.parameters_yaml import read_document
 
 GOOD = """\
 /**:

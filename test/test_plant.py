@@ -28,10 +28,10 @@ from referees import (
     rotation_about, size_of, smooth_motion)
 
 from stewart_dynamics import Motion, ParameterError, StewartPlatform
+from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.parameters import Parameters, read_yaml
-from stewart_dynamics.plant import (
+from stewart_dynamics.runtime.plant import (
     _largest, OUTPUT_TYPES, Plant, SimulatorParameters, State)
-from stewart_dynamics.rotation import from_quaternion
 
 Array = NDArray[np.float64]
 Six = tuple[float, float, float, float, float, float]

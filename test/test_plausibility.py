@@ -26,8 +26,8 @@ import pytest
 from referees import random_parameters, ROOT, symmetric_parameters
 
 from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.plausibility import doubts, homes
-from stewart_dynamics.rotation import from_euler
+from stewart_dynamics.mechanics.plausibility import doubts, homes
+from stewart_dynamics.mechanics.rotation import from_euler
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -24,8 +24,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from stewart_dynamics import planned, plant, setpoints, step
 from stewart_dynamics.parameters import PARAMETERS
+from stewart_dynamics.runtime import planned_trajectory as planned
+from stewart_dynamics.runtime import plant, setpoints, step
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / 'README.md').read_text(encoding='utf-8')

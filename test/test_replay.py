@@ -49,15 +49,15 @@ from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
-from stewart_dynamics.causes import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ, replay, Replayed)
-from stewart_dynamics.rotation import from_quaternion
-from stewart_dynamics.setpoints import (
-    ACCEL, COMBINED, INPUT_TYPES, MALFORMED, NOT_FINITE, NOT_JOINED, POSE, TOO_OLD,
-    TWICE, TWIST, WRENCH)
-from stewart_dynamics.step import OUTPUT_TYPES
+from stewart_dynamics.runtime.setpoints import (
+    ACCEL, COMBINED, INPUT_TYPES, MALFORMED, NOT_FINITE, NOT_JOINED, POSE, TOO_OLD, TWICE, TWIST,
+    WRENCH)
+from stewart_dynamics.runtime.step import OUTPUT_TYPES
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -804,8 +804,8 @@ def test_it_needs_no_ros() -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import sys, stewart_dynamics.replay; '
          'print([n for n in sys.modules if n.startswith(("rclpy", "rcl_interfaces", "rosidl", '
-         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node")) '
-         'or n == "stewart_dynamics.ros"])'],
+         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.nodes.dynamics_node")) '
+         'or n == "stewart_dynamics.nodes.run"])'],
         capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == '[]'
 

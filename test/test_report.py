@@ -34,13 +34,14 @@ from numpy.typing import NDArray
 import pytest
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.causes import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.reference_motion import (
+    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.report import Report
-from stewart_dynamics.rotation import from_euler
-from stewart_dynamics.step import Batch, Outputs, Step
-from stewart_dynamics.summary import Summary
-from stewart_dynamics.trajectory import motion_at, sample_times, TrajectoryParameters
+from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -49,7 +49,7 @@ from running import (  # noqa: E402
 
 from stewart_dynamics import plant  # noqa: E402
 from stewart_dynamics.errors import StewartError  # noqa: E402
-from stewart_dynamics.security import check_environment  # noqa: E402
+from stewart_dynamics.nodes.security import check_environment  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'

@@ -28,9 +28,9 @@ from referees import (
     QUARTER_TURN, random_motion, random_parameters, random_wrench, rng, symmetric_parameters)
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.rotation import from_quaternion
-from stewart_dynamics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
-from stewart_dynamics.step import (
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
+from stewart_dynamics.runtime.step import (
     Excess, NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Six, Step)
 
 PARAMETERS = symmetric_parameters()

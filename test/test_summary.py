@@ -33,12 +33,12 @@ import pytest
 from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
-from stewart_dynamics import inverse_dynamics as runtime
 from stewart_dynamics import Parameters
-from stewart_dynamics.causes import CAUSES, ForceCauses
-from stewart_dynamics.singularity import CAUSE, STATE, TIME
-from stewart_dynamics.step import Batch, Outputs, Step
-from stewart_dynamics.summary import Summary, TOLD
+from stewart_dynamics.mechanics import kernel as runtime
+from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME
+from stewart_dynamics.replay.summary import Summary, TOLD
+from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
 

@@ -26,14 +26,13 @@ import sys
 
 from tqdm import tqdm
 
-from stewart_dynamics import compiled
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics import jit as compiled
+from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.plausibility import doubts
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, folders_of_results
 from stewart_dynamics.replay.fleet import replay_fleet
-from stewart_dynamics.replay.one import (
-    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, replay)
+from stewart_dynamics.replay.one import BAD_INPUT, DONE, LIMIT_MET, NODE, Options, replay
 
 _INTERRUPTED = 130
 _CUTOFF = 10.0

@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.summary import FIRST, longest_step
+from stewart_dynamics.replay.summary import FIRST, longest_step
 
 Array = NDArray[np.float64]
 

@@ -53,10 +53,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics import rotation as rotations
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.inverse_dynamics import MOTION, WRENCH
-from stewart_dynamics.step import Batch
+from stewart_dynamics.mechanics import rotation as rotations
+from stewart_dynamics.mechanics.kernel import MOTION, WRENCH
+from stewart_dynamics.runtime.step import Batch
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stewart_dynamics import cdr
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.setpoints import MALFORMED, NOT_FINITE
+from stewart_dynamics.messages import cdr
+from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

@@ -44,8 +44,8 @@ import numpy as np
 from numpy.typing import NDArray
 import zstandard
 
-from stewart_dynamics.compiled import entry_point
 from stewart_dynamics.errors import BagError, one_line
+from stewart_dynamics.mechanics.jit import entry_point
 
 Integers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]

@@ -75,9 +75,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.inverse_dynamics import COULOMB_RATE
+from stewart_dynamics.mechanics.kernel import COULOMB_RATE
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.step import Batch, Outputs
+from stewart_dynamics.runtime.step import Batch, Outputs
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

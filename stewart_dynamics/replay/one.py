@@ -37,9 +37,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics import setpoints as inputs
-from stewart_dynamics.causes import ForceCauses
 from stewart_dynamics.errors import BagError, StewartError
+from stewart_dynamics.mechanics.force_breakdown import ForceCauses
+from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.efforts import Efforts
@@ -47,10 +47,10 @@ from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Table
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
-from stewart_dynamics.setpoints import Messages, Refusal, Setpoints
-from stewart_dynamics.singularity import Singularity
-from stewart_dynamics.step import Batch, Stamps, Step
-from stewart_dynamics.summary import Summary
+from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.runtime import setpoints as inputs
+from stewart_dynamics.runtime.setpoints import Messages, Refusal, Setpoints
+from stewart_dynamics.runtime.step import Batch, Stamps, Step
 
 DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
 NODE = '/stewart_dynamics'

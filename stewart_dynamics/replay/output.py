@@ -34,10 +34,10 @@ import orjson
 from rosbags.typesys import get_typestore, Stores
 import yaml  # type: ignore[import-untyped]
 
-from stewart_dynamics.cdr import at_any_byte
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.messages.cdr import at_any_byte
 from stewart_dynamics.replay.mcap_file import MAGIC
-from stewart_dynamics.step import OUTPUT_TYPES, Outputs, Stamps, Step
+from stewart_dynamics.runtime.step import OUTPUT_TYPES, Outputs, Stamps, Step
 
 _LIBRARY = 'stewart_dynamics'
 # Of a message record: opcode, length, channel, sequence, when it was logged and published.

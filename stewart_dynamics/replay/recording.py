@@ -30,10 +30,10 @@ import numpy as np
 import zstandard
 
 from stewart_dynamics.errors import BagError, one_line, ParameterError
+from stewart_dynamics.parameters_yaml import read_document
 from stewart_dynamics.replay.bags import STORAGES
 from stewart_dynamics.replay.mcap_file import Block, compact, joined, MAGIC, McapFile
-from stewart_dynamics.ros_yaml import read_document
-from stewart_dynamics.setpoints import Messages
+from stewart_dynamics.runtime.setpoints import Messages
 
 # So many messages are handed over at once, where there are as many: enough that numpy's own cost
 # for each call is small, few enough that they stay in the processor's cache.

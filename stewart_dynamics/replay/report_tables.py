@@ -28,7 +28,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.causes import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import CAUSES
 from stewart_dynamics.parameters import PARAMETERS, Parameters
 
 # So many of the times of one kind are told, the first.

@@ -1,0 +1,217 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Forward kinematics: the pose that belongs to six leg lengths, and the twist to six leg rates.
+
+Up to forty poses have the same six lengths (Dietmaier, The Stewart-Gough platform of general
+geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess says which
+one is meant: the last pose, or the one that is commanded. Newton's method on ``L(X) = L``
+with the exact J_inv goes from it to the pose, and never to where det(J) has the other sign:
+another assembly lies beyond a singularity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined, source_digest
+from stewart_dynamics.mechanics.kernel import leg_line
+from stewart_dynamics.mechanics.matrix6 import inverse_and_determinant, Rows
+from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.vectors import add, cross, dot6, Matrix3, scale, Vector3, Vector6
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int64]
+
+# The lengths of a pose that is found differ by no more than this from those given [m].
+RESIDUAL = 1e-12
+
+# What became of a guess.
+FOUND, NO_POSE, SINGULAR = range(3)
+
+# Newton's method takes 6 steps at most from nearly everywhere (benchmarks/README.md). A step to
+# the other side of a singularity is halved, and one that leads away by this (of the sum of
+# squares: a first step from afar may overshoot and yet be the fastest way). Where even so small a
+# part of one does, and after so many, there is no pose to be found.
+_FARTHER = 16.0
+_LEAST_PART = 1e-3
+MOST_STEPS = 50
+
+
+@inlined
+def _row(machine: Array, leg: int, position: Vector3, rotation: Matrix3,
+         ) -> tuple[float, Vector6]:
+    """Return a leg's length and row of J_inv, its right half by the characteristic length."""
+    a, length, _, s = leg_line(machine, leg, position, rotation)
+    m = scale(1.0 / machine[3], cross(a, s))
+    return length, (s[0], s[1], s[2], m[0], m[1], m[2])
+
+
+@inlined
+def _squares(rows: Rows) -> float:
+    a, b, c, d, e, f = rows
+    return dot6(a, a) + dot6(b, b) + dot6(c, c) + dot6(d, d) + dot6(e, e) + dot6(f, f)
+
+
+@inlined
+def _orthonormal(r: Matrix3) -> Matrix3:
+    """Return the rotation next to one that is off by little: R (3 - R^T R) / 2, Newton's step."""
+    x, y, z = (r[0], r[3], r[6]), (r[1], r[4], r[7]), (r[2], r[5], r[8])
+    xx = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
+    yy = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
+    zz = z[0] * z[0] + z[1] * z[1] + z[2] * z[2]
+    xy = 0.5 * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
+    xz = 0.5 * (x[0] * z[0] + x[1] * z[1] + x[2] * z[2])
+    yz = 0.5 * (y[0] * z[0] + y[1] * z[1] + y[2] * z[2])
+    u, v, w = 1.5 - 0.5 * xx, 1.5 - 0.5 * yy, 1.5 - 0.5 * zz
+    return (u * x[0] - xy * y[0] - xz * z[0], v * y[0] - xy * x[0] - yz * z[0],
+            w * z[0] - xz * x[0] - yz * y[0],
+            u * x[1] - xy * y[1] - xz * z[1], v * y[1] - xy * x[1] - yz * z[1],
+            w * z[1] - xz * x[1] - yz * y[1],
+            u * x[2] - xy * y[2] - xz * z[2], v * y[2] - xy * x[2] - yz * z[2],
+            w * z[2] - xz * x[2] - yz * y[2])
+
+
+@inlined
+def _turned(turn: Vector3, r: Matrix3) -> Matrix3:
+    """
+    Return R turned about ``turn`` by 2 atan(|turn| / 2): Cayley's map, a rotation exactly.
+
+    It is the turn by |turn| but for the third order, which Newton's method does not feel.
+    """
+    x, y, z = scale(0.5, turn)
+    k = 2.0 / (1.0 + x * x + y * y + z * z)
+    c = 1.0 - k * (x * x + y * y + z * z)
+    a, b, d = (c + k * x * x, k * (x * y - z), k * (x * z + y))
+    e, f, g = (k * (x * y + z), c + k * y * y, k * (y * z - x))
+    h, i, j = (k * (x * z - y), k * (y * z + x), c + k * z * z)
+    return (a * r[0] + b * r[3] + d * r[6], a * r[1] + b * r[4] + d * r[7],
+            a * r[2] + b * r[5] + d * r[8],
+            e * r[0] + f * r[3] + g * r[6], e * r[1] + f * r[4] + g * r[7],
+            e * r[2] + f * r[5] + g * r[8],
+            h * r[0] + i * r[3] + j * r[6], h * r[1] + i * r[4] + j * r[7],
+            h * r[2] + i * r[5] + j * r[8])
+
+
+@compiled
+def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float]:
+    """
+    Find the pose of six lengths.
+
+    Parameters
+    ----------
+    machine : (MACHINE,)
+        The machine's numbers as ``inverse_dynamics`` has them.
+    lengths : (6,)
+        [m]
+    motion : (MOTION,)
+        A row of motion; its first twelve numbers are the guess, and the pose when it is found.
+
+    Returns
+    -------
+    code, steps, residual
+        FOUND, NO_POSE or SINGULAR; the steps taken; the largest difference in length [m].
+
+    """
+    position = motion[0], motion[1], motion[2]
+    # Twice, for a guess may be off by 1e-6; the pose found does not hand on what rounding adds.
+    rotation = _orthonormal(_orthonormal((
+        motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9], motion[10],
+        motion[11])))
+    per_size = 1.0 / machine[3]
+    side = 0.0
+    # The last pose that was good to go on from, by how much it missed, and the step from there.
+    from_position, from_rotation, before, residual = position, rotation, math.inf, math.inf
+    way, turn, part = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
+    for steps in range(MOST_STEPS):
+        l0, r0 = _row(machine, 0, position, rotation)
+        l1, r1 = _row(machine, 1, position, rotation)
+        l2, r2 = _row(machine, 2, position, rotation)
+        l3, r3 = _row(machine, 3, position, rotation)
+        l4, r4 = _row(machine, 4, position, rotation)
+        l5, r5 = _row(machine, 5, position, rotation)
+        miss = (lengths[0] - l0, lengths[1] - l1, lengths[2] - l2, lengths[3] - l3,
+                lengths[4] - l4, lengths[5] - l5)
+        missed = dot6(miss, miss)
+        (i0, i1, i2, i3, i4, i5), determinant = inverse_and_determinant(r0, r1, r2, r3, r4, r5)
+        if missed < _FARTHER * before and side * determinant >= 0.0:
+            condition = math.sqrt(_squares((r0, r1, r2, r3, r4, r5))
+                                  * _squares((i0, i1, i2, i3, i4, i5)))
+            residual = max(abs(miss[0]), abs(miss[1]), abs(miss[2]), abs(miss[3]), abs(miss[4]),
+                           abs(miss[5]))
+            # by Frobenius norms, at most six times the condition number: a step goes anywhere then
+            if not condition < UNSOLVABLE_CONDITION:
+                return SINGULAR, steps, residual
+            from_position, from_rotation, before, side = position, rotation, missed, determinant
+            way = dot6(i0, miss), dot6(i1, miss), dot6(i2, miss)
+            turn = scale(per_size, (dot6(i3, miss), dot6(i4, miss), dot6(i5, miss)))
+            part = 1.0
+        elif residual > RESIDUAL:
+            part *= 0.5
+            if part < _LEAST_PART:
+                return NO_POSE, steps, residual
+        # With the last step, where it is near enough: what it then misses is rounding.
+        position = add(from_position, scale(part, way))
+        rotation = _turned(scale(part, turn), from_rotation)
+        if residual <= RESIDUAL:
+            for n in range(3):
+                motion[n] = position[n]
+            for n in range(9):
+                motion[3 + n] = rotation[n]
+            return FOUND, steps, residual
+    return NO_POSE, MOST_STEPS, residual
+
+
+@compiled
+def twist(machine: Array, rates: Array, motion: Array) -> None:
+    """Write the twist of a row of motion (MOTION,) that leg rates (6,) [m/s] belong to."""
+    position = motion[0], motion[1], motion[2]
+    rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
+                motion[10], motion[11])
+    inverse, _ = inverse_and_determinant(
+        _row(machine, 0, position, rotation)[1], _row(machine, 1, position, rotation)[1],
+        _row(machine, 2, position, rotation)[1], _row(machine, 3, position, rotation)[1],
+        _row(machine, 4, position, rotation)[1], _row(machine, 5, position, rotation)[1])
+    rate = rates[0], rates[1], rates[2], rates[3], rates[4], rates[5]
+    per_size = 1.0 / machine[3]
+    for n in range(3):
+        motion[12 + n] = dot6(inverse[n], rate)
+        motion[15 + n] = per_size * dot6(inverse[3 + n], rate)
+
+
+def _entry_points(source: str) -> tuple[Callable[..., None], Callable[..., None]]:
+    @entry_point
+    def poses(machine: Array, lengths: Array, motions: Array, codes: Codes, steps: Codes,
+              residuals: Array) -> None:
+        """Find the poses of lengths (N, 6), see ``pose``; the rest is (N, MOTION) and (N,)."""
+        _ = source  # part of the key of the kept machine code: see source_digest
+        for n in range(len(motions)):
+            codes[n], steps[n], residuals[n] = pose(machine, lengths[n], motions[n])
+
+    @entry_point
+    def twists(machine: Array, rates: Array, motions: Array) -> None:
+        """Write the twists of motions (N, MOTION) that leg rates (N, 6) belong to."""
+        _ = source
+        for n in range(len(motions)):
+            twist(machine, rates[n], motions[n])
+
+    return poses, twists
+
+
+poses, twists = _entry_points(source_digest())

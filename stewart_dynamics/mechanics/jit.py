@@ -1,0 +1,100 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How the runtime path is compiled: by numba where it is installed, else not at all.
+
+The functions are plain Python either way and give the same bits: no fast-math flag is set,
+so the compiler may neither reorder a sum nor fuse a product into it, and a sample computed
+in a vector lane equals the same sample computed alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import hashlib
+from pathlib import Path
+from typing import Any, cast, TypeVar
+
+import numpy as np
+
+__all__ = ['COMPILED', 'HINT', 'compiled', 'entry_point', 'inlined', 'source_digest']
+
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+_UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a thousand times '
+               'slower, a millisecond or more for each setpoint')
+# What a user should hear once, on a log, of how the runtime path is compiled; empty where all
+# is well.
+HINT = ''
+
+
+def _quiet(function: Function) -> Function:
+    """Return the function with no word of an overflow, as compiled code has none."""
+    return np.errstate(all='ignore')(function)
+
+
+try:
+    import numba
+except ImportError:
+    COMPILED = False
+    HINT = f'numba is not installed: {_UNCOMPILED}; pip install numba'
+
+    def inlined(function: Function) -> Function:
+        """Return the function as it is: there is no compiler."""
+        return function
+
+    compiled = inlined
+    entry_point = _quiet
+else:
+    COMPILED = not getattr(numba.config, 'DISABLE_JIT', 0)
+    if not COMPILED:
+        HINT = f'NUMBA_DISABLE_JIT is set: {_UNCOMPILED}'
+
+    def inlined(function: Function) -> Function:
+        """Compile a part of a loop's body; inlined, so that the loop becomes vector code."""
+        # error_model 'numpy': a division by zero gives inf or nan and no exception, which
+        # would be a branch that keeps the loop from becoming vector code.
+        return cast('Function', numba.njit(error_model='numpy', forceinline=True)(function))
+
+    def compiled(function: Function) -> Function:
+        """Compile a function that is called as one."""
+        return cast('Function', numba.njit(error_model='numpy', nogil=True)(function))
+
+    def entry_point(function: Function) -> Function:
+        """Compile what Python calls; its machine code is kept on disk for the next start."""
+        global HINT
+        if not COMPILED:
+            return _quiet(function)
+        kept = numba.njit(error_model='numpy', nogil=True, cache=True)
+        try:
+            return cast('Function', kept(function))
+        except RuntimeError:  # no folder that numba may write to
+            HINT = ('the compiled dynamics cannot be kept on disk: every start takes seconds; '
+                    'let NUMBA_CACHE_DIR name a folder that can be written to')
+            return compiled(function)
+
+
+def source_digest() -> str:
+    """
+    Return a digest of the sources of the mechanics.
+
+    numba takes kept machine code for valid while the file of the entry point is unchanged,
+    whatever became of the files of the functions it calls. What an entry point closes over
+    is part of its key, so an entry point closes over this.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob('*.py')):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

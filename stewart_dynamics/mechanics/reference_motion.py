@@ -1,0 +1,192 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Motions as functions of time, with exact derivatives, and the parameters that describe them.
+
+A file that holds one belongs to the node stewart_trajectory, which publishes it as setpoints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics import rotation as rotations
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.parameters import Parameter, ParameterSet
+
+Array = NDArray[np.float64]
+
+_POSE = 'X Y Z alpha beta gamma'
+
+TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
+    Parameter('target', 'string', 'node that gets the setpoints, on <target>/setpoint/...',
+              default='stewart_dynamics'),
+    Parameter('base_frame', 'string', 'frame in which the setpoints are given', default='base'),
+    Parameter('output', 'string', 'pose, twist and accel on three topics, or all in one message',
+              default='separate', choices=('separate', 'combined')),
+    Parameter('rate', 'double', 'setpoints in a second', 'Hz', 100.0, minimum=1e-3,
+              maximum=1e4),
+    Parameter('start_timeout', 'double', 'it begins half a second after all its topics have '
+              'subscribers, or after this time without', 's', 5.0, minimum=0.0,
+              maximum=86400.0),
+    Parameter('loop', 'bool', 'go on until stopped: paper and quintic to and fro, sine and hold '
+              'without an end', default=False),
+    Parameter('motion.type', 'string', 'paper: from initial to final, each coordinate as a half '
+              'cosine; quintic: on the straight line and about one axis; sine: about initial; '
+              'hold: at initial', default='paper', choices=('paper', 'quintic', 'sine', 'hold')),
+    Parameter('motion.duration', 'double', 'how long it lasts, one way', 's', 10.0, minimum=0.0,
+              maximum=86400.0, above=True),
+    Parameter('motion.initial', 'double', f'{_POSE} at the start; the center of a sine',
+              'm, rad', required=True, sizes=(6,)),
+    Parameter('motion.final', 'double', f'{_POSE} at the end; paper and quintic need it',
+              'm, rad', sizes=(6,)),
+    Parameter('motion.amplitude', 'double', f'of {_POSE}; sine only', 'm, rad', (0.0,) * 6,
+              sizes=(6,)),
+    Parameter('motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
+              (0.5,), sizes=(1, 6), minimum=0.0, maximum=1e3),
+    Parameter('motion.phase', 'double', f'of {_POSE}; sine only', 'rad', (0.0,) * 6, sizes=(6,)),
+)})
+
+
+class TrajectoryParameters(ParameterSet):
+    """A motion, and how it is published."""
+
+    table = TRAJECTORY_PARAMETERS
+    node = 'stewart_trajectory'
+
+    def _check_together(self, source: str) -> None:
+        """Check what one parameter demands of another."""
+        if self['motion.type'] in ('paper', 'quintic') and self['motion.final'] is None:
+            raise ParameterError(f'{source}: motion.final: missing, motion.type '
+                                 f'{self["motion.type"]} needs it')
+
+
+def sample_times(parameters: TrajectoryParameters) -> NDArray[np.int64]:
+    """
+    Return the times of one way of the motion (N,) [ns], 0 and on at the rate.
+
+    The last is at the duration or, where no sample falls on it, the next one after it: a
+    motion that ends at rest is then seen to end.
+    """
+    return sample_time(parameters, np.arange(sample_count(parameters)))
+
+
+def sample_count(parameters: TrajectoryParameters) -> int:
+    """Return how many times ``sample_times`` has."""
+    exact: float = parameters['motion.duration'] * parameters['rate']
+    near = round(exact)
+    is_near = math.isclose(exact, near, rel_tol=1e-12, abs_tol=1e-9)
+    return 1 + (near if is_near else math.ceil(exact))
+
+
+def sample_time(parameters: TrajectoryParameters, index: ArrayLike) -> NDArray[np.int64]:
+    """Return the times of samples by their index (...) [ns]; errors of rounding do not add up."""
+    times: NDArray[np.int64] = np.rint(
+        np.asarray(index) * 1e9 / parameters['rate']).astype(np.int64)
+    return times
+
+
+def motion_at(parameters: TrajectoryParameters, times: ArrayLike) -> Motion:
+    """
+    Return the motion at times (...) [s] from its start; all derivatives are exact.
+
+    - paper: each of X, Y, Z, alpha, beta, gamma goes from initial to final as
+      (1 - cos(pi t / T)) / 2. The paper prints neither its law nor its figures' data, only
+      that the input goes from an initial to a final pose in 10 s and is differentiated twice.
+      This is the simplest law that does so from rest to rest; its acceleration is bounded but
+      does not begin at zero, and looped it is one smooth oscillation.
+    - quintic: the position on a straight line, the rotation about the one axis, fixed in the
+      base, that leads from the initial to the final orientation the short way; both with
+      10 u^3 - 15 u^4 + 6 u^5, u = t / T, so that velocity and acceleration are zero at both
+      ends.
+    - sine: each coordinate as initial + amplitude sin(2 pi frequency t + phase), from the first
+      sample on: it begins at full speed where the phase is zero.
+    - hold: at rest in initial.
+
+    paper and quintic are at rest in initial before their start and in final after their end;
+    looped they run to and fro, each way in the duration.
+    """
+    time = np.asarray(times, dtype=float)
+    kind, initial = parameters['motion.type'], parameters['motion.initial']
+    if kind == 'hold':
+        return _euler_motion(np.broadcast_to(initial, (*time.shape, 6)), np.zeros(6), np.zeros(6))
+    if kind == 'sine':
+        amplitude = parameters['motion.amplitude']
+        omega = 2.0 * np.pi * parameters['motion.frequency']
+        angle = omega * time[..., None] + parameters['motion.phase']
+        return _euler_motion(
+            initial + amplitude * np.sin(angle), amplitude * omega * np.cos(angle),
+            -amplitude * omega ** 2 * np.sin(angle))
+    s, ds, dds = (each[..., None] for each in _progress(parameters, time))
+    final = parameters['motion.final']
+    if kind == 'paper':
+        way = final - initial
+        return _euler_motion(initial + s * way, ds * way, dds * way)
+    start, end = rotations.from_euler(initial[3:]), rotations.from_euler(final[3:])
+    turn = _rotation_vector(end @ start.T)
+    way = final[:3] - initial[:3]
+    return Motion(initial[:3] + s * way, _rotation_about(turn, s[..., 0]) @ start,
+                  ds * way, ds * turn, dds * way, dds * turn)
+
+
+def _euler_motion(pose: Array, rate: Array, acceleration: Array) -> Motion:
+    return Motion.from_euler(pose[..., :3], pose[..., 3:], rate[..., :3], rate[..., 3:],
+                             acceleration[..., :3], acceleration[..., 3:])
+
+
+def _progress(parameters: TrajectoryParameters, time: Array) -> tuple[Array, Array, Array]:
+    """Return the part of the way that is done and its time derivatives [1, 1/s, 1/s^2]."""
+    duration = parameters['motion.duration']
+    u = time / duration
+    sign = np.ones_like(u)
+    if parameters['loop']:
+        u = np.mod(u, 2.0)
+        sign = np.where(u > 1.0, -1.0, 1.0)
+        u = np.where(u > 1.0, 2.0 - u, u)
+    moving = np.where((u >= 0.0) & (u <= 1.0), 1.0, 0.0)
+    u = np.clip(u, 0.0, 1.0)
+    if parameters['motion.type'] == 'paper':
+        s, ds, dds = ((1.0 - np.cos(np.pi * u)) / 2.0, np.pi / 2.0 * np.sin(np.pi * u),
+                      np.pi ** 2 / 2.0 * np.cos(np.pi * u))
+    else:
+        s, ds, dds = (u ** 3 * (10.0 + u * (6.0 * u - 15.0)), 30.0 * (u * (1.0 - u)) ** 2,
+                      60.0 * u * (1.0 - u) * (1.0 - 2.0 * u))
+    return s, sign * moving * ds / duration, moving * dds / duration ** 2
+
+
+def _rotation_vector(rotation: Array) -> Array:
+    """Return axis times angle (3,) [rad] of a rotation, the angle at most pi."""
+    quaternion = rotations.to_quaternion(rotation)
+    sine = float(np.linalg.norm(quaternion[:3]))
+    if sine == 0.0:
+        return np.zeros(3)
+    vector: Array = quaternion[:3] / sine * (2.0 * math.atan2(sine, quaternion[3]))
+    return vector
+
+
+def _rotation_about(vector: Array, part: Array) -> Array:
+    """Return the rotations (..., 3, 3) by a part (...) of a rotation vector (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector / angle if angle else vector
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turned = (part * angle)[..., None, None]
+    rotation: Array = np.eye(3) + np.sin(turned) * k + (1.0 - np.cos(turned)) * (k @ k)
+    return rotation

@@ -1,0 +1,96 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Vectors of three and six numbers as tuples: the arithmetic of the runtime path.
+
+Tuples become registers when compiled. Every function is inlined into the loop over samples.
+"""
+
+from __future__ import annotations
+
+from stewart_dynamics.mechanics.jit import inlined
+
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+Matrix3 = tuple[float, float, float, float, float, float, float, float, float]  # row by row
+Symmetric3 = Vector6  # xx xy xz yy yz zz
+
+
+@inlined
+def add(a: Vector3, b: Vector3) -> Vector3:
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def subtract(a: Vector3, b: Vector3) -> Vector3:
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def scale(k: float, a: Vector3) -> Vector3:
+    """Return k a."""
+    return k * a[0], k * a[1], k * a[2]
+
+
+@inlined
+def dot(a: Vector3, b: Vector3) -> float:
+    """Return a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Return a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@inlined
+def rotate(r: Matrix3, a: Vector3) -> Vector3:
+    """Return R a."""
+    return (r[0] * a[0] + r[1] * a[1] + r[2] * a[2],
+            r[3] * a[0] + r[4] * a[1] + r[5] * a[2],
+            r[6] * a[0] + r[7] * a[1] + r[8] * a[2])
+
+
+@inlined
+def rotate_back(r: Matrix3, a: Vector3) -> Vector3:
+    """Return R^T a."""
+    return (r[0] * a[0] + r[3] * a[1] + r[6] * a[2],
+            r[1] * a[0] + r[4] * a[1] + r[7] * a[2],
+            r[2] * a[0] + r[5] * a[1] + r[8] * a[2])
+
+
+@inlined
+def symmetric(i: Symmetric3, a: Vector3) -> Vector3:
+    """Return I a of a symmetric I (xx xy xz yy yz zz)."""
+    return (i[0] * a[0] + i[1] * a[1] + i[2] * a[2],
+            i[1] * a[0] + i[3] * a[1] + i[4] * a[2],
+            i[2] * a[0] + i[4] * a[1] + i[5] * a[2])
+
+
+@inlined
+def dot6(a: Vector6, b: Vector6) -> float:
+    """Return a . b."""
+    return (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+            + a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
+
+
+@inlined
+def choose6(first: bool, a: Vector6, b: Vector6) -> Vector6:
+    """Return a if first, else b."""
+    return (a[0] if first else b[0], a[1] if first else b[1], a[2] if first else b[2],
+            a[3] if first else b[3], a[4] if first else b[4], a[5] if first else b[5])

@@ -1,0 +1,209 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator: the plant as a node, in real time or one period for each command."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+import gc
+import time
+from typing import Any
+
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from stewart_dynamics.mechanics import jit as compiled
+from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.messages import cdr
+from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
+from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant, SimulatorParameters
+from stewart_dynamics.runtime.repeated_events import Series
+from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE, Refusal, Setpoints
+from stewart_dynamics.runtime.step import Six
+
+_TYPES: dict[str, Any] = {
+    'geometry_msgs/msg/PoseStamped': PoseStamped,
+    'geometry_msgs/msg/TwistStamped': TwistStamped,
+    'geometry_msgs/msg/AccelStamped': AccelStamped,
+    'geometry_msgs/msg/WrenchStamped': WrenchStamped,
+    'sensor_msgs/msg/JointState': JointState,
+    'std_msgs/msg/Float64MultiArray': Float64MultiArray,
+}
+
+_QUEUE = 1000
+# Simulated time begins here [ns]: zero is no stamp.
+_BEGIN = 1_000_000_000
+_ANNOUNCE_SECONDS = 0.1
+_BACKLOG = 100_000_000  # [ns]
+_WATCH_SECONDS = 1.0
+
+NOT_SIX = 'not six numbers'
+
+
+class SimulatorNode(Node):
+    """
+    Moves the machine under the forces that are commanded, and publishes how it moves.
+
+    In real time it takes the periods that are due by a steady clock, several where it is late,
+    and lets time go where it is later than 0.1 s. With ``use_sim_time`` each command is one period
+    and nothing else moves time.
+
+    Raises ParameterError where the parameters break a rule.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(
+            'stewart_simulator', automatically_declare_parameters_from_overrides=True,
+            allow_undeclared_parameters=True)
+        self._settings = declare_parameters(self, SimulatorParameters)
+        self._stepped = bool(self.get_parameter('use_sim_time').value)
+        self._series = Series()
+        if compiled.HINT:
+            self.get_logger().warning(compiled.HINT)
+        begun = time.monotonic()
+        self._plant = Plant(self._settings)
+        for doubt in doubts(self._settings):
+            self.get_logger().warning(doubt)
+        # What it knows of messages on ~/wrench, and the counting of what is refused.
+        self._loads = Setpoints(self._settings, self._on_refusal, self.get_logger().warning)
+        self._commands: Six | None = None
+        self._stamp = _BEGIN
+        self._index = 0
+        self._rate: float = self._settings['rate']
+        qos = QoSProfile(depth=_QUEUE)
+        self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
+                         for topic, kind in OUTPUT_TYPES.items()}
+        for topic, take in (('commands', self._on_commands),
+                            ('wrench', self._loads.take_wrench)):
+            self.create_subscription(_TYPES[INPUT_TYPES[topic]], f'~/{topic}',
+                                     until_shutdown(self, take), qos, raw=True)
+        self.get_logger().info(
+            f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
+                'one period for each command' if self._stepped else 'in real time')
+            + f', {self._rate:g} periods in a second, steps in each: {self._plant.steps}')
+        if self._stepped:
+            self._clock_output = self.create_publisher(Clock, '/clock', qos)
+            self._messages = self._messages_now()
+            self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
+        else:
+            self._start: int | None = None
+            self._timer(1.0 / self._rate, self._on_time)
+        self._timer(_WATCH_SECONDS, self._on_watch)
+        # What is there now stays: see DynamicsNode.
+        gc.collect()
+        gc.freeze()
+
+    def _timer(self, seconds: float, callback: Any) -> Any:
+        # A steady clock: ROS time stands still until it is moved here, or jumps.
+        return self.create_timer(seconds, until_shutdown(self, callback),
+                                 clock=RosClock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_commands(self, data: bytes) -> None:
+        try:
+            values = cdr.float64_values(data)
+        except cdr.MalformedError as exc:
+            self._loads.refuse('commands', MALFORMED, str(exc))
+            return
+        if len(values) != 6:
+            self._loads.refuse('commands', NOT_SIX, f'{len(values)} of them')
+            return
+        if not cdr.finite(values):
+            self._loads.refuse('commands', NOT_FINITE, str(values))
+            return
+        first, second, third, fourth, fifth, sixth = values
+        self._commands = first, second, third, fourth, fifth, sixth
+        if self._stepped:
+            self._announcing.reset()
+            self._advance()
+
+    def _on_time(self) -> None:
+        """Take the periods that are due."""
+        now = time.monotonic_ns()
+        if self._start is None:
+            self._start, self._stamp = now, self.get_clock().now().nanoseconds
+        late = now - self._start - self._time_of(self._index + 1)
+        if late > _BACKLOG:
+            # Stamps go on with the clock, the machine where it is.
+            self._start += late
+            self._stamp += late
+            self._say('late', f'fell behind by {late / 1e9:.3f} s: that time is let go')
+        while self._time_of(self._index + 1) <= now - self._start:
+            self._advance()
+
+    def _time_of(self, index: int) -> int:
+        """Return the time of a period's end since the start [ns]; rounding does not add up."""
+        return round(index * 1e9 / self._rate)
+
+    def _advance(self) -> None:
+        """Take one period, with the brakes on until there is a command."""
+        self._index += 1
+        if self._commands is not None and not self._plant.fault:
+            state = self._plant.advance(self._commands, self._loads.wrench)
+            if self._plant.fault:
+                self.get_logger().error(self._plant.fault)
+            elif state.forces != self._commands:
+                self._tell_saturated(self._commands, state.forces)
+        self._messages = self._messages_now()
+        self._publish()
+
+    def _messages_now(self) -> list[tuple[str, bytes]]:
+        return list(self._plant.messages(self._stamp + self._time_of(self._index)))
+
+    def _announce(self) -> None:
+        """Say again what is not answered: all of it at first, when not all may be heard yet."""
+        if self._commands is None:
+            self._publish()
+        else:
+            self._publish_clock()  # those who follow it do so best effort
+
+    def _publish(self) -> None:
+        for topic, message in self._messages:
+            self._outputs[topic].publish(message)
+        if self._stepped:
+            self._publish_clock()
+
+    def _publish_clock(self) -> None:
+        self._clock_output.publish(cdr.clock(self._stamp + self._time_of(self._index)))
+
+    # -- words ----------------------------------------------------------------------------
+
+    def _tell_saturated(self, commands: Six, forces: Six) -> None:
+        joint, command, force = max(
+            zip(self._settings['joints'], commands, forces, strict=True),
+            key=lambda leg: abs(leg[1] - leg[2]))
+        self._say('saturated', f'commands: {joint}: {command:.6g} N is beyond limits.force_max, '
+                  f'clipped to {force:.6g} N')
+
+    def _on_refusal(self, refusal: Refusal, details: str) -> None:
+        self._say(refusal, f'{refusal.topic} refused: {refusal.reason}: {details}')
+
+    def _say(self, kind: Hashable, text: str) -> None:
+        if (line := self._series.add(kind, text, time.monotonic())) is not None:
+            self.get_logger().warning(line)
+
+    def _on_watch(self) -> None:
+        for line in self._series.over(time.monotonic()):
+            self.get_logger().warning(line)
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    return run(SimulatorNode, SimulatorParameters)

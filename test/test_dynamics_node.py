@@ -1,0 +1,1068 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node as it is used: in a process of its own, over real topics and services."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import json
+import math
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from hypothesis import given, HealthCheck, settings
+from hypothesis import strategies as st
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+import numpy as np
+import pytest
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import get_typestore, Stores
+from running import (
+    assert_only_log_lines, bits, DynamicsNode, executable, HOME, LATCHED, log_lines, nanoseconds,
+    NODE, OUTPUTS, Peer, PLATFORM, raw, refused, ROOT, Sample, SEPARATE, wrench_message)
+from std_msgs.msg import Bool
+
+from stewart_dynamics import Parameters, StewartPlatform
+
+Start = Callable[..., DynamicsNode]
+
+OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
+
+MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
+                (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
+# All legs lie in the plane of the base: they cannot lift anything.
+FLAT = Sample((0.0, 0.0, 0.0))
+# Turned by 88 degrees; at 90 the machine is singular.
+TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
+LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
+
+NOT_JOINED = 'passed over: not all topics had its stamp'
+
+
+# Setpoints from a bag
+
+def _replayed(bag: str, folder: Path) -> list[tuple[int, str, bytes]]:
+    """Return what the replay writes for a bag: when it was recorded, topic, message."""
+    subprocess.run([executable('stewart_replay'), ROOT / 'bags' / bag, '--params', PLATFORM,
+                    '--output', folder, '--no-report'], check=True, stdout=subprocess.DEVNULL)
+    return _recorded(folder / bag / 'bag')
+
+
+def _recorded(bag: Path) -> list[tuple[int, str, bytes]]:
+    with AnyReader([bag]) as reader:
+        return [(at, connection.topic.removeprefix(f'{NODE}/'), bytes(data))
+                for connection, at, data in reader.messages()]
+
+
+def _by_topic(replayed: list[tuple[int, str, bytes]]) -> dict[str, list[bytes]]:
+    """Return messages as they come over the wire: Fast DDS fills them to four bytes."""
+    return {topic: [data + bytes(-len(data) % 4) for _, of, data in replayed if of == topic]
+            for topic in OUTPUTS}
+
+
+@pytest.mark.parametrize('bag', ['clear', 'flawed'])
+def test_node_and_replay_give_the_same_bits(bag: str, start: Start, tmp_path: Path) -> None:
+    expected = _replayed(bag, tmp_path)
+    completed = {at for at, topic, _ in expected if topic == 'leg_states'}
+    node = start()
+    node.until_active()
+    answers = 0
+    for at, topic, data in _recorded(ROOT / 'bags' / bag):
+        node.publish(topic, data)
+        if at in completed:
+            # What is on its way on several topics could arrive in another order.
+            answers += 1
+            node.until(lambda: len(node.raw['leg_states']) >= answers,  # noqa: B023
+                       'the setpoint is answered')
+    messages = _by_topic(expected)
+    node.until(lambda: all(len(node.raw[topic]) >= len(messages[topic]) for topic in OUTPUTS),
+               'all messages have come')
+    assert node.raw == messages
+    summary = json.loads((tmp_path / bag / 'summary.json').read_text(encoding='utf-8'))
+    counts = {f'refused, {each["topic"]}: {each["reason"]}': str(each['count'])
+              for each in summary['refused']}
+    assert bool(counts) == (bag == 'flawed')
+
+    def counted() -> bool:
+        values = node.values('setpoints')
+        return (values.get('setpoints answered') == str(answers)
+                and {key: n for key, n in values.items() if key in counts} == counts)
+
+    node.until(counted, 'the node refuses what the replay refuses')
+
+
+def test_a_thousand_setpoints_at_100_hz_are_answered_with_the_librarys_bits(
+        start: Start, tmp_path: Path) -> None:
+    replayed = _by_topic(_replayed('singular', tmp_path))
+    node = start()
+    node.until_active()
+    played = _recorded(ROOT / 'bags/singular')
+    begun = time.monotonic_ns() - played[0][0]
+    for at, topic, data in played:
+        while (left := begun + at - time.monotonic_ns()) > 0:
+            node.peer.spin(left * 1e-9)
+        node.publish(topic, data)
+    sent = len(played) // 3
+    assert sent >= 1000
+    node.until(lambda: all(len(node.raw[topic]) >= len(replayed[topic]) for topic in OUTPUTS),
+               'all setpoints are answered')
+
+    # None lost, and what the replay writes is what the node sends, to the last bit.
+    assert len(node.raw['leg_states']) == sent
+    assert node.raw == replayed
+
+    samples, stamps = _bag_samples(played)
+    motions = [sample.motion() for sample in samples]
+    assert [nanoseconds(state.header.stamp) for state in node.received('leg_states')] == stamps
+    for motion, state, lengths, forces, determinant in zip(
+            motions, *(node.received(topic) for topic in (
+                'leg_states', 'leg_lengths', 'leg_forces', 'jacobian_determinant')),
+            strict=True):
+        result = node.platform.inverse_dynamics(motion)
+        node.check(state, result)
+        assert bits(lengths.data) == bits(result.lengths)
+        assert bits(forces.data) == bits(state.effort)
+        assert bits(determinant.data) == bits(result.determinant)
+
+    # It crosses a singularity: the warning comes and stays. Who comes late is told as well.
+    assert [message.data for message in node.received('singularity_warning')] == [False, True]
+    late = Peer(node.domain, 'late')
+    try:
+        heard = late.listen(f'{NODE}/singularity_warning', Bool, LATCHED)
+        late.until(lambda: heard, 'the warning is latched')
+        assert heard == node.raw['singularity_warning'][-1:]
+    finally:
+        late.close()
+    node.until(lambda: node.values('setpoints').get('setpoints answered') == str(sent),
+               'diagnostics count the answers')
+    assert node.values('singularity')['crossings'] == '1'
+    node.until_counted()
+    node.stop()
+
+
+def _bag_samples(played: list[tuple[int, str, bytes]]) -> tuple[list[Sample], list[int]]:
+    """Return a bag's setpoints as another library reads them, and their stamps."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    poses, twists, accels = (
+        [store.deserialize_cdr(data, kind) for _, topic, data in played if topic == wanted]
+        for wanted, kind in zip(SEPARATE, (
+            'geometry_msgs/msg/PoseStamped', 'geometry_msgs/msg/TwistStamped',
+            'geometry_msgs/msg/AccelStamped'), strict=True))
+    samples, stamps = [], []
+    for p, t, a in zip(poses, twists, accels, strict=True):
+        stamps.append(nanoseconds_of_bag(p))
+        assert nanoseconds_of_bag(t) == nanoseconds_of_bag(a) == stamps[-1]
+        q = p.pose.orientation
+        samples.append(Sample(
+            _numbers(p.pose.position), (q.x, q.y, q.z, q.w),
+            _numbers(t.twist.linear) + _numbers(t.twist.angular),
+            _numbers(a.accel.linear) + _numbers(a.accel.angular)))
+    return samples, stamps
+
+
+def nanoseconds_of_bag(message: Any) -> int:
+    """Return the stamp [ns] of a message that rosbags has read."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _numbers(three: Any) -> tuple[float, ...]:
+    return three.x, three.y, three.z
+
+
+# Bad input: every row of the table in the README
+
+def _spoiled(topic: str, sample: Sample, frame: str = 'base') -> Callable[[int], tuple[str, Any]]:
+    return lambda stamp: (topic, sample.messages(stamp, frame)[topic])
+
+
+SPOILED = {
+    'nan in a position': (
+        _spoiled('setpoint/pose', HOME._replace(position=(0.0, math.nan, 1.1))), 'not finite'),
+    'infinity in a quaternion': (
+        _spoiled('setpoint/pose', HOME._replace(quaternion=(0.0, 0.0, math.inf, 1.0))),
+        'not finite'),
+    'nan in a twist': (
+        _spoiled('setpoint/twist', HOME._replace(twist=(0.0,) * 5 + (math.nan,))), 'not finite'),
+    'infinity in a twist': (
+        _spoiled('setpoint/twist', HOME._replace(twist=(-math.inf,) + (0.0,) * 5)), 'not finite'),
+    'infinity in an acceleration': (
+        _spoiled('setpoint/accel', HOME._replace(accel=(0.0, math.inf) + (0.0,) * 4)),
+        'not finite'),
+    'a quaternion too long': (
+        _spoiled('setpoint/pose', HOME._replace(quaternion=(0.0, 0.0, 0.0, 1.0011))),
+        'quaternion not of unit length'),
+    'a quaternion of zeros': (
+        _spoiled('setpoint/pose', HOME._replace(quaternion=(0.0,) * 4)),
+        'quaternion not of unit length'),
+    'another frame': (_spoiled('setpoint/pose', HOME, 'world'), 'wrong frame_id'),
+    'another frame of a twist': (_spoiled('setpoint/twist', HOME, 'base2'), 'wrong frame_id'),
+    'another frame of an acceleration': (
+        _spoiled('setpoint/accel', HOME, 'bas'), 'wrong frame_id'),
+    'a message cut short': (
+        lambda stamp: ('setpoint/pose', raw(HOME.messages(stamp)['setpoint/pose'])[:60]),
+        'malformed'),
+    'a stamp with too many nanoseconds': (
+        lambda stamp: ('setpoint/accel', _nanosec(raw(HOME.messages(stamp)['setpoint/accel']),
+                                                  1_000_000_000)), 'malformed'),
+}
+
+
+def _nanosec(message: bytes, nanosec: int) -> bytes:
+    return message[:8] + nanosec.to_bytes(4, 'little') + message[12:]
+
+
+@pytest.mark.parametrize('case', SPOILED)
+def test_a_bad_sample_is_refused_counted_and_nothing_is_published(
+        node: DynamicsNode, case: str) -> None:
+    spoil, reason = SPOILED[case]
+    stamp = node.stamp()
+    bad_topic, bad = spoil(stamp)
+    for topic, message in HOME.messages(stamp).items():
+        node.publish(topic, bad if topic == bad_topic else message)
+        node.refuses(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
+    # The next one is answered, and only that: it says so.
+    node.answer(MOVING)
+    node.until_counted()
+    assert f'{bad_topic} refused: {reason}' in node.program.stderr
+
+
+def test_an_empty_frame_is_accepted(node: DynamicsNode) -> None:
+    stamp = node.send(MOVING, frame='')
+    node.check(node.state_of(stamp), node.result_of(MOVING))
+    node.until_counted()
+
+
+@pytest.mark.parametrize('factor', [1.0009, 0.9991])
+def test_a_quaternion_nearly_of_unit_length_is_brought_to_it(
+        node: DynamicsNode, factor: float) -> None:
+    node.answer(MOVING._replace(quaternion=tuple(factor * q for q in MOVING.quaternion)))
+    node.until_counted()
+
+
+def test_a_setpoint_whose_numbers_overflow_is_refused(node: DynamicsNode) -> None:
+    node.send(HOME._replace(position=(0.0, 0.0, 1e300)))
+    node.refuses('setpoint', 'out of range: the numbers overflow')
+    node.answer(MOVING)
+    node.until_counted()
+
+
+def test_a_stamp_older_than_the_last_used_is_refused(node: DynamicsNode) -> None:
+    node.answer()
+    last = node.stamp(0)
+    # setpoint.timeout is 0.1 s: a jump by more would be a restart.
+    node.send(MOVING, last - 100_000_000)
+    for topic in SEPARATE:
+        node.refuses(topic, 'older than the last used')
+    node.answer(MOVING)
+    node.until_counted()
+
+
+def test_a_jump_back_by_more_than_the_timeout_is_a_restart(start: Start) -> None:
+    node = start()
+    node.until_active()
+    for _ in range(3):
+        node.answer()
+    node.stamp(-1_000_000_000)
+    for _ in range(3):
+        node.answer(MOVING)
+    # A bag that loops does so again; it is followed again.
+    node.stamp(-100_000_001 - 10_000_000)
+    node.answer(MOVING)
+    node.until_counted()
+    said = [line for line in log_lines(node.program.stderr, 'WARN') if 'restart' in line]
+    assert 'stamps jumped back by 0.99 s: followed as a restart' in said[0]
+
+
+def test_zero_stamps_are_joined_in_order_of_arrival(start: Start) -> None:
+    node = start('setpoint.timeout:=1000.0')  # however slow this machine is
+    node.until_active()
+    samples = [TURNED, HOME, MOVING]
+    begun = time.time_ns()
+    for number, sample in enumerate(samples, 1):
+        for topic, message in sample.messages(0).items():
+            node.publish(topic, message)
+        node.until(lambda number=number: len(node.raw['leg_states']) == number,
+                   'it is answered')
+    states = node.received('leg_states')
+    stamps = [nanoseconds(state.header.stamp) for state in states]
+    assert stamps == sorted(stamps)
+    assert begun <= stamps[0] <= stamps[-1] <= time.time_ns()
+    for state, sample in zip(states, samples, strict=True):
+        node.check(state, node.result_of(sample))
+    # With a stamp they are joined by it as ever.
+    node.answer(MOVING, stamp=time.time_ns())
+    node.until_counted()
+    assert node.program.stderr.count('header stamps are zero') == 1
+
+
+def test_of_a_stamp_twice_on_one_topic_the_first_is_used(node: DynamicsNode) -> None:
+    stamp = node.stamp()
+    other = HOME.messages(stamp)
+    for topic, message in MOVING.messages(stamp).items():
+        node.publish(topic, message)
+        if topic != 'setpoint/accel':
+            node.publish(topic, other[topic])
+    node.check(node.state_of(stamp), node.result_of(MOVING))
+    # And once more when it has been answered.
+    node.publish('setpoint/pose', other['setpoint/pose'])
+    node.refuses('setpoint/pose', 'same stamp twice', 2)
+    node.refuses('setpoint/twist', 'same stamp twice')
+    node.answer(MOVING)
+    node.until_counted()
+
+
+@pytest.mark.parametrize('silent', SEPARATE)
+def test_a_silent_topic_is_named_and_nothing_is_published(
+        node: DynamicsNode, silent: str) -> None:
+    node.answer()
+    answered = len(node.raw['leg_states'])
+    sent = 0
+
+    def named() -> bool:
+        nonlocal sent
+        for topic, message in MOVING.messages(node.stamp()).items():
+            if topic != silent:
+                node.publish(topic, message)
+        sent += 1
+        status = node.status('setpoints')
+        return (bool(status.level == STALE) and f'{silent} silent for ' in status.message
+                and not any(topic in status.message for topic in SEPARATE if topic != silent))
+
+    node.until(named, f'diagnostics name {silent}')
+    assert float(node.values('setpoints')[f'{silent}: last heard (s ago)']) > 0.1
+    node.answer(MOVING)
+    assert len(node.raw['leg_states']) == answered + 1
+    for topic in SEPARATE:
+        if topic != silent:
+            node.refuses(topic, NOT_JOINED, sent)
+    node.until_counted()
+
+
+def test_a_topic_that_never_came_is_named(start: Start) -> None:
+    node = start()
+    node.until_active()
+    assert node.status('setpoints').level == STALE
+    node.publish('setpoint/pose', HOME.messages(node.stamp())['setpoint/pose'])
+    node.until_status('setpoints', STALE, 'setpoint/pose silent for ')
+    assert 'setpoint/twist never came, setpoint/accel never came' in node.status(
+        'setpoints').message
+    assert node.raw['leg_states'] == []
+
+
+def test_without_setpoints_diagnostics_are_stale_and_nothing_is_repeated(
+        node: DynamicsNode) -> None:
+    node.answer(MOVING)
+    answered = {topic: len(node.raw[topic]) for topic in OUTPUTS}
+    for topic in SEPARATE:
+        node.until_status('setpoints', STALE, f'{topic} silent for ')
+    # Two more reports, a second apart.
+    for _ in range(2):
+        age = node.values('setpoints')['age of the last (s)']
+        node.until(lambda age=age: node.values('setpoints')['age of the last (s)'] != age,
+                   'one more report')
+    assert {topic: len(node.raw[topic]) for topic in OUTPUTS} == answered
+
+
+def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_forces(
+        node: DynamicsNode) -> None:
+    node.answer()
+    node.until(lambda: node.received('singularity_warning')
+               and not node.received('singularity_warning')[-1].data, 'no warning is on')
+    forces, warnings = len(node.raw['leg_forces']), len(node.raw['singularity_warning'])
+    state = node.state_of(node.send(FLAT))
+    assert len(state.effort) == 0
+    zero = node.platform.parameters['geometry.zero_length']
+    assert bits(state.position) == bits(
+        node.platform.inverse_kinematics(FLAT.position, np.eye(3)) - zero)
+    assert node.received('leg_lengths')[-1].data.tolist() == (state.position + zero).tolist()
+    assert abs(node.received('jacobian_determinant')[-1].data) < 1e-30
+    node.until(lambda: len(node.raw['singularity_warning']) > warnings, 'it warns')
+    assert node.received('singularity_warning')[-1].data
+    node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
+    node.until_status('limits', ERROR, 'beyond limits.length_min')
+    # Out of it again the forces are back; the warning ends a sample after det(J) has changed.
+    node.answer(MOVING)
+    node.answer(MOVING)
+    node.until(lambda: len(node.raw['singularity_warning']) == warnings + 2, 'the warning ends')
+    assert not node.received('singularity_warning')[-1].data
+    assert len(node.raw['leg_forces']) == forces + 2
+    node.until_counted()
+
+
+def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: DynamicsNode) -> None:
+    result = node.result_of(LEAPING)
+    assert result.forces.max() > 6000.0
+    state = node.answer(LEAPING)
+    assert max(state.effort) == 6000.0
+    message = node.until_status('limits', ERROR, 'beyond limits.force_max, clipped')
+    worst = int(np.argmax(result.forces))
+    assert (f'leg_{worst + 1}: force {result.forces[worst]:.6g} N is '
+            f'{result.forces[worst] - 6000.0:.6g} N beyond limits.force_max, clipped') in message
+    key = f'leg_{worst + 1}: force demanded (N)'
+    assert node.values('limits')[key] == f'{result.forces[worst]:.6g}'
+    node.answer(MOVING)
+    node.until_status('limits', OK, '')
+
+
+@pytest.mark.parametrize('sample, text', [
+    (HOME._replace(position=(0.0, 0.0, 0.5)), 'm beyond limits.length_min'),
+    (HOME._replace(position=(0.0, 0.0, 2.0)), 'm beyond limits.length_max'),
+    (HOME._replace(twist=(0.0, 0.0, 0.9, 0.0, 0.0, 0.0)), 'm/s beyond limits.velocity_max'),
+])
+def test_other_limits_are_told_and_the_answer_goes_out(
+        node: DynamicsNode, sample: Sample, text: str) -> None:
+    node.answer(sample)
+    node.until_status('limits', ERROR, text)
+    assert 'clipped' not in node.status('limits').message
+    node.answer(MOVING)
+    node.until_counted()
+
+
+def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
+    node.answer()
+    node.until_status('singularity', OK, 'clear')
+    node.answer(TURNED)
+    node.until_status('singularity', WARN, 'condition number above warn_condition')
+    values = node.values('singularity')
+    result = node.result_of(TURNED)
+    assert values['condition number'] == f'{result.condition_number:.6g}'
+    assert values['det(J) (m^3)'] == f'{result.determinant:.9g}'
+    node.answer()
+    node.until(lambda: not node.received('singularity_warning')[-1].data, 'the warning ends')
+
+
+# Other writers and readers
+
+def test_who_reads_the_answers_is_counted(start: Start) -> None:
+    node = start()
+    readers = {f'leg_{of}: readers': '1' for of in ('states', 'forces')}
+    node.until(lambda: readers.items() <= node.values('setpoints').items(), 'this one is known')
+    second = node.peer.node.create_subscription(
+        OUTPUTS['leg_forces'], f'{NODE}/leg_forces', lambda message: None, 10)
+    node.until(lambda: node.values('setpoints').get('leg_forces: readers') == '2', 'another is')
+    node.peer.node.destroy_subscription(second)
+    node.until(lambda: readers.items() <= node.values('setpoints').items(), 'it has gone')
+
+
+def test_with_exclusive_setpoints_a_second_writer_is_told_and_refused(start: Start) -> None:
+    node = start('setpoint.exclusive:=true')
+    node.until_active()
+    node.answer()
+    second = node.peer.writer(f'{NODE}/setpoint/pose', PoseStamped)
+    node.until(lambda: node.values('setpoints')['setpoint/pose: writers'] == '2',
+               'the second writer is known')
+    node.send(MOVING)
+    node.refuses('setpoint/pose', 'more than one writer')
+    node.until_counted()
+    node.peer.node.destroy_publisher(second)
+    node.until(lambda: node.values('setpoints')['setpoint/pose: writers'] == '1',
+               'the second writer has gone')
+    for topic in ('setpoint/twist', 'setpoint/accel'):
+        node.refuses(topic, NOT_JOINED)
+    node.answer(MOVING)
+    node.until_counted()
+
+
+def test_a_writer_that_cannot_be_heard_is_told(start: Start) -> None:
+    node = start()
+    node.until_active()
+    node.peer.node.create_publisher(
+        PoseStamped, f'{NODE}/setpoint/pose',
+        QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+    node.until(lambda: log_lines(node.program.stderr, 'ERROR'), 'it is told')
+    said, = log_lines(node.program.stderr, 'ERROR')
+    assert 'setpoint/pose: a publisher offers an incompatible quality of service' in said
+
+
+# More than can be answered
+
+WITHOUT = """\
+import sys
+sys.modules['{}'] = None  # importing it fails, as if it were not there
+from stewart_dynamics.nodes.dynamics_node import main
+sys.exit(main())
+"""
+WITHOUT_EVENTS = [sys.executable, '-c', WITHOUT.format('rclpy.experimental.events_executor')]
+WITHOUT_NUMBA = [sys.executable, '-c', WITHOUT.format('numba')]
+
+
+@pytest.mark.parametrize('executor', ['events', 'single-threaded'])
+def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
+        start: Start, executor: str) -> None:
+    node = start(command=WITHOUT_EVENTS if executor == 'single-threaded' else None,
+                 NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
+    node.until_active()
+    key = 'refused, setpoint: passed over: more came at once than can be answered'
+    sent = passed = 0
+    while not passed:
+        stamps = [node.stamp() for _ in range(500)]
+        burst = [(topic, raw(message)) for stamp in stamps
+                 for topic, message in MOVING.messages(stamp).items()]
+        for topic, data in burst:
+            node.publish(topic, data)
+        sent += len(stamps)
+        node.check(node.state_of(stamps[-1]), node.result_of(MOVING))
+        passed = _passed_over(node, key, sent)
+    node.until(lambda: len(node.raw['leg_states']) == sent - passed, 'the answers have come')
+    answered = [nanoseconds(each.header.stamp) for each in node.received('leg_states')]
+    assert answered == sorted(set(answered))
+    node.expected[key] = passed
+    node.answer()
+    node.until_counted()
+
+
+def _passed_over(node: DynamicsNode, key: str, sent: int) -> int:
+    """Return how many setpoints the node has passed over, once it has counted all sent."""
+    def counted(key: str) -> int:
+        return int(node.values('setpoints').get(key, '0'))
+
+    node.until(lambda: counted('setpoints answered') + counted(key) == sent,
+               'every setpoint is answered or counted')
+    return counted(key)
+
+
+# Both executors, with and without a compiler
+
+@pytest.mark.parametrize('command, environment, said', [
+    (WITHOUT_EVENTS, {}, 'this rclpy has no events executor: the single-threaded one takes 2.5 '
+                         'times the processor time'),
+    (WITHOUT_NUMBA, {}, 'the dynamics run uncompiled'),
+    (None, {'NUMBA_DISABLE_JIT': '1'}, 'the dynamics run uncompiled'),
+], ids=['single-threaded executor', 'no numba', 'numba disabled'])
+def test_what_is_missing_is_said_once_and_gives_the_same_bits(
+        start: Start, command: list[str] | None, environment: dict[str, str], said: str) -> None:
+    node = start(command=command, **environment)
+    node.until_active()
+    for sample in (HOME, MOVING, TURNED, LEAPING):
+        node.answer(sample)
+    # one of the samples is near a singularity, which is said as well
+    warnings = [line for line in log_lines(node.program.stderr, 'WARN')
+                if ': singularity: ' not in line]
+    assert len(warnings) == 1
+    assert said in warnings[0]
+    node.stop()
+
+
+def test_with_everything_there_nothing_is_said(start: Start) -> None:
+    node = start()
+    node.until_active()
+    node.answer()
+    lines = log_lines(node.program.stderr)
+    assert len(lines) == 1
+    assert '[INFO]' in lines[0]
+    assert 'dynamics ready after' in lines[0]
+
+
+# Other sources of setpoints
+
+def test_setpoints_in_one_message(start: Start) -> None:
+    node = start('setpoint.source:=combined')
+    node.until_active()
+    assert node.topics == ['setpoint/combined']
+    for sample in (HOME, MOVING, TURNED):
+        node.answer(sample)
+    two = MOVING.combined(node.stamp())
+    two.points.append(two.points[0])
+    without = MOVING.combined(node.stamp())
+    without.points[0].accelerations = []
+    for bad, reason in (
+            (MOVING._replace(accel=(math.nan,) * 6).combined(node.stamp()), 'not finite'),
+            (MOVING._replace(quaternion=(1.0,) * 4).combined(node.stamp()),
+             'quaternion not of unit length'),
+            (MOVING.combined(node.stamp(), 'map'), 'wrong frame_id'),
+            (two, 'malformed'), (without, 'malformed'),
+            (MOVING.combined(node.stamp(0) - 50_000_000), 'older than the last used')):
+        if reason == 'older than the last used':
+            node.answer()
+        node.publish('setpoint/combined', bad)
+        node.refuses('setpoint/combined', reason)
+    node.answer(MOVING)
+    node.until_counted()
+    assert '2 points: a setpoint has one' in node.program.stderr
+    node.stop()
+
+
+def test_setpoints_of_a_pose_alone_are_quasi_static(start: Start) -> None:
+    node = start('setpoint.source:=pose')
+    node.until_active()
+    assert node.topics == ['setpoint/pose']
+    at_rest = MOVING._replace(twist=(0.0,) * 6, accel=(0.0,) * 6)
+    state = node.answer(at_rest)
+    assert list(state.velocity) == [0.0] * 6
+    # One after another, far apart: no speed is made of them.
+    node.answer(HOME)
+    # What comes on the other topics is not heard.
+    stamp = node.stamp()
+    for topic, message in MOVING.messages(stamp).items():
+        node.publish(topic, message)
+    node.check(node.state_of(stamp), node.result_of(at_rest))
+    node.until_counted()
+
+
+def test_stamps_within_the_tolerance_are_joined(start: Start) -> None:
+    node = start('setpoint.sync_tolerance:=0.002')
+    node.until_active()
+    stamp = node.stamp()
+    for topic, late in zip(SEPARATE, (0, 2_000_000, 1_500_000), strict=True):
+        node.publish(topic, MOVING.messages(stamp + late)[topic])
+    # The pose's stamp is the setpoint's.
+    node.check(node.state_of(stamp), node.result_of(MOVING))
+    stamp = node.stamp()
+    for topic, late in zip(SEPARATE, (0, 2_000_001, 0), strict=True):
+        node.publish(topic, HOME.messages(stamp + late)[topic])
+    node.answer(MOVING)
+    assert len(node.raw['leg_states']) == 2
+    for topic in SEPARATE:
+        node.refuses(topic, NOT_JOINED)
+    node.until_counted()
+
+
+# The load that the surroundings put on the platform
+
+def test_a_wrench_holds_for_the_setpoints_to_come(start: Start) -> None:
+    node = start()
+    node.until_active()
+    node.answer(MOVING)
+    loads = ((100.0, -50.0, -800.0, 20.0, 10.0, -5.0), (0.0, 0.0, 300.0, 0.0, 0.0, 0.0))
+    for load in loads:
+        node.publish('wrench', wrench_message(load))
+        _until_load(node, load)
+        for sample in (MOVING, HOME):
+            node.answer(sample, load)
+    spoiled = (math.nan, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for bad, reason in ((wrench_message(spoiled), 'not finite'),
+                        (wrench_message((0.0,) * 5 + (math.inf,)), 'not finite'),
+                        (wrench_message((9.0,) * 6, 'platform'), 'wrong frame_id'),
+                        (raw(wrench_message((9.0,) * 6))[:50], 'malformed')):
+        node.publish('wrench', bad)
+        node.refuses('wrench', reason)
+    node.until_counted()
+    # The last sound one still holds; one in a frame without a name is sound.
+    node.answer(MOVING, loads[-1])
+    node.publish('wrench', wrench_message((0.0,) * 6, ''))
+    _until_load(node, (0.0,) * 6)
+    node.answer(MOVING)
+    node.until_counted()
+
+
+def _until_load(node: DynamicsNode, load: tuple[float, ...]) -> None:
+    """Send setpoints until one is answered with a load: nothing else tells that it is held."""
+    expected = bits(node.result_of(HOME, load).forces)
+    node.until(lambda: bits(node.state_of(node.send()).effort) == expected, 'the load is held')
+
+
+# Forces inside stop_condition
+
+def test_forces_are_suppressed_inside_stop_condition(start: Start) -> None:
+    node = start('singularity.action:=suppress_forces', 'singularity.stop_condition:=50.0')
+    node.until_active()
+    node.answer(HOME)
+    inside = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.765), math.cos(0.765)))
+    # Hysteresis: between 0.8 of the limit and it, forces come before and stay away after.
+    between = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.7515), math.cos(0.7515)))
+    assert node.result_of(inside).condition_number > 50.0
+    assert 40.0 < node.result_of(between).condition_number < 50.0
+    node.answer(between)
+    forces = len(node.raw['leg_forces'])
+    for sample in (inside, between):
+        state = node.state_of(node.send(sample))
+        assert len(state.effort) == 0
+        assert bits(state.velocity) == bits(node.result_of(sample).rates)
+    node.until_status('singularity', ERROR, 'inside stop_condition: forces suppressed')
+    node.answer(HOME)
+    assert len(node.raw['leg_forces']) == forces + 1
+    node.until_counted()
+
+
+# Parameters at run time
+
+@pytest.fixture
+def as_before(node: DynamicsNode) -> Iterator[DynamicsNode]:
+    """Return the module's node, and give it its payload and thresholds back."""
+    p = Parameters.from_yaml(PLATFORM)
+    yield node
+    result = node.set_parameters(**{
+        name.replace('.', '__'): value.tolist() if hasattr(value, 'tolist') else value
+        for name in ('platform.mass', 'platform.center_of_mass', 'platform.inertia',
+                     'singularity.warn_condition', 'singularity.stop_condition',
+                     'singularity.warn_time', 'singularity.action') for value in (p[name],)})
+    assert result.successful, result.reason
+
+
+def test_a_payload_is_picked_up_while_active(as_before: DynamicsNode) -> None:
+    node = as_before
+    node.answer(MOVING)
+    payload = {'platform.mass': 210.0, 'platform.center_of_mass': [0.05, 0.02, 0.3],
+               'platform.inertia': [25.0, 0.5, -0.6, 27.0, 0.4, 31.0]}
+    result = node.set_atomically([
+        RosParameter(name, value=value) for name, value in payload.items()])
+    assert result.successful, result.reason
+    laden = StewartPlatform(node.platform.parameters.replaced(payload))
+    state = node.answer(MOVING, platform=laden)
+    assert bits(state.effort) != bits(node.result_of(MOVING).forces)
+
+    # Through the other service as well it is all of a request or nothing.
+    def ask(**changes: Any) -> list[bool]:
+        answer = node.call('set_parameters', SetParameters.Request(parameters=[
+            RosParameter(f'platform.{name}', value=value).to_parameter_msg()
+            for name, value in changes.items()]))
+        return [each.successful for each in answer.results]
+
+    assert ask(mass=99.0, inertia=[1.0, 9.0, 0.0, 1.0, 0.0, 1.0]) == [False, False]
+    node.answer(MOVING, platform=laden)
+    assert ask(mass=150.0) == [True]
+    lighter = StewartPlatform(laden.parameters.replaced({'platform.mass': 150.0}))
+    node.answer(MOVING, platform=lighter)
+    # Each change is logged, and what can hardly be meant.
+    assert 'platform.mass: 210.0 -> 150.0' in node.program.stderr
+    assert ask(mass=150000.0) == [True]
+    node.until(lambda: 'cannot carry the platform' in node.program.stderr, 'it is doubted')
+
+
+def test_thresholds_change_while_active(as_before: DynamicsNode) -> None:
+    node = as_before
+    node.answer(MOVING)
+    node.until(lambda: not node.received('singularity_warning')[-1].data, 'no warning is on')
+    condition = float(node.result_of(MOVING).condition_number)
+    assert node.set_parameters(singularity__warn_condition=condition - 0.01).successful
+    node.answer(MOVING)
+    node.until(lambda: node.received('singularity_warning')[-1].data, 'it warns')
+    assert node.set_parameters(singularity__stop_condition=condition - 0.005,
+                               singularity__action='suppress_forces').successful
+    assert len(node.state_of(node.send(MOVING)).effort) == 0
+    node.until_status('singularity', ERROR, 'forces suppressed')
+    assert node.set_parameters(singularity__action='warn').successful
+    node.answer(MOVING)
+
+
+@pytest.mark.parametrize('changes, reason', [
+    ({'platform.mass': 150}, 'platform.mass: 150: is an integer, must be a double: write 150.0'),
+    ({'platform.mass': -1.0}, 'platform.mass: -1.0 kg: must be more than 0'),
+    ({'platform.mass': math.nan}, 'platform.mass: nan kg: must be finite'),
+    ({'platform.mass': 'heavy'}, "platform.mass: 'heavy': must be a double"),
+    ({'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, -1.0]}, 'must be positive definite'),
+    ({'platform.center_of_mass': [1.0, 2.0]}, 'must have 3 entries, has 2'),
+    ({'singularity.action': 'stop'}, 'must be one of warn, suppress_forces'),
+    ({'singularity.stop_condition': 19.0}, 'must be at least singularity.warn_condition, 20.0'),
+    ({'geometry.zero_length': 1.0},
+     'geometry.zero_length: only changed while the node is unconfigured'),
+    ({'legs.piston.mass': 7.0, 'gravity': [0.0, 0.0, 9.8]},
+     'legs.piston.mass, gravity: only changed while the node is unconfigured'),
+    ({'platform.mas': 1.0}, 'platform.mas: unknown parameter; do you mean platform.mass?'),
+    ({'platform.center_of_mass': None}, 'platform.center_of_mass: cannot be unset'),
+    # All or none: the mass alone would do.
+    ({'platform.mass': 99.0, 'singularity.warn_time': -1.0},
+     'singularity.warn_time: -1.0 s: must be at least 0'),
+], ids=lambda value: ', '.join(value) if isinstance(value, dict) else '')
+def test_a_bad_change_is_refused_with_its_reason(
+        node: DynamicsNode, changes: dict[str, Any], reason: str) -> None:
+    result = node.set_atomically([
+        RosParameter(name, value=value) for name, value in changes.items()])
+    assert not result.successful
+    assert reason in result.reason
+    node.answer(MOVING)
+
+
+def test_parameters_are_described_with_text_and_unit(node: DynamicsNode) -> None:
+    names = ['platform.mass', 'limits.force_max', 'singularity.action', 'singularity.warn_time']
+    mass, force, action, warn_time = node.call(
+        'describe_parameters', DescribeParameters.Request(names=names)).descriptors
+    assert mass.name == 'platform.mass'
+    assert mass.description == 'mass of the platform with all that it carries [kg]'
+    assert mass.additional_constraints == 'more than 0; set also while active'
+    assert force.description.endswith('[N]')
+    assert action.additional_constraints == (
+        'one of warn, suppress_forces; set also while active')
+    assert warn_time.description.endswith('[s]')
+
+
+# Lifecycle
+
+def _change(node: DynamicsNode, transition: int) -> bool:
+    return bool(node.call('change_state', ChangeState.Request(
+        transition=Transition(id=transition))).success)
+
+
+def _state(node: DynamicsNode) -> str:
+    return str(node.call('get_state', GetState.Request()).current_state.label)
+
+
+def _activate(node: DynamicsNode) -> None:
+    assert _change(node, Transition.TRANSITION_ACTIVATE)
+    assert _state(node) == 'active'
+    node.until_active()
+
+
+def test_the_whole_lifecycle(start: Start) -> None:
+    node = start('autostart:=false')
+    node.until_said('unconfigured: autostart is false')
+    assert _state(node) == 'unconfigured'
+    # What a state does not have is answered, and the node lives on.
+    for impossible in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE,
+                       Transition.TRANSITION_CLEANUP, 99):
+        assert not _change(node, impossible)
+    assert _state(node) == 'unconfigured'
+    # Geometry may change now.
+    assert node.set_parameters(geometry__zero_length=1.0).successful
+    assert not node.set_parameters(geometry__zero_length=1).successful
+    moved = StewartPlatform(node.platform.parameters.replaced({'geometry.zero_length': 1.0}))
+
+    assert _change(node, Transition.TRANSITION_CONFIGURE)
+    assert _state(node) == 'inactive'
+    change = node.set_parameters(geometry__zero_length=0.9)
+    assert 'only changed while the node is unconfigured' in change.reason
+    assert not _change(node, Transition.TRANSITION_CONFIGURE)
+    _send_to_all(node)
+    _activate(node)
+    node.answer(MOVING, platform=moved)
+
+    assert _change(node, Transition.TRANSITION_DEACTIVATE)
+    assert _state(node) == 'inactive'
+    # Heard in vain: neither answered now nor kept for later.
+    _send_to_all(node)
+    _activate(node)
+    node.answer(MOVING, platform=moved)
+    assert [each.data for each in node.received('singularity_warning')][:1] == [False]
+
+    assert _change(node, Transition.TRANSITION_DEACTIVATE)
+    assert _change(node, Transition.TRANSITION_CLEANUP)
+    assert _state(node) == 'unconfigured'
+    node.until(lambda: not any(writer.get_subscription_count()
+                               for writer in node.writers.values()), 'its topics are closed')
+    assert node.set_parameters(geometry__zero_length=0.95).successful
+    assert _change(node, Transition.TRANSITION_CONFIGURE)
+    _activate(node)
+    node.answer(MOVING)
+
+    assert _change(node, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert _state(node) == 'finalized'
+    _send_to_all(node)
+    assert not _change(node, Transition.TRANSITION_CONFIGURE)
+    assert len(node.raw['leg_states']) == 3
+    said = log_lines(node.program.stderr, 'ERROR')
+    assert said
+    assert all('transition refused: ' in line for line in said)
+    node.until_counted()
+    node.stop()
+
+
+def _send_to_all(node: DynamicsNode) -> None:
+    """Send a setpoint on the three topics, whatever the node says that it listens to."""
+    for topic, message in HOME.messages(node.stamp()).items():
+        node.publish(topic, message)
+
+
+# How it ends
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
+@pytest.mark.parametrize('flowing', [False, True], ids=['idle', 'while setpoints flow'])
+def test_a_signal_ends_it_with_exit_code_0(
+        start: Start, number: signal.Signals, flowing: bool) -> None:
+    node = start()
+    node.until_active()
+    node.answer()
+    if flowing:
+        for _ in range(20):
+            node.send(MOVING)
+        node.program.process.send_signal(number)
+        while not node.program.ended:
+            node.send(MOVING)
+            node.peer.spin(0.0)
+    node.stop(number)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
+def test_a_signal_ends_it_while_it_starts(start: Start, number: signal.Signals) -> None:
+    node = start(NUMBA_CACHE_DIR='cache')  # an empty one: it compiles for seconds
+    # The node is there, and is compiling: no setpoint topic yet.
+    node.until(lambda: ('stewart_dynamics', '/') in node.peer.node.get_node_names_and_namespaces(),
+               'the node is there')
+    node.stop(number)
+
+
+# What is wrong in a parameter file is said in one line
+
+GOOD = """\
+/**:
+  ros__parameters:
+    geometry:
+      base_joints: [1.0, 0.3, 0.0,  0.9, 0.5, 0.1,  -0.1, 1.0, 0.0,
+                    -0.8, 0.6, 0.0,  -0.8, -0.6, 0.0,  1.0, -0.4, 0.0]
+      platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,
+                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]
+    platform:
+      mass: 150.0
+      inertia: [20.0, 1.0, 2.0, 21.0, 3.0, 35.0]
+    limits: {length_min: 0.8, length_max: 1.4}
+    singularity: {warn_condition: 40.0, stop_condition: 400.0}
+    autostart: true
+"""
+
+BROKEN = {
+    'required one missing': (
+        '      mass: 150.0\n', '', 'platform.mass: missing, it has no default'),
+    'unknown name': ('mass: 150.0', 'mass: 150.0\n      mas: 1.0',
+                     'platform.mas: unknown parameter; do you mean platform.mass?'),
+    'integer for a double': ('mass: 150.0', 'mass: 150', 'platform.mass: 150: is an integer, '
+                             'must be a double: write 150.0'),
+    'text for a double': ('mass: 150.0', 'mass: heavy',
+                          "platform.mass: 'heavy': must be a double"),
+    'text for a bool': ('autostart: true', 'autostart: maybe',
+                        "autostart: 'maybe': must be a bool"),
+    'wrong length': ('[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 21.0, 35.0]',
+                     'platform.inertia: [20.0, 21.0, 35.0]: must have 6 entries, has 3'),
+    'wrong number of legs': ('length_min: 0.8', 'length_min: [0.8, 0.8]',
+                             'limits.length_min: [0.8, 0.8]: must have 1 or 6 entries, has 2'),
+    'one value for an array': ('inertia: [20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', 'inertia: 20.0',
+                               'platform.inertia: 20.0 kg m^2: must be an array of 6'),
+    'no choice': ('stop_condition: 400.0', "stop_condition: 400.0, action: 'stop'",
+                  "singularity.action: 'stop': must be one of warn, suppress_forces"),
+    'not finite': ('mass: 150.0', 'mass: .nan', 'platform.mass: nan kg: must be finite'),
+    'negative': ('mass: 150.0', 'mass: -150.0', 'platform.mass: -150.0 kg: must be more than 0'),
+    'inertia': ('21.0, 3.0, 35.0', '21.0, 3.0, -35.0',
+                'platform.inertia: [20.0, 1.0, 2.0, 21.0, 3.0, -35.0]: must be positive definite'),
+    'limits crossed': ('length_min: 0.8', 'length_min: 1.4',
+                       'limits.length_min: [1.4, 1.4, 1.4, 1.4, 1.4, 1.4]: must be less than '
+                       'limits.length_max'),
+    'stop below warn': ('stop_condition: 400.0', 'stop_condition: 39.0',
+                        'singularity.stop_condition: 39.0: must be at least '
+                        'singularity.warn_condition, 40.0'),
+    'names twice': ('    autostart: true', '    joints: [a, b, c, d, e, e]',
+                    "joints: ['a', 'b', 'c', 'd', 'e', 'e']: six different names needed"),
+    'not YAML': ('platform:\n', 'platform: [\n', 'not YAML: '),
+    'name given twice': ('mass: 150.0', 'mass: 150.0\n      mass: 160.0', 'not YAML: '),
+    'no value': ('mass: 150.0', 'mass:', 'platform.mass: '),
+    'no section for it': ('/**:', 'another_node:', 'geometry.base_joints: missing'),
+}
+
+
+@pytest.mark.parametrize('case', BROKEN)
+def test_a_broken_rule_is_said_in_one_line(domain: int, tmp_path: Path, case: str) -> None:
+    good, bad, text = BROKEN[case]
+    assert good in GOOD
+    file = tmp_path / 'machine.yaml'
+    file.write_text(GOOD.replace(good, bad), encoding='utf-8')
+    line = refused(domain, tmp_path / 'node', '--params-file', str(file))
+    assert line.startswith(f'stewart_dynamics: {file}: {text}')
+
+
+def test_the_file_that_those_spoil_is_good(start: Start, tmp_path: Path) -> None:
+    file = tmp_path / 'machine.yaml'
+    file.write_text(GOOD, encoding='utf-8')
+    node = start(file=file)
+    node.until_active()
+    node.stop()
+
+
+def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
+    file = tmp_path / 'none.yaml'
+    assert refused(domain, tmp_path / 'node', '--params-file', str(file)) == (
+        f'stewart_dynamics: {file}: cannot be read: No such file or directory')
+
+
+@pytest.mark.parametrize('override, text', [
+    ('platform.mass:=150', 'platform.mass: 150: is an integer'),
+    ('platfrom.mass:=150.0', 'platfrom.mass: unknown parameter; do you mean platform.mass?'),
+])
+def test_a_bad_parameter_on_the_command_line_is_said_in_one_line(
+        domain: int, tmp_path: Path, override: str, text: str) -> None:
+    line = refused(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
+    assert text in line
+
+
+def test_no_parameters_at_all_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
+    assert refused(domain, tmp_path / 'node') == (
+        'stewart_dynamics: command line: geometry.base_joints: missing, it has no default')
+
+
+# Whatever comes
+
+_numbers_of_any_kind = st.floats(allow_nan=True, allow_infinity=True)
+_six = st.tuples(*[_numbers_of_any_kind] * 6)
+_samples = st.builds(
+    Sample, position=st.tuples(*[_numbers_of_any_kind] * 3), quaternion=st.one_of(
+        st.just((0.0, 0.0, 0.0, 1.0)), st.tuples(*[_numbers_of_any_kind] * 4)),
+    twist=_six, accel=_six)
+_inputs = st.sampled_from([*SEPARATE, 'wrench'])
+
+
+@st.composite
+def _messages(draw: st.DrawFn) -> list[tuple[str, Any]]:
+    """Return messages on the node's topics, sound, spoiled or no messages at all."""
+    if draw(st.booleans()):
+        # A CDR header, of which readers of such messages know some, and anything behind it.
+        return [(draw(_inputs), draw(st.sampled_from([b'\0\1\0\0', b'\0\0\0\0', b'\1\7\0\0']))
+                 + draw(st.binary(max_size=200)))]
+    stamp = draw(st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1))
+    frame = draw(st.sampled_from(['base', '', 'world', '\N{SNOWMAN}']))
+    sample = draw(_samples)
+    messages = {**sample.messages(0, frame), 'wrench': wrench_message(sample.twist, frame)}
+    sent = []
+    for topic in draw(st.lists(_inputs, min_size=1, max_size=6)):
+        data = raw(messages[topic])
+        sec, nanosec = divmod(stamp, 10**9)
+        data = data[:4] + sec.to_bytes(4, 'little', signed=True) + draw(st.sampled_from([
+            nanosec, 10**9, 2**32 - 1])).to_bytes(4, 'little') + data[12:]
+        sent.append((topic, data[:draw(st.sampled_from([len(data), len(data) - 8, 12]))]))
+    return sent
+
+
+@pytest.fixture(scope='module')
+def target(ros_environment: None, tmp_path_factory: pytest.TempPathFactory,
+           ) -> Iterator[DynamicsNode]:
+    """Return a node for whatever comes."""
+    each = DynamicsNode(tmp_path_factory.mktemp('target'))
+    try:
+        each.until_active()
+        yield each
+    finally:
+        each.close()
+
+
+@settings(max_examples=60, derandomize=True, deadline=None, database=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@given(st.lists(_messages(), min_size=1, max_size=6))
+def test_whatever_comes_nothing_but_numbers_goes_out_and_a_setpoint_is_answered(
+        target: DynamicsNode, sent: list[list[tuple[str, Any]]]) -> None:
+    for topic, message in (each for messages in sent for each in messages):
+        target.publish(topic, message)
+    # A load that is held may be so large that every setpoint's numbers overflow.
+    target.publish('wrench', wrench_message((0.0,) * 6))
+    state = target.state_of(target.send(MOVING))
+    assert bits(state.position) == bits(
+        target.result_of(MOVING).lengths - target.platform.parameters['geometry.zero_length'])
+    target.check_finite()
+    assert_only_log_lines(target.program.stderr)
+
+
+@pytest.mark.parametrize('program', ['stewart_dynamics', 'stewart_trajectory'])
+def test_help_is_given_and_a_stray_argument_is_refused(program: str) -> None:
+    path = Path(sys.executable).with_name(program)
+    said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
+    assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')
+    assert not said.stderr
+    ended = subprocess.run([path, 'foo'], capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr == f'{program}: foo: unknown argument; see --help\n'

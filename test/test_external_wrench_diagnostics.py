@@ -1,0 +1,169 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is said of the external wrench, at which level, and since when."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from referees import rotation_about
+from test_external_wrench import (
+    BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, UNFILTERED)
+
+from stewart_dynamics import Motion
+from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench
+from stewart_dynamics.runtime.external_wrench_diagnostics import WrenchDiagnostics
+from stewart_dynamics.runtime.measured_legs import LACKING, MEASURED_LEGS
+from stewart_dynamics.runtime.setpoints import Refusal
+
+TARGET = tuple(HOME.rows.tolist())
+
+
+def found(load: tuple[float, ...] = LOAD, **changes: float) -> Estimate:
+    """Return the second estimate of a machine at rest under a load."""
+    parameters = MACHINE.replaced({**UNFILTERED, **{
+        f'external_wrench.{name}': value for name, value in changes.items()}})
+    return estimates(ExternalWrench(parameters),
+                     resting(MACHINE, HOME, load, [BEGIN, BEGIN + MILLISECOND]))[1]
+
+
+FIRST = estimates(ExternalWrench(MACHINE), resting(MACHINE, HOME, LOAD, [BEGIN]))[0]
+CLEAR = found()
+OVER = found(force_max=300.0, moment_max=100.0)
+
+
+def felt(diagnostics: WrenchDiagnostics, now: float, estimate: Estimate = CLEAR) -> bool:
+    diagnostics.heard(now)
+    return diagnostics.estimated(estimate, TARGET, now)
+
+
+def status(diagnostics: WrenchDiagnostics, now: float) -> Status:
+    only, = diagnostics.report(now)
+    assert only.name == 'external wrench'
+    assert only.level == diagnostics.level(now)
+    return only
+
+
+def test_there_is_none_before_a_measurement_has_come() -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    assert diagnostics.report(5.0) == ()
+    assert diagnostics.level(1e9) == OK
+    diagnostics.heard(6.0)
+    assert len(diagnostics.report(6.0)) == 1
+
+
+def test_it_comes_behind_the_others() -> None:
+    wrench = WrenchDiagnostics(MACHINE)
+    diagnostics = Diagnostics(MACHINE, (), 0.0, [wrench])
+    assert [each.name for each in diagnostics.report(0.0)] == [
+        'setpoints', 'singularity', 'limits', 'timing']
+    assert not diagnostics.level_changed(0.0)
+    felt(wrench, 0.1, OVER)
+    assert diagnostics.level_changed(0.1)
+    assert [each.name for each in diagnostics.report(0.1)] == [
+        'setpoints', 'singularity', 'limits', 'timing', 'external wrench']
+    assert not diagnostics.level_changed(0.1)
+
+
+def test_its_keys_are_what_is_felt() -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    felt(diagnostics, 1.0)
+    now = status(diagnostics, 1.05)
+    assert (now.level, now.message) == (OK, 'no overload')
+    values = dict(now.values)
+    assert CLEAR.wrench is not None
+    assert CLEAR.differences is not None
+    worst = int(np.argmax(np.abs(CLEAR.differences)))
+    assert values == {
+        'wrenches': '1', 'age of the last (s)': '0.050',
+        'force (N)': f'{np.linalg.norm(LOAD[:3]):.6g}',
+        'moment (N m)': f'{np.linalg.norm(LOAD[3:]):.6g}',
+        'force x (N)': '150', 'force y (N)': '-100', 'force z (N)': '250',
+        'moment x (N m)': '60', 'moment y (N m)': '-40', 'moment z (N m)': '80',
+        'largest measured - model force of a leg (N)': f'{CLEAR.differences[worst]:.6g}',
+        'its leg': f'leg_{worst + 1}',
+        'distance from the last setpoint (m)': values['distance from the last setpoint (m)'],
+        'turn from the last setpoint (rad)': values['turn from the last setpoint (rad)']}
+    assert float(values['distance from the last setpoint (m)']) < 1e-12
+
+
+@pytest.mark.parametrize('angle', [1e-9, 1e-3, 1.0, 3.0])
+def test_how_far_it_is_from_the_setpoint(angle: float) -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    target = Motion([0.003, 0.0, 1.104], rotation_about(axis, angle))
+    diagnostics.heard(1.0)
+    diagnostics.estimated(CLEAR, target.rows.tolist(), 1.0)
+    values = dict(status(diagnostics, 1.0).values)
+    assert float(values['distance from the last setpoint (m)']) == pytest.approx(0.005, rel=1e-5)
+    assert float(values['turn from the last setpoint (rad)']) == pytest.approx(angle, rel=1e-5)
+    diagnostics.estimated(CLEAR, None, 1.0)
+    assert not any('setpoint' in key for key, _ in status(diagnostics, 1.0).values)
+
+
+def test_an_overload_is_an_error_and_held_for_a_second() -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    assert not felt(diagnostics, 1.0)
+    assert status(diagnostics, 1.0).level == OK
+    assert felt(diagnostics, 1.01, OVER)
+    now = status(diagnostics, 1.01)
+    assert now.level == ERROR
+    assert now.message == (
+        f'force {OVER.force:.6g} N is {OVER.force - 300.0:.6g} N beyond '
+        f'external_wrench.force_max, moment {OVER.moment:.6g} N m is '
+        f'{OVER.moment - 100.0:.6g} N m beyond external_wrench.moment_max')
+    assert not felt(diagnostics, 1.5)
+    assert status(diagnostics, 1.5).level == ERROR
+    assert felt(diagnostics, 2.02)
+    assert status(diagnostics, 2.02).level == OK
+
+
+def test_silence_is_stale() -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    felt(diagnostics, 1.0)
+    assert status(diagnostics, 1.09).level == OK
+    now = status(diagnostics, 3.5)
+    assert (now.level, now.message) == (STALE, 'no wrench: measured_legs silent for 2.5 s')
+    assert felt(diagnostics, 4.0)
+    assert status(diagnostics, 4.0).level == OK
+
+
+def test_measurements_that_are_too_far_apart_are_stale() -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    for now in (1.0, 1.5, 2.0):
+        felt(diagnostics, now, FIRST)
+    of = status(diagnostics, 2.0)
+    assert (of.level, of.message) == (
+        STALE, 'no wrench: measurements are farther apart than setpoint.timeout, 0.1 s')
+    assert 'force (N)' not in dict(of.values)
+    assert 'distance from the last setpoint (m)' in dict(of.values)
+
+
+def test_a_refusal_is_told_and_counted() -> None:
+    diagnostics = WrenchDiagnostics(MACHINE)
+    felt(diagnostics, 1.0)
+    diagnostics.refused(Refusal(MEASURED_LEGS, LACKING), 'leg_6', 1.01)
+    now = status(diagnostics, 1.02)
+    assert (now.level, now.message) == (
+        WARN, 'measured_legs: lacks one of the joints (leg_6)')
+    assert dict(now.values)['refused, measured_legs: lacks one of the joints'] == '1'
+    for n in range(10):
+        diagnostics.heard(1.1 + 0.1 * n)
+        diagnostics.refused(Refusal(MEASURED_LEGS, LACKING), 'leg_6', 1.1 + 0.1 * n)
+    now = status(diagnostics, 2.0)
+    assert (now.level, now.message) == (
+        STALE, 'no wrench: measured_legs: lacks one of the joints (leg_6)')
+    assert dict(now.values)['refused, measured_legs: lacks one of the joints'] == '11'

@@ -1,0 +1,705 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The runtime path against other libraries, other formulas, and itself in other forms."""
+
+from __future__ import annotations
+
+import copy
+import os
+from pathlib import Path
+import pickle
+import re
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    derivative, each_relative, energies, friction, moved, PinocchioReferee, QUARTER_TURN,
+    random_motion, random_parameters, random_wrench, relative, rng, rotation_about, smooth_motion,
+    symmetric_parameters)
+
+import stewart_dynamics
+from stewart_dynamics import (
+    InverseDynamics, Motion, MotionError, Parameters, SingularityError, StewartError,
+    StewartPlatform)
+from stewart_dynamics.mechanics import lagrange
+from stewart_dynamics.mechanics import stewart_platform as platform_module
+from stewart_dynamics.mechanics.jit import COMPILED
+from stewart_dynamics.mechanics.kernel import (
+    CONDITION, DETERMINANT, FORCES, LANES, MOTION, RESULT, solve)
+
+Array = NDArray[np.float64]
+
+PACKAGE = Path(stewart_dynamics.__file__).parent
+MACHINES = 12
+STATES = 15
+
+
+def sample(motion: Motion, n: int) -> Motion:
+    """Return one sample of a batch."""
+    return Motion(motion.position[n], motion.rotation[n], motion.linear_velocity[n],
+                  motion.angular_velocity[n], motion.linear_acceleration[n],
+                  motion.angular_acceleration[n])
+
+
+def scaled_jacobian(platform: StewartPlatform, motion: Motion) -> Array:
+    """Return J_inv with its right half divided by the characteristic length."""
+    size = platform.parameters['singularity.characteristic_length']
+    j: Array = platform.jacobian(motion.position, motion.rotation) / [1, 1, 1, size, size, size]
+    return j
+
+
+def turned(angles: Any, turn_rate: float = 0.0, height: float = 1.0) -> Motion:
+    """Return the platform above the base, turned about z, a batch."""
+    poses = [rotation_about([0.0, 0.0, 1.0], angle) for angle in np.atleast_1d(angles)]
+    return Motion([0.0, 0.0, height], poses, None, [0.0, 0.0, turn_rate])
+
+
+def samples_of_all_kinds(many: int) -> tuple[StewartPlatform, Array]:
+    """Return a symmetric machine and motions: ordinary, symmetric, near and on a singularity."""
+    random = rng()
+    platform = StewartPlatform(symmetric_parameters())
+    rows = random_motion(platform.parameters, random, many).rows.copy()
+    turns = [0.0, 0.3, np.pi / 2 - 0.1, np.pi / 2 - 1e-4, np.pi / 2 - 1e-9]
+    special = turned(turns, 0.7).rows
+    exact = Motion([[0.0, 0.0, 1.0]], QUARTER_TURN, None, [0.0, 0.0, 0.7]).rows
+    rows[::9] = np.resize(np.vstack([special, exact]), rows[::9].shape)
+    return platform, rows
+
+
+def run(code: str, path: Path = PACKAGE.parent, first: Path | None = None,
+        **environment: str) -> str:
+    """Run Python code against the package under a path, and return what it prints."""
+    paths = [str(path)] if first is None else [str(first), str(path)]
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=path, capture_output=True, text=True, check=False,
+        env={**os.environ, **environment, 'PYTHONPATH': os.pathsep.join(paths)})
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+# The physics
+
+def test_forces_are_those_of_pinocchio() -> None:
+    pytest.importorskip('pinocchio')
+    random = rng()
+    for _ in range(MACHINES):
+        parameters = random_parameters(random)
+        platform = StewartPlatform(parameters)
+        referee = PinocchioReferee(parameters, random)
+        motion = random_motion(parameters, random, STATES)
+        wrenches = random_wrench(parameters, random, STATES)
+        forces = platform.inverse_dynamics(motion, wrenches).forces
+        for n in range(STATES):
+            truth = referee.forces(sample(motion, n), wrenches[n])
+            assert relative(forces[n], truth) < 1e-12
+
+
+def test_forces_near_a_singularity_are_those_of_pinocchio_to_what_its_condition_leaves() -> None:
+    pytest.importorskip('pinocchio')
+    platform = StewartPlatform(symmetric_parameters())
+    referee = PinocchioReferee(platform.parameters, rng())
+    for short_of in (0.3, 1e-2, 1e-4, 1e-6):
+        motion = turned(np.pi / 2 - short_of, 0.5)
+        result = platform.inverse_dynamics(motion)
+        truth = referee.forces(sample(motion, 0), np.zeros(6))
+        assert relative(result.forces[0], truth) < 1e-14 * result.condition_number[0] + 1e-12
+
+
+def test_forces_are_those_of_the_lagrange_matrices() -> None:
+    random = rng()
+    for _ in range(MACHINES):
+        p = random_parameters(random)
+        platform = StewartPlatform(p)
+        motion = random_motion(p, random, STATES)
+        # in some samples the legs are as slow as where Coulomb friction is linear
+        slowed = np.where(np.arange(STATES) % 3 == 0, 1e-4, 1.0)[:, None]
+        motion = Motion(motion.position, motion.rotation, slowed * motion.linear_velocity,
+                        slowed * motion.angular_velocity, motion.linear_acceleration,
+                        motion.angular_acceleration)
+        wrench = random_wrench(p, random, STATES)
+        result = platform.inverse_dynamics(motion, wrench)
+        twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
+        acceleration = np.concatenate(
+            [motion.linear_acceleration, motion.angular_acceleration], axis=-1)
+        j_inv = platform.jacobian(motion.position, motion.rotation)
+        for christoffel in (False, True):
+            c = platform.coriolis_matrix(motion.position, motion.rotation,
+                                         motion.linear_velocity, motion.angular_velocity,
+                                         christoffel)
+            load = (np.einsum('nij,nj->ni', platform.mass_matrix(
+                        motion.position, motion.rotation), acceleration)
+                    + np.einsum('nij,nj->ni', c, twist)
+                    + platform.gravity_vector(motion.position, motion.rotation) - wrench)
+            truth = np.linalg.solve(np.swapaxes(j_inv, -1, -2), load[..., None])[..., 0]
+            truth = truth + friction(p, result.rates)
+            assert each_relative(result.forces, truth) < 1e-12
+
+
+def test_reflected_mass_and_friction_act_along_each_leg() -> None:
+    random = rng()
+    with_actuators = random_parameters(random)
+    without = with_actuators.replaced(dict.fromkeys((
+        'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'), 0.0))
+    unloaded = StewartPlatform(without)
+    course = smooth_motion(with_actuators, random)
+    for time in np.linspace(0.0, 3.0, 10):
+        motion = course(time)
+        loaded = StewartPlatform(with_actuators).inverse_dynamics(motion)
+        free = unloaded.inverse_dynamics(motion)
+
+        def rates(h: float, t: float = time) -> Array:
+            return unloaded.inverse_dynamics(course(t + h)).rates
+
+        actuators = (with_actuators['actuator.reflected_mass'] * derivative(rates, 1e-3)
+                     + friction(with_actuators, free.rates))
+        assert relative(loaded.forces - free.forces, actuators) < 1e-8
+
+
+def test_lengths_are_the_distances_of_the_joints_and_rates_their_derivatives() -> None:
+    random = rng()
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = random_motion(p, random, STATES)
+    result = platform.inverse_dynamics(motion)
+    ends = motion.position[:, None] + np.einsum(
+        'nij,kj->nki', motion.rotation, p['geometry.platform_joints'])
+    lengths = np.linalg.norm(ends - p['geometry.base_joints'], axis=-1)
+    assert relative(result.lengths, lengths) < 1e-14
+    assert np.array_equal(
+        result.lengths, platform.inverse_kinematics(motion.position, motion.rotation))
+
+    def lengths_after(h: float) -> Array:
+        later = moved(motion, h)
+        return platform.inverse_kinematics(later.position, later.rotation)
+
+    assert each_relative(result.rates, derivative(lengths_after, 1e-3)) < 1e-9
+
+
+def test_rates_are_j_inv_times_the_twist() -> None:
+    random = rng()
+    for _ in range(MACHINES):
+        p = random_parameters(random)
+        platform = StewartPlatform(p)
+        motion = random_motion(p, random, STATES)
+        twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
+        rates = np.einsum(
+            'nij,nj->ni', platform.jacobian(motion.position, motion.rotation), twist)
+        assert each_relative(platform.inverse_dynamics(motion).rates, rates) < 1e-13
+
+
+def test_forces_at_rest_balance_the_gravity_vector() -> None:
+    random = rng()
+    for _ in range(MACHINES):
+        p = random_parameters(random)
+        platform = StewartPlatform(p)
+        moving = random_motion(p, random, STATES)
+        rest = Motion(moving.position, moving.rotation)
+        forces = platform.inverse_dynamics(rest).forces
+        j_inv = platform.jacobian(rest.position, rest.rotation)
+        held = np.einsum('nji,nj->ni', j_inv, forces)
+        assert each_relative(held, platform.gravity_vector(rest.position, rest.rotation)) < 1e-13
+
+
+def test_power_of_the_legs_and_the_wrench_is_the_change_of_energy_and_the_friction() -> None:
+    random = rng()
+    step = 1e-3
+    times = np.linspace(0.0, 2.0, 25)
+    for _ in range(4):
+        p = random_parameters(random)
+        platform = StewartPlatform(p)
+        course = smooth_motion(p, random)
+        motion = course(times)
+        wrench = random_wrench(p, random, len(times))
+        result = platform.inverse_dynamics(motion, wrench)
+        twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
+        supplied = np.sum(result.forces * result.rates, axis=-1) + np.sum(wrench * twist, axis=-1)
+        lost = np.sum(friction(p, result.rates) * result.rates, axis=-1)
+
+        def energy(h: float, course: Any = course, p: Parameters = p) -> Array:
+            return np.sum(energies(p, course(times + h)), axis=0)
+
+        assert relative(supplied - lost, derivative(energy, step)) < 1e-7
+
+
+def test_a_wrench_is_held_by_the_forces_that_balance_it() -> None:
+    random = rng()
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = random_motion(p, random, STATES)
+    wrench = random_wrench(p, random, STATES)
+    taken = (platform.inverse_dynamics(motion).forces
+             - platform.inverse_dynamics(motion, wrench).forces)
+    j_inv = platform.jacobian(motion.position, motion.rotation)
+    assert each_relative(np.einsum('nji,nj->ni', j_inv, taken), wrench) < 1e-12
+    one_for_all = platform.inverse_dynamics(motion, wrench[0])
+    assert np.array_equal(one_for_all.forces[3], platform.inverse_dynamics(
+        sample(motion, 3), wrench[0]).forces)
+
+
+# The neighbourhood of singularities
+
+def test_determinant_and_its_rate_are_those_of_j_inv() -> None:
+    random = rng()
+    for _ in range(MACHINES):
+        p = random_parameters(random)
+        platform = StewartPlatform(p)
+        motion = random_motion(p, random, STATES)
+        result = platform.inverse_dynamics(motion)
+        det = np.linalg.det(platform.jacobian(motion.position, motion.rotation))
+        assert relative(result.determinant, det) < 1e-13
+
+        def det_after(h: float, platform: StewartPlatform = platform,
+                      motion: Motion = motion) -> Array:
+            later = moved(motion, h)
+            return np.linalg.det(platform.jacobian(later.position, later.rotation))
+
+        assert relative(result.determinant_rate, derivative(det_after, 1e-3)) < 1e-8
+
+
+def test_determinant_rate_holds_up_to_a_singularity() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+
+    def det(angle: float) -> Array:
+        motion = turned(np.pi / 2 + angle)
+        return np.linalg.det(platform.jacobian(motion.position, motion.rotation))
+
+    truth = derivative(det, 1e-3)[0]
+    for short_of in (1e-6, 1e-9, 1e-12):
+        row = platform.solve(turned(np.pi / 2 - short_of, 1.0).rows)[0]
+        assert row[DETERMINANT + 1] == pytest.approx(truth, rel=1e-5)
+    exact = Motion([[0.0, 0.0, 1.0]], QUARTER_TURN, None, [0.0, 0.0, 1.0])
+    assert platform.solve(exact.rows)[0, DETERMINANT + 1] == pytest.approx(truth, rel=1e-9)
+
+
+def test_condition_number_and_unit_load_forces_are_those_of_numpy() -> None:
+    random = rng()
+    for _ in range(MACHINES):
+        p = random_parameters(random)
+        platform = StewartPlatform(p)
+        motion = random_motion(p, random, STATES)
+        result = platform.inverse_dynamics(motion)
+        j = scaled_jacobian(platform, motion)
+        assert np.allclose(result.condition_number, np.linalg.cond(j), rtol=1e-12, atol=0.0)
+        rows = np.linalg.norm(np.linalg.inv(np.swapaxes(j, -1, -2)), axis=-1)
+        assert np.allclose(result.unit_load_forces, rows, rtol=1e-12, atol=0.0)
+
+
+def test_unit_load_force_is_reached_by_a_load_and_exceeded_by_none() -> None:
+    random = rng()
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = sample(random_motion(p, random, 1), 0)
+    size = p['singularity.characteristic_length']
+    result = platform.inverse_dynamics(motion)
+    loads = random.normal(size=(20000, 6))
+    loads /= np.linalg.norm(loads, axis=1, keepdims=True)
+    balance = np.linalg.inv(platform.jacobian(motion.position, motion.rotation).T)
+    scaled = balance * [1, 1, 1, size, size, size]
+    loads = np.vstack([loads, scaled / np.linalg.norm(scaled, axis=1, keepdims=True)])
+    forces = np.abs(loads @ scaled.T)
+    assert np.all(forces <= result.unit_load_forces * (1.0 + 1e-12))
+    assert np.allclose(forces.max(axis=0), result.unit_load_forces, rtol=1e-12)
+
+
+@pytest.mark.parametrize('height', [0.3, 0.5, 1.0, 1.5, 4.0])
+def test_condition_number_holds_in_symmetric_poses_with_double_singular_values(
+        height: float) -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    motion = turned(np.linspace(-1.4, 1.4, 57), height=height)
+    j = scaled_jacobian(platform, motion)
+    values = np.linalg.svd(j, compute_uv=False)
+    assert np.all(np.min(-np.diff(values), axis=-1) < 1e-12)  # double ones there are
+    condition = platform.inverse_dynamics(motion).condition_number
+    assert np.allclose(condition, np.linalg.cond(j), rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parametrize('decade', range(1, 12))
+def test_condition_number_and_determinant_hold_near_a_singularity(decade: int) -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    motion = turned(np.pi / 2 - np.array([-1.0, 1.0]) * 10.0 ** -decade)
+    result = platform.solve(motion.rows)
+    j = scaled_jacobian(platform, motion)
+    condition = np.linalg.cond(j)
+    allowed = 1e-15 * condition + 1e-13
+    assert np.all(np.abs(result[:, CONDITION] / condition - 1.0) < allowed)
+    det = np.linalg.det(platform.jacobian(motion.position, motion.rotation))
+    assert np.all(np.abs(result[:, DETERMINANT] / det - 1.0) < allowed)
+
+
+def test_forces_stay_finite_through_a_singularity_and_grow_as_one_over_the_distance() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    exact = Motion([[0.0, 0.0, 1.0]], QUARTER_TURN, None, [0.0, 0.0, 1.0],
+                   [0.3, 0.2, 0.1]).rows
+    near = turned(np.pi / 2 + np.linspace(-0.5, 0.5, 1001), 1.0).rows
+    rows = np.vstack([near, exact])
+    results = platform.solve(rows)
+    assert np.all(np.isfinite(results))
+    assert np.all(np.sign(results[:500, DETERMINANT]) == -np.sign(results[501:1001, DETERMINANT]))
+    sizes = [np.abs(platform.solve(turned(np.pi / 2 - d, 1.0).rows)[0, FORCES:FORCES + 6]).max()
+             * d for d in (1e-3, 1e-4)]
+    assert sizes[1] == pytest.approx(sizes[0], rel=0.01)
+
+
+@pytest.mark.parametrize('legs', ['parallel', 'in one plane', 'one joint', 'one of no length'])
+def test_results_are_finite_where_many_legs_fail_at_once(legs: str) -> None:
+    p = symmetric_parameters()
+    base, top = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
+    if legs == 'parallel':
+        base = top
+    elif legs == 'in one plane':
+        base = top = top * [1.0, 0.0, 0.0]
+    elif legs == 'one joint':
+        base = np.tile([1.0, 0.0, 0.0], (6, 1))
+    else:
+        base[0] = top[0] + [0.0, 0.0, 1.0]
+    platform = StewartPlatform(p.replaced({
+        'geometry.base_joints': base.ravel(), 'geometry.platform_joints': top.ravel(),
+        'singularity.characteristic_length': 0.6}))
+    motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.1, 0.2, 0.3], [0.1, 0.2, 0.3])
+    assert np.all(np.isfinite(platform.solve(motion.rows.reshape(1, MOTION))))
+    with pytest.raises(SingularityError, match='sample 0'):
+        platform.inverse_dynamics(motion)
+
+
+def test_determinant_rate_holds_where_a_pivot_is_exactly_zero() -> None:
+    p = symmetric_parameters()
+    base, moving = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
+    # legs 1 and 2 on one vertical line
+    base[:2] = [[0.5, 0.0, 0.0], [0.5, 0.0, -1.0]]
+    moving[:2] = [[0.5, 0.0, 0.0], [0.5, 0.0, 0.5]]
+    platform = StewartPlatform(p.replaced({
+        'geometry.base_joints': base.ravel().tolist(),
+        'geometry.platform_joints': moving.ravel().tolist()}))
+
+    omega = np.array([0.1, 0.2, 0.3])
+    speed = float(np.linalg.norm(omega))
+
+    def determinant(time: float) -> float:
+        motion = Motion(np.array([0.0, 0.0, 1.0]) + time * np.array([0.3, 0.2, 0.1]),
+                        rotation_about(omega / speed, speed * time))
+        return float(np.linalg.det(platform.jacobian(motion.position, motion.rotation)))
+
+    motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.3, 0.2, 0.1], omega)
+    found = platform.solve(motion.rows[None])[0]
+    assert abs(found[DETERMINANT]) < 1e-30
+    h = 1e-5
+    truth = (determinant(h) - determinant(-h)) / (2.0 * h)
+    assert found[DETERMINANT + 1] == pytest.approx(truth, rel=1e-8)
+
+
+def test_no_layout_of_arrays_is_compiled_for_anew() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    rows = samples_of_all_kinds(40)[1]
+    motion = Motion([[0.0, 0.0, 1.0]] * 5, np.eye(3))
+    one_by_one = platform.inverse_dynamics(motion, np.tile(np.arange(6.0), (5, 1)))
+    for_all = platform.inverse_dynamics(motion, np.arange(6.0))
+    assert np.array_equal(one_by_one.forces, for_all.forces)
+    assert np.array_equal(platform.solve(rows[::2]), platform.solve(rows)[::2])
+    assert np.array_equal(platform.solve(np.asfortranarray(rows)), platform.solve(rows))
+    if COMPILED:
+        assert len(solve.signatures) == 1
+
+
+def test_a_singular_sample_is_named() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    rows = turned(np.linspace(0.0, 1.0, 7)).rotation.copy()
+    rows[4] = QUARTER_TURN
+    with pytest.raises(SingularityError, match=re.escape('sample 4: ')) as caught:
+        platform.inverse_dynamics(Motion([0.0, 0.0, 1.0], rows))
+    assert '1e+12' in str(caught.value)
+    assert '[0.0, 0.0, 1.0] m' in str(caught.value)
+
+
+# One sample, many samples, any form of them
+
+def test_a_sample_of_a_batch_of_any_size_is_the_sample_alone_bit_for_bit() -> None:
+    platform, rows = samples_of_all_kinds(3 * LANES + 5)
+    wrenches = random_wrench(platform.parameters, rng(), len(rows))
+    alone = np.vstack([platform.solve(row[None], wrench[None])
+                       for row, wrench in zip(rows, wrenches, strict=True)])
+    for many in range(len(rows) + 1):
+        assert np.array_equal(platform.solve(rows[:many], wrenches[:many]), alone[:many])
+        first = len(rows) - many
+        assert np.array_equal(platform.solve(rows[first:], wrenches[first:]), alone[first:])
+
+
+@pytest.mark.parametrize('one_wrench', [True, False])
+def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit(
+        one_wrench: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    # more threads than there may be processors, and parts that end amid a tile
+    monkeypatch.setattr(platform_module, '_CPUS', 5)
+    monkeypatch.setattr(platform_module, '_SAMPLES_FOR_A_THREAD', 1000)
+    platform, rows = samples_of_all_kinds(5 * 1000 + 77)
+    wrenches = random_wrench(platform.parameters, rng(), 1 if one_wrench else len(rows))
+    together = platform.solve(rows, wrenches)
+    alone = np.vstack([platform.solve(rows[n:n + 1], wrenches if one_wrench
+                                      else wrenches[n:n + 1]) for n in range(len(rows))])
+    assert np.array_equal(together, alone)
+
+
+def test_any_leading_shape_gives_the_same_samples() -> None:
+    random = rng()
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    flat = random_motion(p, random, 12)
+    square = Motion(*(np.reshape(part, (3, 4, *part.shape[1:])) for part in (
+        flat.position, flat.rotation, flat.linear_velocity, flat.angular_velocity,
+        flat.linear_acceleration, flat.angular_acceleration)))
+    wrench = random_wrench(p, random, 12)
+    batch = platform.inverse_dynamics(flat, wrench)
+    grid = platform.inverse_dynamics(square, wrench.reshape(3, 4, 6))
+    for name, of_batch, of_grid in zip(InverseDynamics._fields, batch, grid, strict=True):
+        tail = of_batch.shape[1:]
+        assert tail == ((6,) if name in ('lengths', 'rates', 'forces', 'unit_load_forces')
+                        else ())
+        assert of_grid.shape == (3, 4, *tail)
+        assert np.array_equal(of_grid.reshape(of_batch.shape), of_batch)
+        for n in range(12):
+            one = getattr(platform.inverse_dynamics(sample(flat, n), wrench[n]), name)
+            assert np.shape(one) == tail
+            assert np.array_equal(one, of_batch[n])
+    for function in (platform.jacobian, platform.mass_matrix, platform.gravity_vector,
+                     platform.inverse_kinematics):
+        of_grid = function(square.position, square.rotation)
+        of_batch = function(flat.position, flat.rotation)
+        assert of_grid.shape == (3, 4, *of_batch.shape[1:])
+        assert np.allclose(of_grid.reshape(of_batch.shape), of_batch, rtol=1e-14, atol=1e-14)
+        assert function(flat.position[0], flat.rotation[0]).shape == of_batch.shape[1:]
+
+
+def test_no_samples_give_no_results() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    result = platform.inverse_dynamics(Motion(np.zeros((0, 3)), np.zeros((0, 3, 3))))
+    assert result.forces.shape == (0, 6)
+    assert result.determinant.shape == (0,)
+
+
+@pytest.mark.parametrize(('wrench', 'text'), [
+    (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'do not fit'),
+    ('push', 'not an array of numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
+])
+def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    with pytest.raises(MotionError, match=text) as error:
+        platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
+    assert 'wrench' in str(error.value)
+
+
+def test_many_loads_on_one_pose_are_many_samples() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    motion = turned(0.1)
+    pose = Motion(motion.position[0], motion.rotation[0])
+    loads = random_wrench(platform.parameters, rng(), 4)
+    forces = platform.inverse_dynamics(pose, loads).forces
+    assert forces.shape == (4, 6)
+    for n in range(4):
+        assert np.array_equal(forces[n], platform.inverse_dynamics(pose, loads[n]).forces)
+
+
+@pytest.mark.parametrize('position', [[1e200, 0.0, 1.0], None], ids=['far', 'no length'])
+def test_a_leg_without_a_length_is_refused(position: Any) -> None:
+    p = symmetric_parameters()
+    platform = StewartPlatform(p)
+    if position is None:
+        position = p['geometry.base_joints'][1] - p['geometry.platform_joints'][1]
+    for function in (platform.jacobian, platform.mass_matrix, platform.gravity_vector):
+        with pytest.raises(MotionError, match='leg [1-6] would have a length'):
+            function(position, np.eye(3))
+    with pytest.raises(MotionError, match='leg [1-6] would have a length'):
+        platform.coriolis_matrix(position, np.eye(3), np.ones(3), np.ones(3))
+
+
+def test_a_pose_that_overflows_has_no_lengths() -> None:
+    with pytest.raises(MotionError, match='overflow'):
+        StewartPlatform(symmetric_parameters()).inverse_kinematics([1e200, 0.0, 1.0], np.eye(3))
+
+
+def test_where_machine_code_cannot_be_kept_it_is_compiled_at_every_start(
+        tmp_path: Path) -> None:
+    shutil.copytree(PACKAGE, tmp_path / 'stewart_dynamics',
+                    ignore=shutil.ignore_patterns('__pycache__'))
+    code = """
+import numba.core.caching as caching
+caching.CacheImpl._locator_classes = []
+from stewart_dynamics.mechanics import jit as compiled
+from stewart_dynamics.mechanics import kernel as inverse_dynamics
+print(compiled.HINT)
+print(inverse_dynamics.solve.py_func.__name__)
+"""
+    printed = run(code, path=tmp_path).splitlines()
+    if COMPILED:
+        assert 'NUMBA_CACHE_DIR' in printed[0]
+        assert printed[1] == 'solve'
+
+
+def test_a_platform_can_be_copied_and_sent_to_another_process() -> None:
+    platform = StewartPlatform(random_parameters(rng()))
+    motion = random_motion(platform.parameters, rng(), 3)
+    truth = platform.inverse_dynamics(motion).forces
+    for other in (copy.deepcopy(platform), pickle.loads(pickle.dumps(platform))):
+        assert np.array_equal(other.inverse_dynamics(motion).forces, truth)
+        assert other.parameters == platform.parameters
+        assert hash(other.parameters) == hash(platform.parameters)
+        assert not other.parameters['geometry.base_joints'].flags.writeable
+    assert platform.parameters != platform.parameters.replaced({'platform.mass': 1.5})
+
+
+# Compiled and not
+
+UNCOMPILED = """
+import numpy as np
+from stewart_dynamics.mechanics import kernel as inverse_dynamics
+from stewart_dynamics.mechanics.jit import COMPILED
+assert not COMPILED
+given = np.load({source!r})
+results = np.empty((len(given['rows']), inverse_dynamics.RESULT))
+with np.errstate(all='ignore'):
+    inverse_dynamics.solve(given['machine'], given['rows'], given['wrenches'], results)
+np.save({target!r}, results)
+"""
+
+
+@pytest.mark.parametrize('without', ['jit', 'numba'])
+def test_uncompiled_results_are_the_compiled_ones_bit_for_bit(
+        without: str, tmp_path: Path) -> None:
+    if not stewart_dynamics.mechanics.jit.COMPILED:
+        pytest.skip('nothing is compiled here')
+    platform, rows = samples_of_all_kinds(40)
+    other = StewartPlatform(random_parameters(rng()))
+    for n, machine in enumerate((platform, other)):
+        wrenches = random_wrench(machine.parameters, rng(), len(rows))
+        source, target = str(tmp_path / f'{n}.npz'), str(tmp_path / f'{n}.npy')
+        np.savez(source, machine=machine.machine, rows=rows, wrenches=wrenches)
+        code = UNCOMPILED.format(source=source, target=target)
+        if without == 'jit':
+            run(code, NUMBA_DISABLE_JIT='1')
+        else:
+            (tmp_path / 'numba.py').write_text("raise ImportError('no numba here')\n")
+            run(code, first=tmp_path)
+        assert np.array_equal(np.load(target), machine.solve(rows, wrenches))
+
+
+def test_the_package_needs_neither_ros_nor_bags() -> None:
+    loaded = run('import stewart_dynamics, sys; print(*sys.modules)').split()
+    assert 'stewart_dynamics' in loaded
+    tops = {name.partition('.')[0] for name in loaded}
+    assert not tops & {'rclpy', 'rosbags', 'sensor_msgs', 'geometry_msgs', 'std_msgs'}
+
+
+def test_kept_machine_code_is_not_used_after_a_change_of_a_module_it_was_made_of(
+        tmp_path: Path) -> None:
+    if not stewart_dynamics.mechanics.jit.COMPILED:
+        pytest.skip('nothing is compiled here')
+    # with the machine code kept so far, so that only the changed one is compiled here
+    shutil.copytree(PACKAGE, tmp_path / 'stewart_dynamics')
+    code = f"""
+import numpy as np
+from stewart_dynamics.mechanics import kernel as inverse_dynamics
+results = np.empty((1, {RESULT}))
+inverse_dynamics.solve(*np.load({str(tmp_path / "given.npy")!r}, allow_pickle=True), results)
+print(inverse_dynamics.__file__, results[0, 0], sep='|')
+"""
+    platform = StewartPlatform(symmetric_parameters())
+    given_arrays = np.empty(3, dtype=object)
+    given_arrays[:] = [platform.machine, turned(0.2).rows, np.zeros((1, 6))]
+    np.save(tmp_path / 'given.npy', given_arrays)
+    where, before = run(code, tmp_path).split('|')
+    assert Path(where).parents[1] == tmp_path
+    vectors = tmp_path / 'stewart_dynamics' / 'mechanics' / 'vectors.py'
+    text = vectors.read_text()
+    line = 'return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]\n'
+    assert line in text
+    vectors.write_text(text.replace(line, line.replace('return a[0]', 'return 2.0 * a[0]')))
+    _, after = run(code, tmp_path).split('|')
+    assert float(after) > float(before)
+
+
+# Whatever is given
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+ordinary = st.floats(-2.0, 2.0)
+positive = st.floats(min_value=0.0, allow_infinity=False)
+SYMMETRIC = {name: symmetric_parameters()[name].ravel().tolist()
+             for name in ('geometry.base_joints', 'geometry.platform_joints')}
+
+
+def numbers(many: int) -> Any:
+    """Return a strategy for lists of ordinary numbers, of any, and of both."""
+    return st.one_of(*(st.lists(each, min_size=many, max_size=many)
+                       for each in (ordinary, finite, st.one_of(ordinary, finite))))
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.lists(numbers(3), min_size=6, max_size=6), numbers(6))
+@np.errstate(all='ignore')
+def test_any_motion_gives_finite_results_or_an_error_of_the_package(
+        motion: Any, wrench: Any) -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    try:
+        result = platform.inverse_dynamics(Motion.from_euler(*motion), wrench)
+    except StewartError:
+        return
+    assert all(np.all(np.isfinite(part)) for part in result)
+    assert result.condition_number >= 1.0
+
+
+def machines(amount: Any) -> Any:
+    """Return a strategy for machines whose masses and inertias are such amounts."""
+    moments = st.lists(amount, min_size=3, max_size=3)
+    return st.fixed_dictionaries({
+        name: st.one_of(st.just(usual), numbers(len(usual)))
+        for name, usual in SYMMETRIC.items()
+    } | {
+        'platform.mass': amount,
+        'platform.inertia': moments.map(lambda i: [i[0], 0.0, 0.0, i[1], 0.0, i[2]]),
+    }, optional=dict.fromkeys((
+        'legs.cylinder.mass', 'legs.cylinder.center_of_mass', 'legs.cylinder.inertia',
+        'legs.piston.mass', 'legs.piston.center_of_mass', 'legs.piston.inertia',
+        'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+        'singularity.characteristic_length'), amount) | {
+            'gravity': numbers(3), 'platform.center_of_mass': numbers(3)})
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.one_of(machines(st.floats(0.01, 100.0)), machines(positive)))
+@np.errstate(all='ignore')
+def test_any_machine_gives_finite_results_or_an_error_of_the_package(values: Any) -> None:
+    try:
+        result = StewartPlatform(Parameters(values)).inverse_dynamics(Motion(
+            [0.1, 0.2, 1.0], np.eye(3), [0.1, 0.2, 0.3], [0.3, 0.2, 0.1], [1.0, 2.0, 3.0],
+            [3.0, 2.0, 1.0]))
+    except StewartError:
+        return
+    assert all(np.all(np.isfinite(part)) for part in result)
+    assert result.condition_number >= 1.0
+
+
+def test_lagrange_reference_names_the_same_jacobian() -> None:
+    random = rng()
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = random_motion(p, random, STATES)
+    at = lagrange.legs(p, motion.position, motion.rotation)
+    assert np.array_equal(platform.jacobian(motion.position, motion.rotation),
+                          lagrange.jacobian(at))
+    assert each_relative(platform.inverse_dynamics(motion).lengths, at.lengths) < 1e-14

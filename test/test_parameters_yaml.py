@@ -1,0 +1,158 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The reader of YAML files: what ROS's own reader gives, or a refusal in words."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+from stewart_dynamics import ParameterError
+from stewart_dynamics.parameters_yaml import no_space, read_document
+
+# Each as it stands in a file, and what both readers make of it.
+VALUES = {
+    # doubles
+    '1e3': 1000.0, '1.e3': 1000.0, '1E5': 1e5, '5.': 5.0, '.5': 0.5, '+.5': 0.5, '-.5e-3': -5e-4,
+    '-0.0': -0.0, '0e-999': 0.0, '08': 8.0, '9223372036854775808': 2.0 ** 63,
+    '100000000000000000000': 1e20, '0x1p3': 8.0, '0x1.8p1': 3.0, '0x.8': 0.5, '0x0p99999': 0.0,
+    '0xffffffffffffffff': 2.0 ** 64, '2.2250738585072014e-308': 2.0 ** -1022,
+    'inf': float('inf'), '-Infinity': -float('inf'), '.inf': float('inf'), '+.INF': float('inf'),
+    '-.Inf': -float('inf'), '|-\n      5.0': 5.0, '&a 1.0': 1.0, '1.0 # one': 1.0,
+    # integers, which no parameter of ours is
+    '0': 0, '-0': 0, '+5': 5, '010': 8, '0150': 104, '0x10': 16, '-0X1f': -31,
+    '9223372036854775807': 2 ** 63 - 1, '-9223372036854775808': -2 ** 63,
+    # truths
+    'yes': True, 'y': True, 'On': True, 'TRUE': True, 'no': False, 'N': False, 'off': False,
+    '>-\n      on': True,
+    # and all else is a text
+    '1_000': '1_000', '0b101': '0b101', '0o17': '0o17', '1,5': '1,5', '1:30': '1:30',
+    '2020-01-01': '2020-01-01', '1e400': '1e400', '1e-310': '1e-310', '0x1p99999': '0x1p99999',
+    '1e': '1e', '0x': '0x', '1.5f': '1.5f', '.e3': '.e3', '.': '.', 'tRUE': 'tRUE', '=': '=',
+    '<<': '<<', '\u0661': '\u0661', "'1.0'": '1.0', '"on"': 'on', "''": '', '!!str 1.0': '1.0',
+    '|\n      5.0': '5.0\n', '1.0\n      2.0': '1.0 2.0', '"1\\x302"': '102',
+    # lists
+    '[1.0, .inf, 3e0]': [1.0, float('inf'), 3.0], '[yes, off]': [True, False],
+    '[1, 0x2]': [1, 2], '[a, "1"]': ['a', '1'],
+}
+
+
+def file_of(path: Path, text: str) -> Path:
+    """Return the path of a file with this text."""
+    file = path / 'file.yaml'
+    file.write_text(text, encoding='utf-8')
+    return file
+
+
+def parameters_of(texts: list[str]) -> str:
+    """Return a file in which these are the parameters p0, p1 and so on."""
+    return '/**:\n  ros__parameters:\n' + ''.join(
+        f'    p{n}: {text}\n' for n, text in enumerate(texts))
+
+
+def test_texts_mean_what_they_mean_to_ros(tmp_path: Path) -> None:
+    file = file_of(tmp_path, parameters_of(list(VALUES)))
+    found = list(read_document(file)['/**']['ros__parameters'].values())
+    for text, value, expected in zip(VALUES, found, VALUES.values(), strict=True):
+        assert repr(value) == repr(expected), text
+
+
+# In its own process: a context of ROS and its arguments are the process's.
+READ_BY_ROS = """\
+import json, sys
+import rclpy
+from rclpy.node import Node
+rclpy.init(args=['--ros-args', '--params-file', sys.argv[1]])
+node = Node('reader', automatically_declare_parameters_from_overrides=True)
+values = []
+for n in range(int(sys.argv[2])):
+    value = node.get_parameter(f'p{n}').value
+    values.append(repr(list(value) if hasattr(value, 'tolist') else value))
+print(json.dumps(values))
+node.destroy_node()
+rclpy.shutdown()
+"""
+
+
+def test_ros_itself_reads_the_same(tmp_path: Path, domain: int) -> None:
+    pytest.importorskip('rclpy')
+    file = file_of(tmp_path, parameters_of(list(VALUES)))
+    read = subprocess.run(
+        [sys.executable, '-c', READ_BY_ROS, str(file), str(len(VALUES))], check=True,
+        capture_output=True, text=True, timeout=60,
+        env={**os.environ, 'ROS_DOMAIN_ID': f'{domain}'})
+    for text, value, expected in zip(
+            VALUES, json.loads(read.stdout), VALUES.values(), strict=True):
+        assert value == repr(expected), text
+
+
+@pytest.mark.parametrize('text', ['', '~', 'null', 'Null', 'NULL'])
+def test_what_is_nothing_in_yaml_is_nothing(tmp_path: Path, text: str) -> None:
+    assert read_document(file_of(tmp_path, f'a: {text}\n')) == {'a': None}
+
+
+def test_not_a_number_is_one_for_ros_in_all_its_spellings(tmp_path: Path) -> None:
+    document = read_document(file_of(tmp_path, 'a: [.nan, .NaN, nan, NAN, -nan, nan(0)]\n'))
+    assert all(isinstance(each, float) and each != each for each in document['a'])
+
+
+def test_a_document_of_any_form_is_read(tmp_path: Path) -> None:
+    text = 'a:\n  - b: 1\n    c: [[x], {y: 2.0}]\n  -\n    - d\n1: {}\n2.0: []\n'
+    assert read_document(file_of(tmp_path, text)) == {
+        'a': [{'b': 1, 'c': [['x'], {'y': 2.0}]}, ['d']], '1': {}, '2.0': []}
+
+
+@pytest.mark.parametrize('text', [
+    '[' * 900_000, '{' * 900_000, '- ' * 450_000, '? ' * 450_000, 'a: ' * 300_000,
+    '[\n' * 450_000, '%TAG !a! b\n' * 80_000, '---\n' * 225_000,
+    ''.join(f'%TAG !{n}! b\n' for n in range(60_000)),
+    '\u2028'.join(f'%TAG !{n}! b' for n in range(60_000)), '\r%TAG ! b' * 80_000,
+    'a: &a [1]\nb: ' + '&b [*a, *a, *a]', 'a: !<' + '%20' * 200_000 + '> b', '!' * 900_000,
+    'x: {<<: {a: 1}, <<: {a: 1}}', 'a: 1\na: 1'],
+    ids=lambda text: repr(text[:10]))
+def test_what_could_take_long_is_refused_when_it_begins(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        read_document(file_of(tmp_path, text))
+    message = str(caught.value)
+    assert message.isprintable()
+    assert len(message) < 300 + len(str(tmp_path))
+
+
+@pytest.mark.parametrize('text', [
+    '1' * 900_000 + 'x', '0x' + '1' * 900_000 + 'x', '.' + '1' * 900_000 + 'x',
+    ' ' * 900_000 + 'x',
+    '1e' + '1' * 900_000 + 'x', 'nan(' + 'a' * 900_000, '+' * 900_000])
+def test_what_is_nearly_a_number_is_soon_told(tmp_path: Path, text: str) -> None:
+    assert read_document(file_of(tmp_path, f'a: {text}\n')) == {'a': text.strip()}
+
+
+def test_the_largest_file_may_be_chosen(tmp_path: Path) -> None:
+    file = file_of(tmp_path, 'a: 1\n' + '#' * 95)
+    assert read_document(file, largest=100) == {'a': 1}
+    with pytest.raises(ParameterError, match='larger than 99 bytes'):
+        read_document(file, largest=99)
+
+
+@pytest.mark.parametrize('text, name', [
+    ('mass:150.0', 'mass'), ('  - mass:[1.0]', 'mass'), ('/**:{}', '/**'), ('a.b:c', 'a.b'),
+    ('mass: 150.0', ''), ('mass:', ''), ('a::b', ''), ('5:30', ''), ('', '')])
+def test_a_missing_space_is_found(text: str, name: str) -> None:
+    assert no_space(text) == (f'a space is missing after the colon of {name}' if name else '')

@@ -1,0 +1,273 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Motions: their derivatives against finite differences, their ends, the files in config."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
+from stewart_dynamics.mechanics import rotation as rotations
+from stewart_dynamics.mechanics.reference_motion import (
+    motion_at, sample_time, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.singularity import Cause, Singularity
+from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
+
+CONFIG = Path(__file__).resolve().parents[1] / 'config'
+FILES = sorted(CONFIG.glob('trajectory_*.yaml'))
+
+INITIAL = [0.1, -0.2, 1.1, 0.3, -0.2, 0.4]
+FINAL = [-0.2, 0.1, 0.9, -0.5, 0.6, 1.7]
+BETWEEN = {
+    'motion.initial': INITIAL, 'motion.final': FINAL, 'motion.duration': 3.0}
+MOTIONS = {
+    'paper': {'motion.type': 'paper', **BETWEEN},
+    'quintic': {'motion.type': 'quintic', **BETWEEN},
+    'paper to and fro': {'motion.type': 'paper', 'loop': True, **BETWEEN},
+    'quintic to and fro': {'motion.type': 'quintic', 'loop': True, **BETWEEN},
+    'sine': {
+        'motion.type': 'sine', 'motion.initial': INITIAL, 'motion.duration': 3.0,
+        'motion.amplitude': [0.1, 0.2, 0.05, 0.3, 0.2, 0.5],
+        'motion.frequency': [0.5, 0.3, 1.0, 0.7, 0.4, 0.6],
+        'motion.phase': [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]},
+    'hold': {'motion.type': 'hold', 'motion.initial': INITIAL, 'motion.duration': 3.0},
+}
+POINT_TO_POINT = ('paper', 'quintic')
+
+
+@pytest.fixture(scope='module')
+def platform() -> StewartPlatform:
+    return StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
+
+
+def parameters(name: str, **changes: object) -> TrajectoryParameters:
+    return TrajectoryParameters({**MOTIONS[name], **changes})
+
+
+def skew(vector: np.ndarray) -> np.ndarray:
+    return -np.cross(vector[..., None, :], np.eye(3))
+
+
+def pose_matches(motion: Motion, pose: list[float]) -> bool:
+    return (np.allclose(motion.position, pose[:3], rtol=0.0, atol=1e-14)
+            and np.allclose(motion.rotation, rotations.from_euler(pose[3:]), rtol=0.0,
+                            atol=1e-14))
+
+
+def at_rest(motion: Motion) -> bool:
+    return bool(np.all(motion.rows[..., 12:] == 0.0))
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_derivatives_are_those_of_the_pose(name: str) -> None:
+    p, step = parameters(name), 1e-5
+    end = 6.0 if p['loop'] else 3.0
+    times = np.random.default_rng(1).uniform(step, end - step, (20, 5))
+    now = motion_at(p, times)
+    before, after = motion_at(p, times - step), motion_at(p, times + step)
+
+    def rate(quantity: str) -> np.ndarray:
+        change = getattr(after, quantity) - getattr(before, quantity)
+        return np.asarray(change / (2.0 * step))
+
+    assert now.shape == (20, 5)
+    for quantity, derivative in (('position', now.linear_velocity),
+                                 ('rotation', skew(now.angular_velocity) @ now.rotation),
+                                 ('linear_velocity', now.linear_acceleration),
+                                 ('angular_velocity', now.angular_acceleration)):
+        np.testing.assert_allclose(rate(quantity), derivative, rtol=0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_one_time_gives_what_many_give(name: str) -> None:
+    p, times = parameters(name), np.linspace(-1.0, 7.0, 50)
+    rows = np.array([motion_at(p, t).rows for t in times])
+    assert motion_at(p, 0.5).shape == ()
+    np.testing.assert_allclose(motion_at(p, times).rows, rows, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize('name', POINT_TO_POINT)
+def test_ends_in_the_final_pose_with_no_velocity(name: str) -> None:
+    p = parameters(name)
+    start, end = motion_at(p, 0.0), motion_at(p, 3.0)
+    assert pose_matches(start, INITIAL) and pose_matches(end, FINAL)
+    for motion in (start, end):
+        np.testing.assert_allclose(motion.rows[12:18], 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize('name', POINT_TO_POINT)
+def test_rests_before_and_after(name: str) -> None:
+    before, after = motion_at(parameters(name), -1.0), motion_at(parameters(name), 3.001)
+    assert at_rest(before) and pose_matches(before, INITIAL)
+    assert at_rest(after) and pose_matches(after, FINAL)
+
+
+def test_quintic_ends_with_no_acceleration() -> None:
+    assert at_rest(motion_at(parameters('quintic'), [0.0, 3.0]))
+
+
+def test_quintic_turns_about_one_fixed_axis_on_a_straight_line() -> None:
+    motion = motion_at(parameters('quintic'), np.linspace(0.1, 2.9, 20))
+    way, omega = np.subtract(FINAL, INITIAL)[:3], motion.angular_velocity
+    np.testing.assert_allclose(np.cross(motion.linear_velocity, way), 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.cross(omega, omega[0]), 0.0, atol=1e-15)
+
+
+def test_quintic_between_equal_orientations_does_not_turn() -> None:
+    motion = motion_at(parameters('quintic', **{'motion.final': [0.0, 0.0, 1.0, *INITIAL[3:]]}),
+                       np.linspace(0.0, 3.0, 7))
+    np.testing.assert_allclose(motion.angular_velocity, 0.0, atol=1e-15)
+    np.testing.assert_allclose(motion.rotation - motion.rotation[0], 0.0, atol=1e-15)
+
+
+def test_quintic_turns_by_half_a_turn() -> None:
+    p = parameters('quintic', **{'motion.initial': [0.0] * 6,
+                                 'motion.final': [0.0] * 5 + [np.pi]})
+    motion = motion_at(p, [1.5, 3.0])
+    np.testing.assert_allclose(np.abs(motion.rotation[0, 1, 0]), 1.0, atol=1e-15)
+    assert pose_matches(motion_at(p, 3.0), [0.0] * 5 + [np.pi])
+
+
+@pytest.mark.parametrize('name', POINT_TO_POINT)
+def test_loop_runs_back_the_same_way(name: str) -> None:
+    p, times = parameters(name, loop=True), np.linspace(0.0, 3.0, 31)
+    forth, back = motion_at(p, times), motion_at(p, 6.0 - times)
+    np.testing.assert_allclose(back.rows[..., :12], forth.rows[..., :12], atol=1e-14)
+    np.testing.assert_allclose(back.linear_velocity, -forth.linear_velocity, atol=1e-14)
+    np.testing.assert_allclose(motion_at(p, times + 60.0).rows, forth.rows, atol=1e-13)
+
+
+def test_hold_is_at_rest() -> None:
+    motion = motion_at(parameters('hold'), [0.0, 1.0, 100.0])
+    assert motion.shape == (3,) and at_rest(motion) and pose_matches(motion, INITIAL)
+
+
+def test_times_that_are_none_are_refused() -> None:
+    with pytest.raises(MotionError, match='must be finite'):
+        motion_at(parameters('quintic'), [0.0, np.nan])
+
+
+@pytest.mark.parametrize(('duration', 'rate', 'count', 'last'), [
+    (10.0, 100.0, 1001, 10_000_000_000),
+    (10.0, 1000.0, 10_001, 10_000_000_000),
+    (0.1, 30.0, 4, 100_000_000),
+    (1.0, 3.0, 4, 1_000_000_000),
+    (1.05, 10.0, 12, 1_100_000_000),
+    (0.001, 10.0, 2, 100_000_000),
+])
+def test_samples_reach_the_duration(
+        duration: float, rate: float, count: int, last: int) -> None:
+    times = sample_times(parameters('paper', **{'motion.duration': duration, 'rate': rate}))
+    assert times.dtype == np.int64
+    assert (len(times), times[0], times[-1]) == (count, 0, last)
+
+
+def test_samples_are_spaced_exactly() -> None:
+    times = sample_times(parameters('sine', rate=125.0))
+    assert np.all(np.diff(times) == 8_000_000)
+    assert sample_times(parameters('sine', rate=3.0))[:4].tolist() == [
+        0, 333_333_333, 666_666_667, 1_000_000_000]
+    assert sample_time(parameters('sine', rate=3.0), 3_000_001) == 1_000_000_333_333_333
+
+
+@pytest.mark.parametrize(('changes', 'text'), [
+    ({'motion.final': None}, 'motion.final: missing, motion.type paper needs it'),
+    ({'motion.initial': None}, 'motion.initial: missing'),
+    ({'motion.type': 'cubic'}, 'must be one of paper, quintic, sine, hold'),
+    ({'motion.final': [0.0, 1.0]}, 'must have 6 entries, has 2'),
+    ({'motion.duration': 0.0}, 'must be more than 0'),
+    ({'motion.duration': 5}, 'write 5.0'),
+    ({'rate': 0.0}, 'must be at least 0.001'), ({'rate': 1e15}, 'at most 10000'),
+    ({'output': 'both'}, 'must be one of separate, combined'),
+    ({'motion.finale': FINAL}, 'do you mean motion.final'),
+])
+def test_a_broken_rule_is_named(changes: dict[str, object], text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        parameters('paper', **changes)
+
+
+def test_every_parameter_is_described() -> None:
+    for name, parameter in TrajectoryParameters.table.items():
+        assert parameter.text
+        assert bool(parameter.unit) == (parameter.kind == 'double'), name
+
+
+def limits_broken(platform: StewartPlatform, result: InverseDynamics) -> set[str]:
+    p = platform.parameters
+    return {name for name, broken in {
+        'length': ((result.lengths < p['limits.length_min'])
+                   | (result.lengths > p['limits.length_max'])),
+        'velocity': np.abs(result.rates) > p['limits.velocity_max'],
+        'force': np.abs(result.forces) > p['limits.force_max'],
+    }.items() if np.any(broken)}
+
+
+def warnings(platform: StewartPlatform, result: InverseDynamics) -> list[Singularity]:
+    states = [Singularity()]
+    for sample in zip(result.determinant, result.determinant_rate, result.condition_number,
+                      strict=True):
+        states.append(states[-1].after(platform.parameters, *map(float, sample)))
+    return states[1:]
+
+
+@pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
+def test_files_suit_the_machine(path: Path, platform: StewartPlatform) -> None:
+    p = TrajectoryParameters.from_yaml(path)
+    times = np.arange(0.0, 60.0, 0.01) if p['loop'] else sample_times(p) / 1e9
+    result = platform.inverse_dynamics(motion_at(p, times))
+    states = warnings(platform, result)
+    if path.stem == 'trajectory_singular':
+        assert limits_broken(platform, result) == {'force'}
+    else:
+        assert limits_broken(platform, result) == set()
+        assert not any(state.warning for state in states)
+        assert result.condition_number.max() < 5.0
+
+
+def test_there_is_a_file_for_every_type() -> None:
+    assert {TrajectoryParameters.from_yaml(path)['motion.type'] for path in FILES} == set(
+        TrajectoryParameters.table['motion.type'].choices)
+
+
+def test_singular_path_crosses_once_between_8_and_9_s(platform: StewartPlatform) -> None:
+    p = TrajectoryParameters.from_yaml(CONFIG / 'trajectory_singular.yaml')
+    assert (p['motion.type'], p['motion.duration']) == ('paper', 10.0)
+    times = sample_times(p) / 1e9
+    result = platform.inverse_dynamics(motion_at(p, times))
+    crossings = times[1:][np.diff(np.sign(result.determinant)) != 0]
+    assert len(crossings) == 1 and 8.0 < crossings[0] < 9.0
+    worst = times[np.argmax(np.abs(result.forces).max(axis=-1))]
+    assert abs(worst - crossings[0]) < 0.02
+
+
+def test_singular_path_is_warned_of_in_time(platform: StewartPlatform) -> None:
+    p = TrajectoryParameters.from_yaml(CONFIG / 'trajectory_singular.yaml')
+    times = sample_times(p) / 1e9
+    result = platform.inverse_dynamics(motion_at(p, times))
+    states = warnings(platform, result)
+    crossing = next(t for t, state in zip(times, states, strict=True) if state.crossings)
+    warned = next(t for t, state in zip(times, states, strict=True) if state.warning)
+    foretold = times[np.argmax(result.time_to_crossing < 0.5)]
+    clipped = times[np.argmax((np.abs(result.forces) > 6000.0).any(axis=-1))]
+    assert warned < clipped < crossing
+    assert 0.5 <= crossing - foretold < 1.0
+    assert 0.5 <= crossing - warned < 1.5
+    assert all(state.warning for t, state in zip(times, states, strict=True)
+               if warned <= t <= crossing)
+    assert [state.cause for state in states].count(Cause.CROSSED) == 1
+    assert states[-1].crossings == 1

@@ -1,0 +1,196 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the nodes say of their parameters, and what they do with changes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import gc
+import math
+import sys
+from typing import Any
+
+import pytest
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from referees import ROOT
+
+from stewart_dynamics import ParameterError, Parameters
+from stewart_dynamics.mechanics.reference_motion import TRAJECTORY_PARAMETERS, TrajectoryParameters
+from stewart_dynamics.nodes.run import declare_parameters
+from stewart_dynamics.parameters import PARAMETERS, ParameterSet
+
+SECONDS = 30.0
+
+# Asks a node's service, over ROS.
+Ask = Callable[[str, Any], Any]
+
+
+@pytest.fixture
+def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
+             ) -> Iterator[Callable[..., Ask]]:
+    """Return a function that makes a node with declared parameters, and gives how to ask it."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', f'{domain}')
+    context = rclpy.Context()
+    made: list[Any] = []  # the executor, then the nodes
+
+    def make(kind: type[Node], parameters: type[ParameterSet], file: str,
+             *overrides: str) -> Ask:
+        arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
+        arguments += [each for override in overrides for each in ('-p', override)]
+        monkeypatch.setattr(sys, 'argv', [parameters.node, *arguments])
+        rclpy.init(args=arguments, context=context)
+        executor = SingleThreadedExecutor(context=context)
+        node = kind(parameters.node, context=context, allow_undeclared_parameters=True,
+                    automatically_declare_parameters_from_overrides=True)
+        made.extend((executor, node))
+        declare_parameters(node, parameters)
+        asker = Node('asker', context=context, use_global_arguments=False)
+        made.append(asker)
+        executor.add_node(node)
+        executor.add_node(asker)
+
+        def ask(service: str, request: Any) -> Any:
+            client = asker.create_client(
+                SERVICES[service], f'/{parameters.node}/{service}')
+            assert client.wait_for_service(timeout_sec=SECONDS)
+            future = client.call_async(request)
+            executor.spin_until_future_complete(future, SECONDS)
+            assert future.done()
+            return future.result()
+
+        return ask
+
+    yield make
+    if made:
+        executor, *nodes = made
+        executor.shutdown()
+        for node in nodes:
+            node.destroy_node()
+    context.try_shutdown()
+    # Others see the nodes until the last that refers to them is gone.
+    made.clear()
+    context.destroy()
+    gc.collect()
+
+
+SERVICES = {'describe_parameters': DescribeParameters, 'set_parameters': SetParameters}
+
+
+def described(ask: Ask, *names: str) -> list[ParameterDescriptor]:
+    """Return how a node describes parameters."""
+    return list(ask('describe_parameters', DescribeParameters.Request(names=names)).descriptors)
+
+
+def set_to(ask: Ask, name: str, value: Any) -> tuple[bool, str]:
+    """Return whether a node takes a value, and why not."""
+    (result,) = ask('set_parameters', SetParameters.Request(
+        parameters=[RosParameter(name, value=value).to_parameter_msg()])).results
+    return result.successful, result.reason
+
+
+def bounds(descriptor: ParameterDescriptor) -> list[tuple[float, float, float]]:
+    """Return the ranges that a description holds."""
+    return [(each.from_value, each.to_value, each.step)
+            for each in descriptor.floating_point_range]
+
+
+def test_the_node_describes_each_parameter(declared: Any) -> None:
+    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
+    for name, parameter in PARAMETERS.items():
+        (each,) = described(ask, name)
+        assert each.name == name
+        assert each.description == parameter.text + (
+            f' [{parameter.unit}]' if parameter.unit else '')
+        assert each.type != ParameterType.PARAMETER_NOT_SET
+        assert not each.read_only
+        assert each.dynamic_typing == (parameter.sizes == (1, 6))
+        assert not each.integer_range
+        assert bounds(each) == (
+            [(parameter.minimum, parameter.maximum, 0.0)] if parameter.minimum == 0.0
+            or parameter.minimum == 1.0 else [])
+        assert parameter.rule in each.additional_constraints
+        assert each.additional_constraints.endswith(
+            'set also while active' if parameter.while_active else 'set only while unconfigured')
+
+
+def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
+    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
+    mass, inertia, cylinder, force, joints, action, autostart, friction = described(
+        ask, 'platform.mass', 'platform.inertia', 'legs.cylinder.mass', 'limits.force_max',
+        'joints', 'singularity.action', 'autostart', 'actuator.viscous_friction')
+    assert mass.type == ParameterType.PARAMETER_DOUBLE
+    assert bounds(mass) == [(0.0, math.inf, 0.0)]
+    assert mass.additional_constraints == 'more than 0; set also while active'
+    assert inertia.type == ParameterType.PARAMETER_DOUBLE_ARRAY
+    assert bounds(inertia) == []
+    assert inertia.additional_constraints == '6 entries; set also while active'
+    assert cylinder.type == ParameterType.PARAMETER_DOUBLE
+    assert cylinder.additional_constraints == (
+        '1 or 6 entries; at least 0; set only while unconfigured')
+    assert force.type == ParameterType.PARAMETER_DOUBLE
+    assert joints.type == ParameterType.PARAMETER_STRING_ARRAY
+    assert action.type == ParameterType.PARAMETER_STRING
+    assert action.additional_constraints == 'one of warn, suppress_forces; set also while active'
+    assert autostart.type == ParameterType.PARAMETER_BOOL
+    assert friction.type == ParameterType.PARAMETER_DOUBLE
+
+
+def test_a_value_beyond_the_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
+    # It has none here: rclpy's would refuse these two, in its words.
+    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
+    assert set_to(ask, 'platform.mass', -1.0) == (True, '')
+    assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
+
+
+def test_a_value_that_ros_drops_without_a_word_is_refused(declared: Any) -> None:
+    # rclpy would go on with the file's 150.0.
+    with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
+        declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
+                 'stewart_dynamics:platform.mass:=0,5')
+
+
+def test_what_ros_declares_is_described_by_ros(declared: Any) -> None:
+    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
+    time, mass, unknown = described(ask, 'use_sim_time', 'platform.mass', 'platform.mas')
+    assert time.type == ParameterType.PARAMETER_BOOL
+    assert mass.description.endswith('[kg]')
+    assert unknown.description == ''
+
+
+def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
+    ask = declared(Node, TrajectoryParameters, 'trajectory_sine.yaml')
+    for name, parameter in TRAJECTORY_PARAMETERS.items():
+        (each,) = described(ask, name)
+        assert each.read_only
+        assert each.description.startswith(parameter.text)
+        assert each.additional_constraints.endswith('set only when the node starts')
+    (rate,) = described(ask, 'rate')
+    assert rate.description == 'setpoints in a second [Hz]'
+    assert bounds(rate) == [(1e-3, 1e4, 0.0)]
+    assert rate.additional_constraints == (
+        'at least 0.001, at most 10000; set only when the node starts')
+    assert set_to(ask, 'rate', 50.0) == (
+        False, 'rate: only read when the node starts: start it anew')
+    successful, reason = set_to(ask, 'rates', 50.0)
+    assert not successful
+    assert reason == 'parameters: rates: unknown parameter; do you mean rate?'
+    assert set_to(ask, 'use_sim_time', True) == (True, '')

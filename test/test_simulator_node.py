@@ -1,0 +1,478 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator: in a process of its own, over real topics, in real time and step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import math
+from pathlib import Path
+import signal
+import time
+from typing import Any
+
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+import numpy as np
+import pytest
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.serialization import deserialize_message
+from referees import rng
+from rosgraph_msgs.msg import Clock
+from running import (
+    assert_only_log_lines, bits, executable, log_lines, nanoseconds, Peer, PLATFORM, Program, ROOT,
+    wrench_message)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from stewart_dynamics import StewartPlatform
+from stewart_dynamics.parameters import read_yaml
+from stewart_dynamics.runtime.plant import OUTPUT_TYPES, Plant, SimulatorParameters
+
+SIMULATOR = '/stewart_simulator'
+FILE = ROOT / 'config' / 'simulator.yaml'
+STEPPED = 'use_sim_time:=true'
+FIRST = 1_000_000_000  # where simulated time begins [ns]
+PERIOD = 2_000_000  # [ns]
+TYPES: dict[str, Any] = {
+    'leg_states': JointState, 'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
+GIVEN = {**read_yaml(PLATFORM, 'stewart_simulator'), **read_yaml(FILE, 'stewart_simulator')}
+NO_LOAD = (0.0,) * 6
+UNLIMITED = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+SPECIAL = (math.nan, math.inf, -math.inf)
+
+
+class Simulator:
+    """The simulator in a process of its own, and a peer that commands it and keeps its states."""
+
+    def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = ()
+                 ) -> None:
+        self.peer = Peer(domain)
+        self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
+                    for topic, kind in TYPES.items()}
+        self.raw['clock'] = self.peer.listen('/clock', Clock)
+        self._commands = self.peer.writer(f'{SIMULATOR}/commands', Float64MultiArray)
+        self._wrench = self.peer.writer(f'{SIMULATOR}/wrench', WrenchStamped)
+        paths = [part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)]
+        self.program = Program(
+            [executable('stewart_simulator'), '--ros-args', *paths,
+             *(part for override in overrides for part in ('-p', override))], domain, folder)
+        self.peer.watched = self.program
+
+    def until(self, condition: Callable[[], Any], what: str) -> None:
+        """Take messages until a condition holds."""
+        self.peer.until(condition, what)
+
+    def until_there(self) -> None:
+        """Wait until it hears us and we hear it."""
+        topics = {*TYPES, 'clock'} if self._stepped else set(TYPES)
+        self.until(lambda: all(self.raw[topic] for topic in topics)
+                   and self._commands.get_subscription_count()
+                   and self._wrench.get_subscription_count(), 'the simulator is there')
+
+    @property
+    def _stepped(self) -> bool:
+        return any(part == STEPPED for part in self.program.process.args)
+
+    def until_said(self, level: str, text: str) -> str:
+        """Return the first line of its log that has a text in it, once it is said."""
+        self.until(lambda: self.said(level, text), f'it says {text!r}')
+        return self.said(level, text)[0]
+
+    def said(self, level: str, text: str) -> list[str]:
+        """Return the lines of its log of a level that have a text in them."""
+        return [line for line in log_lines(self.program.stderr, level) if text in line]
+
+    def command(self, message: Any) -> None:
+        """Publish six forces, or any message, or bytes in the place of one."""
+        if not isinstance(message, bytes | Float64MultiArray):
+            message = Float64MultiArray(data=[float(number) for number in message])
+        self._commands.publish(message)
+
+    def load(self, wrench: Sequence[float], frame: str = 'base') -> None:
+        """Publish a load on the platform."""
+        self._wrench.publish(wrench_message(wrench, frame))
+
+    def states(self, topic: str = 'leg_states') -> list[Any]:
+        """Return the messages of a topic so far."""
+        return [deserialize_message(data, TYPES[topic]) for data in self.raw[topic]]
+
+    def last(self, topic: str = 'leg_states') -> Any:
+        """Return the last message of a topic."""
+        return deserialize_message(self.raw[topic][-1], TYPES[topic])
+
+    def stamps(self, topic: str = 'leg_states') -> list[int]:
+        """Return the stamps of a topic's messages so far [ns]."""
+        return [stamp_of(data) for data in self.raw[topic]]
+
+    def step(self, message: Any) -> int:
+        """Command one period and return its stamp, once all of it has come."""
+        before = stamp_of(self.raw['clock'][-1])
+        self.command(message)
+        self.until(lambda: all(stamp_of(of[-1]) > before for of in self.raw.values()),
+                   'time is moved')
+        return stamp_of(self.raw['clock'][-1])
+
+    def at_work(self) -> None:
+        """Check that it still publishes, and nothing but numbers."""
+        if not self._stepped:
+            many = len(self.raw['accel'])
+            self.until(lambda: len(self.raw['accel']) > many + 10, 'it goes on')
+        for topic in TYPES:
+            for message in self.states(topic):
+                assert np.all(np.isfinite(numbers_of(message))), message
+
+    def stop(self, number: int = signal.SIGINT) -> None:
+        """Stop it with a signal and check how it ends."""
+        assert self.program.stop(number) == 0, self.program.stderr
+        assert_only_log_lines(self.program.stderr)
+        assert self.program.stdout == ''
+
+    def close(self) -> None:
+        """Leave ROS, and stop the program if it still runs."""
+        try:
+            if not self.program.ended:
+                self.stop()
+        finally:
+            self.program.kill()
+            self.peer.close()
+
+
+def stamp_of(data: bytes) -> int:
+    """Return the stamp of a message's bytes, or of a clock's [ns]."""
+    return int.from_bytes(data[4:8], 'little') * 1_000_000_000 + int.from_bytes(
+        data[8:12], 'little')
+
+
+def numbers_of(message: Any) -> list[float]:
+    """Return the numbers of a message."""
+    if isinstance(message, JointState):
+        return [*message.position, *message.velocity, *message.effort]
+    if isinstance(message, PoseStamped):
+        p, q = message.pose.position, message.pose.orientation
+        return [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+    of = message.twist if isinstance(message, TwistStamped) else message.accel
+    return [getattr(vector, axis) for vector in (of.linear, of.angular) for axis in 'xyz']
+
+
+Start = Callable[..., Simulator]
+
+
+@pytest.fixture
+def start(domain: int, tmp_path: Path) -> Iterator[Start]:
+    """Return a function that starts a simulator, one after the other; it stops with the test."""
+    started: list[Simulator] = []
+
+    def begin(*overrides: str, **options: Any) -> Simulator:
+        if started:
+            started[-1].close()
+        started.append(Simulator(domain, tmp_path / str(len(started)), *overrides, **options))
+        return started[-1]
+
+    yield begin
+    if started:
+        started[-1].close()
+
+
+@pytest.fixture
+def begin(start: Start) -> Iterator[Start]:
+    """Return the same where it must be at work in the end."""
+    begun: list[Simulator] = []
+
+    def started(*overrides: str, **options: Any) -> Simulator:
+        begun.append(start(*overrides, **options))
+        begun[-1].until_there()
+        return begun[-1]
+
+    yield started
+    begun[-1].at_work()
+
+
+@pytest.fixture
+def unlimited(tmp_path: Path) -> Path:
+    """Return the file of a machine without limits."""
+    text = PLATFORM.read_text(encoding='utf-8')
+    before, _, rest = text.partition('    limits:\n')
+    file = tmp_path / 'unlimited.yaml'
+    file.write_text(before + '    # ' + rest.partition('\n\n')[0].replace('\n', '\n    # ')
+                    + '\n\n' + rest.partition('\n\n')[2], encoding='utf-8')
+    return file
+
+
+def holding() -> list[float]:
+    """Return the forces that hold the machine in its initial pose."""
+    plant = Plant(SimulatorParameters(GIVEN))
+    platform = StewartPlatform(plant.parameters)
+    position, rotation = plant.state.pose[:3], np.eye(3)
+    forces: list[float] = np.linalg.solve(
+        platform.jacobian(position, rotation).T,
+        platform.gravity_vector(position, rotation)).tolist()
+    return forces
+
+
+# Step by step
+
+NOISY = ('noise.length:=1.0e-5', 'noise.rate:=1.0e-3', 'noise.force:=2.0')
+
+
+def test_step_by_step_the_same_commands_give_the_same_bits(begin: Start) -> None:
+    """Two processes, and the library in this one; however long each takes for what."""
+    random = rng()
+    commands = np.array(holding()) + random.uniform(-300.0, 300.0, (40, 6))
+    seen = []
+    for _ in range(2):
+        simulator = begin(STEPPED, *NOISY)
+        for n, command in enumerate(commands):
+            if n == 20:
+                simulator.load((100.0, 0.0, -50.0, 0.0, 10.0, 0.0))
+                # What is not a command comes behind what is: a refused one tells that it came.
+                simulator.load((1.0,) * 6, frame='elsewhere')
+                simulator.until_said('WARN', 'wrench refused: wrong frame_id')
+            simulator.step(command)
+        seen.append({topic: simulator.raw[topic][-len(commands):] for topic in TYPES})
+        assert simulator.stamps()[-len(commands):] == [
+            FIRST + PERIOD * (n + 1) for n in range(len(commands))]
+    assert seen[0] == seen[1]
+    plant = Plant(SimulatorParameters({
+        **GIVEN, 'noise.length': 1e-5, 'noise.rate': 1e-3, 'noise.force': 2.0}))
+    list(plant.messages(FIRST))
+    for n, command in enumerate(commands.tolist()):
+        plant.advance(tuple(command), (100.0, 0.0, -50.0, 0.0, 10.0, 0.0) if n >= 20 else NO_LOAD)
+        for topic, data in plant.messages(FIRST + PERIOD * (n + 1)):
+            assert seen[0][topic][n] == data
+
+
+def test_each_command_is_one_period_and_nothing_else_moves_time(begin: Start) -> None:
+    simulator = begin(STEPPED)
+    # Until the first command it says again and again where it is.
+    simulator.until(lambda: len(simulator.raw['clock']) >= 3, 'it says so again')
+    assert set(simulator.stamps('clock')) == set(simulator.stamps()) == {FIRST}
+    assert len(set(simulator.raw['leg_states'])) == 1
+    first = simulator.states()[0]
+    assert not np.any([*first.velocity, *first.effort])
+    # Many at once are as many periods, in their order.
+    for n in range(200):
+        simulator.command([500.0 + n] * 6)
+    end = FIRST + 200 * PERIOD
+    simulator.until(lambda: all(stamp_of(of[-1]) >= end for of in simulator.raw.values()),
+                    'all are answered')
+    assert [state.effort[0] for state in simulator.states()
+            if nanoseconds(state.header.stamp) > FIRST] == [500.0 + n for n in range(200)]
+    for topic in (*TYPES, 'clock'):
+        stamps = simulator.stamps(topic)
+        assert stamps == sorted(stamps)
+        if topic == 'clock':
+            stamps = sorted(set(stamps))
+        assert [each for each in stamps if each > FIRST] == list(
+            range(FIRST + PERIOD, end + 1, PERIOD))
+    # Those who follow the clock do so best effort: it says again what is not answered, no more.
+    many = len(simulator.raw['clock'])
+    simulator.until(lambda: len(simulator.raw['clock']) > many + 2, 'it says so again')
+    assert simulator.stamps('clock')[-1] == simulator.stamps()[-1] == end
+    assert simulator.stamps()[-2] == end - PERIOD
+    simulator.load((1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
+    assert simulator.step([500.0] * 6) == end + PERIOD
+
+
+# In real time
+
+def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> None:
+    simulator = begin('rate:=250.0')
+    simulator.until(lambda: len(simulator.raw['accel']) > 100, 'it goes on')
+    assert simulator.raw['clock'] == []
+    home = StewartPlatform(SimulatorParameters(GIVEN)).inverse_kinematics(
+        [0.0, 0.0, 1.1], np.eye(3)) - 0.95
+    for state in simulator.states():
+        assert np.allclose(state.position, home, rtol=0.0, atol=1e-15)
+        assert not np.any([*state.velocity, *state.effort])
+    # The last command holds until the next, as of effort controllers.
+    up = (np.array(holding()) + 100.0).tolist()
+    simulator.command(up)
+    simulator.until(lambda: simulator.last('pose').pose.position.z > 1.12, 'it rises')
+    simulator.until(lambda: len(simulator.raw['accel']) == len(simulator.raw['leg_states']),
+                    'the last ones have come')
+    stamps = simulator.stamps()
+    assert min(np.diff(stamps)) == 4_000_000
+    # A machine that is busy with other things may hold it up; that is all it may say.
+    behind = simulator.said('WARN', 'fell behind by')
+    assert simulator.said('WARN', '') == behind
+    if not behind:
+        assert max(np.diff(stamps)) == 4_000_000
+    assert all(simulator.stamps(topic) == stamps for topic in TYPES)
+    assert abs(stamps[0] - time.time_ns()) < 1_000_000_000_000
+    assert bits(simulator.last().effort) == bits(up)
+
+
+def test_a_load_moves_it(begin: Start) -> None:
+    simulator = begin()
+    simulator.command(holding())
+    simulator.load((0.0, 0.0, 400.0, 0.0, 0.0, 0.0))
+    simulator.until(lambda: simulator.last('pose').pose.position.z > 1.15, 'it rises')
+    simulator.load((0.0, 0.0, -2000.0, 0.0, 0.0, 0.0))
+    simulator.until(lambda: simulator.last('pose').pose.position.z < 1.1, 'it sinks')
+
+
+# Faults: see docs/faults.md
+
+@pytest.mark.parametrize('mode', ['real time', 'stepped'])
+def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mode: str) -> None:
+    simulator = begin(*([STEPPED] if mode == 'stepped' else []))
+    good = holding()
+    if mode == 'stepped':
+        simulator.step(good)
+    else:
+        simulator.command(good)
+        simulator.until(lambda: simulator.last().effort[0] == good[0], 'it is heard')
+    for n in range(6):
+        for special in SPECIAL:
+            simulator.command([*good[:n], special, *good[n + 1:]])
+    for many in (0, 1, 5, 7, 100):
+        simulator.command([1.0] * many)
+    simulator.command(b'\0\1\0\0\0')
+    simulator.command(b'\0\7\0\0' + bytes(68))
+    for reason in ('not finite: (', 'not six numbers: 0 of them', 'malformed: '):
+        simulator.until_said('WARN', f'commands refused: {reason}')
+    before = stamp_of(simulator.raw['leg_states'][-1])
+    if mode == 'stepped':
+        # Time stood; the next is one period.
+        assert simulator.step(good) == FIRST + 2 * PERIOD
+    else:
+        simulator.until(lambda: stamp_of(simulator.raw['leg_states'][-1]) > before, 'it goes on')
+    assert {tuple(state.effort) for state in simulator.states()} == {NO_LOAD, tuple(good)}
+    simulator.until_said('WARN', '(the last of 18)')
+
+
+def test_loads_that_are_none_are_refused_and_the_last_holds(begin: Start) -> None:
+    simulator = begin(STEPPED)
+    simulator.load((0.0, 0.0, 500.0, 0.0, 0.0, 0.0))
+    for n in range(6):
+        for special in SPECIAL:
+            simulator.load([0.0] * n + [special] + [0.0] * (5 - n))
+    simulator.load((1e6, 0.0, 0.0, 0.0, 0.0, 0.0), frame='world')
+    simulator.until_said('WARN', 'wrench refused: wrong frame_id')
+    simulator.until_said('WARN', 'wrench refused: not finite')
+    simulator.step(holding())
+    assert np.allclose(numbers_of(simulator.last('accel'))[:2], 0.0, atol=1e-1)
+    assert simulator.last('accel').accel.linear.z > 0.5
+
+
+def test_forces_beyond_their_limit_saturate(begin: Start) -> None:
+    simulator = begin(STEPPED)
+    simulator.step([1000.0, -7000.0, 6000.0, 6001.0, 0.0, 1e300])
+    assert simulator.last().effort.tolist() == [
+        1000.0, -6000.0, 6000.0, 6000.0, 0.0, 6000.0]
+    line = simulator.until_said('WARN', 'is beyond limits.force_max, clipped to')
+    assert 'commands: leg_6: 1e+300 N is beyond limits.force_max, clipped to 6000 N' in line
+
+
+@pytest.mark.parametrize('mode', ['real time', 'stepped'])
+def test_what_cannot_be_computed_holds_it_at_rest(
+        begin: Start, unlimited: Path, mode: str) -> None:
+    simulator = begin(*([STEPPED] if mode == 'stepped' else []), files=(unlimited, FILE))
+    if mode == 'stepped':
+        assert simulator.step([1e300] * 6) == FIRST + PERIOD
+    else:
+        simulator.command([1e300] * 6)
+    simulator.until_said('ERROR', 'held at rest, for good')
+    assert simulator.said('ERROR', 'motion cannot be computed')
+    if mode == 'stepped':
+        assert simulator.step(holding()) == FIRST + 2 * PERIOD
+        assert simulator.step(holding()) == FIRST + 3 * PERIOD
+    else:
+        many = len(simulator.raw['leg_states'])
+        simulator.until(lambda: len(simulator.raw['leg_states']) > many + 20, 'it goes on')
+    last = simulator.last()
+    assert not np.any([*last.velocity, *last.effort])
+    assert len(simulator.said('ERROR', '')) == 1
+
+
+def test_a_machine_too_stiff_for_real_time_lets_time_go(begin: Start) -> None:
+    simulator = begin('actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0')
+    simulator.command(holding())
+    simulator.until_said('WARN', 'fell behind by')
+    # Its stamps go on with the clock, with periods left out.
+    begun = stamp_of(simulator.raw['leg_states'][0])
+    simulator.until(lambda: stamp_of(simulator.raw['leg_states'][-1]) > begun + 1_000_000_000,
+                    'stamps go on')
+    assert max(np.diff(simulator.stamps())) > PERIOD
+
+
+def test_a_simulator_that_was_stopped_takes_what_is_due_and_lets_the_rest_go(
+        begin: Start) -> None:
+    simulator = begin()
+    simulator.program.process.send_signal(signal.SIGSTOP)
+    end = time.monotonic() + 1.0
+    simulator.until(lambda: time.monotonic() > end, 'a second goes by')
+    simulator.program.process.send_signal(signal.SIGCONT)
+    line = simulator.until_said('WARN', 'fell behind by')
+    assert float(line.rpartition('fell behind by ')[2].partition(' s')[0]) > 0.5
+    many = len(simulator.raw['leg_states'])
+    simulator.until(lambda: len(simulator.raw['leg_states']) > many + 100, 'it goes on')
+    gaps = np.diff(simulator.stamps())
+    assert np.sum(gaps != PERIOD) >= 1
+    assert np.all(gaps >= PERIOD)
+
+
+def test_a_signal_ends_it(start: Start) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        for overrides in ((), (STEPPED,)):
+            simulator = start(*overrides)
+            simulator.until_there()
+            simulator.stop(number)
+
+
+@pytest.mark.parametrize(('overrides', 'said'), [
+    (('actuator.coulomb_friction:=1.0e+9',),
+     'actuator.coulomb_friction: [1000000000.0, '),
+    (('actuator.viscous_friction:=1.0e+9', 'actuator.reflected_mass:=0.0'),
+     'too large for a platform of 150 kg: the integration would need steps of '),
+    (('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]',), 'beyond limits.length_max, 1.65 m'),
+    (('rate:=300.0',), 'rate: 300.0 Hz: a period must be a whole number of steps of 0.001 s'),
+    (('step:=0.01',), 'step: 0.01 s: must be at least 1e-05, at most 0.001'),
+    (('noise.lenght:=0.1',), 'noise.lenght: unknown parameter; do you mean noise.length?'),
+], ids=str)
+def test_what_it_cannot_simulate_is_said_in_one_line(
+        start: Start, overrides: tuple[str, ...], said: str) -> None:
+    program = start(*overrides).program
+    assert program.wait() == 1, program.stderr
+    lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
+    assert len(lines) == 1, program.stderr
+    assert lines[0].startswith('stewart_simulator: ')
+    assert said in lines[0]
+
+
+def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
+    simulator = begin()
+    client = simulator.peer.node.create_client(
+        SetParametersAtomically, f'{SIMULATOR}/set_parameters_atomically')
+    simulator.until(client.service_is_ready, 'the service is there')
+    future = client.call_async(SetParametersAtomically.Request(parameters=[
+        RosParameter('platform.mass', value=200.0).to_parameter_msg()]))
+    simulator.until(future.done, 'it answers')
+    assert not future.result().result.successful
+    assert future.result().result.reason == (
+        'platform.mass: only read when the node starts: start it anew')
+
+
+def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
+    program = Program([executable('stewart_simulator'), '--help'], domain, tmp_path)
+    assert program.wait() == 0
+    for name in ('initial_pose', 'end_stops.frequency', 'noise.force', 'platform.mass'):
+        assert f'  {name} (double' in program.stdout
+
+
+def test_the_topics_are_those_of_the_plant() -> None:
+    assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
+            for topic, kind in TYPES.items()} == OUTPUT_TYPES
