@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.setpoints import OUT_OF_RANGE
+from stewart_dynamics.runtime.rejections import OUT_OF_RANGE
 
 # Where |det(J)| falls below this part of its values at two samples, the samples between them are
 # made closer.

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import Counter
 
 from stewart_dynamics.runtime.diagnostics import ERROR, OK, Status, WARN
-from stewart_dynamics.runtime.planned_trajectory import Outcome
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 _NAME = 'trajectory'
 

@@ -30,13 +30,14 @@ from stewart_dynamics.arrays import Array, Six, Stamps
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import consecutive, MOTION, POSITION, ROTATION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.planned_trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
-from stewart_dynamics.runtime.setpoints import (
-    frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, QUATERNION_TOLERANCE, unit_details,
-    WRONG_FRAME)
+from stewart_dynamics.runtime.rejections import (
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
+from stewart_dynamics.runtime.samples import unit_quaternions
 
 INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
@@ -95,7 +96,7 @@ def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome
     try:
         message = _checked_header(data, parameters['base_frame'])
         times, rows = yield from _read(message)
-    except cdr.MalformedError as exc:
+    except MalformedError as exc:
         yield rejected(MALFORMED, str(exc))
         return
     except _RejectedError as exc:
@@ -113,16 +114,16 @@ def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome
                   _values(parameters, result))
 
 
-def _checked_header(data: bytes, base_frame: str) -> cdr.PlatformTrajectory:
-    message = cdr.PlatformTrajectory(data)
+def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
+    message = PlatformTrajectory(data)
     if message.frame not in (b'', base_frame.encode()):
         raise _RejectedError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
     if not 1 <= message.size <= MOST_POINTS:
-        raise cdr.MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
+        raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
     return message
 
 
-def _read(message: cdr.PlatformTrajectory) -> Generator[None, None, tuple[Stamps, Array]]:
+def _read(message: PlatformTrajectory) -> Generator[None, None, tuple[Stamps, Array]]:
     """Return times (N,) [ns] and rows of motion (N, MOTION) of a trajectory; reject bad points."""
     times, rows = np.empty(message.size, dtype=np.int64), np.empty((message.size, MOTION))
     for first in range(0, message.size, _READ):
@@ -130,7 +131,7 @@ def _read(message: cdr.PlatformTrajectory) -> Generator[None, None, tuple[Stamps
         points = message.points(first, end)
         if (late := points['nanosec'] >= 1_000_000_000).any():
             n = int(np.argmax(late))
-            raise cdr.MalformedError(
+            raise MalformedError(
                 f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
                 'under 1000000000')
         times[first:end] = points['sec'] * np.int64(1_000_000_000) + points['nanosec']
@@ -150,25 +151,22 @@ def _rows(first: int, numbers: Array) -> Array:
     if not (finite := np.isfinite(numbers).all(axis=1)).all():
         n = int(np.argmin(finite))
         raise _RejectedError(NOT_FINITE, f'points[{first + n}]: {tuple(numbers[n].tolist())}')
-    # The same arithmetic as for setpoints, so that the bits are the same.
-    x, y, z, w = numbers[:, _QUATERNION].T
-    with np.errstate(over='ignore'):
-        length = np.sqrt(x * x + y * y + z * z + w * w)
-    if not (unit := np.abs(length - 1.0) <= QUATERNION_TOLERANCE).all():
+    quaternions, lengths, unit = unit_quaternions(numbers[:, _QUATERNION])
+    if not unit.all():
         n = int(np.argmin(unit))
-        raise _RejectedError(NOT_UNIT, f'points[{first + n}]: {unit_details(float(length[n]))}')
+        raise _RejectedError(
+            NOT_UNIT, f'points[{first + n}]: {length_details(float(lengths[n]))}')
     rows = np.empty((len(numbers), MOTION))
     rows[:, POSITION] = numbers[:, _POSITION]
-    rows[:, ROTATION] = np.column_stack(
-        from_quaternion(x / length, y / length, z / length, w / length))
+    rows[:, ROTATION] = np.column_stack(from_quaternion(*quaternions))
     rows[:, ROTATION.stop:] = numbers[:, _TWIST_AND_ACCELERATION]
     return rows
 
 
-def _written(parameters: Parameters, message: cdr.PlatformTrajectory, result: PlannedTrajectory,
+def _written(parameters: Parameters, message: PlatformTrajectory, result: PlannedTrajectory,
              ) -> Generator[None, None, bytes]:
     """Return the trajectory_msgs/JointTrajectory of an accepted trajectory."""
-    answer = cdr.LegTrajectory(
+    answer = LegTrajectory(
         message.stamp, parameters['joints'], result.points, parameters['trajectory.effort'])
     for first in range(0, result.points, _WRITTEN):
         some = slice(first, min(first + _WRITTEN, result.points))
