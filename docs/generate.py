@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.reference_motion import TrajectoryParameters
 from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
 from stewart_dynamics.replay.one import NODE, replay
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.plant import SimulatorParameters
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 from stewart_dynamics.runtime.setpoints import Setpoints
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 

@@ -20,8 +20,8 @@ from referees import ROOT
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, WARN
-from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 from stewart_dynamics.runtime.planned_trajectory_diagnostics import PlannedDiagnostics
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 BEGIN = 100.0

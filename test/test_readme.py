@@ -24,9 +24,10 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from stewart_dynamics.nodes import simulator_messages
 from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.runtime import planned_trajectory as planned
-from stewart_dynamics.runtime import plant, setpoints, step
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
+from stewart_dynamics.runtime import setpoints, step
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / 'README.md').read_text(encoding='utf-8')
@@ -45,7 +46,8 @@ def test_topics_are_those_of_the_code() -> None:
     for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
                         ('markers', 'visualization_msgs/msg/MarkerArray'),
                         (planned.INPUT, planned.INPUT_TYPE), (planned.OUTPUT, planned.OUTPUT_TYPE),
-                        *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
+                        *simulator_messages.INPUT_TYPES.items(),
+                        *simulator_messages.OUTPUT_TYPES.items()):
         assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
 
 

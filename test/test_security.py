@@ -47,8 +47,8 @@ from running import (  # noqa: E402
     assert_only_log_lines, DEADLINE, DynamicsNode, executable, INPUTS, log_lines, NODE, OUTPUTS,
     Peer, PLATFORM, Program)
 
-from stewart_dynamics import plant  # noqa: E402
 from stewart_dynamics.errors import StewartError  # noqa: E402
+from stewart_dynamics.nodes import simulator_messages  # noqa: E402
 from stewart_dynamics.nodes.security import check_environment  # noqa: E402
 
 SECURITY = ROOT / 'security'
@@ -196,8 +196,8 @@ def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> N
         peer.until(lambda: name not in peer.node.get_node_names(), 'the simulator has gone')
     peer.close()
     assert union == granted('/stewart_simulator')
-    assert {f'/{name}/{topic}' for topic in plant.OUTPUT_TYPES} < union['publish']
-    assert {f'/{name}/{topic}' for topic in plant.INPUT_TYPES} < union['subscribe']
+    assert {f'/{name}/{topic}' for topic in simulator_messages.OUTPUT_TYPES} < union['publish']
+    assert {f'/{name}/{topic}' for topic in simulator_messages.INPUT_TYPES} < union['subscribe']
 
 
 # What would start with less security than is asked for does not start
