@@ -50,7 +50,8 @@ from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.nodes.markers import Markers
-from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
+from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
+from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.parameters import is_of_ros, Parameters
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime import setpoints as inputs

@@ -17,9 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
-import gc
 import math
 import signal
 import sys
@@ -30,21 +28,18 @@ from rcl_interfaces.msg import (
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import NameValidationException, ROSInterruptException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
-from rclpy.time_source import TimeSource
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.nodes.rclpy_workarounds import (
+    describe_by, make_executor, reject_impossible_times, set_parameters_together, shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries
 from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
-
-# The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
-_SPIN_SECONDS = 10.0
 
 # What is the user's to mend, said in one line: all else is a fault of ours.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
@@ -100,7 +95,9 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
             node.declare_parameter(name, default, unchecked)
     if not isinstance(node, LifecycleNode):
         node.add_on_set_parameters_callback(partial(_refuse_changes, kind))
-    _describe_by_table(node, kind)
+    set_parameters_together(node)
+    describe_by(node, lambda name: _descriptor(
+        kind.table[name], node) if name in kind.table else None)
     return parameters
 
 
@@ -115,28 +112,6 @@ def _refuse_changes(
             return SetParametersResult(successful=False, reason=(
                 f'{change.name}: only read when the node starts: start it anew'))
     return SetParametersResult(successful=True)
-
-
-def _describe_by_table(node: Node, kind: type[ParameterSet]) -> None:
-    """
-    Answer requests for a parameter's description from the table.
-
-    rclpy 7.1 would check by the description that it holds: a double by its range, in words of
-    its own before our check is asked, and with ``more than 0`` as if it were ``at least 0``. And
-    it writes the type of a value into it that is then refused.
-    """
-    def describe(request: Any, response: Any) -> Any:
-        response = describe_by_node(request, response)
-        if response.descriptors:  # none where a name is unknown
-            response.descriptors = [
-                _descriptor(kind.table[name], node) if name in kind.table else known
-                for name, known in zip(request.names, response.descriptors, strict=True)]
-        return response
-
-    for service in node.services:
-        if service.srv_name.endswith('/describe_parameters'):
-            describe_by_node = service.callback
-            service.callback = describe
 
 
 def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
@@ -159,45 +134,6 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
         read_only=not has_lifecycle, dynamic_typing=len(parameter.sizes) > 1,
         floating_point_range=[FloatingPointRange(
             from_value=parameter.minimum, to_value=parameter.maximum)] if in_range else [])
-
-
-def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., None]:
-    """
-    Return a callback that ends in silence where ROS is shut down while it runs.
-
-    A signal does so in the middle of whatever runs; what then asks ROS for anything raises.
-    """
-    def guarded(*arguments: Any) -> None:
-        try:
-            callback(*arguments)
-        except RCLError:
-            if node.context.ok():
-                raise
-
-    return guarded
-
-
-class _TimeSource(TimeSource):
-    """What follows /clock for a node; rclpy's own ends the program at a time before zero."""
-
-    def clock_callback(self, msg: Any) -> None:
-        """Follow a message, or say that it cannot be."""
-        try:
-            super().clock_callback(msg)
-        except ValueError as exc:
-            get_logger('stewart_dynamics').error(
-                f'/clock: {msg.clock.sec} s: not followed: {exc}', throttle_duration_sec=5.0)
-
-
-def _executor() -> Executor:
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
-        get_logger('stewart_dynamics').warning(
-            'this rclpy has no events executor: the single-threaded one takes 2.5 times the '
-            'processor time')
-        return SingleThreadedExecutor()
-    return EventsExecutor()
 
 
 def _usage(kind: type[ParameterSet]) -> str:
@@ -249,17 +185,16 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
         warning = check_environment(sys.argv)
-        rclpy.node.TimeSource = _TimeSource  # type: ignore[misc]
+        reject_impossible_times()
         rclpy.init()
         with without_security_libraries():
             node = make_node()
         if warning:
             node.get_logger().warning(warning)
-        executor = _executor()
+        executor = make_executor()
         executor.add_node(node)
         starting = False
-        while rclpy.ok() and not stop.done():
-            executor.spin_until_future_complete(stop, _SPIN_SECONDS)
+        spin(executor, stop, lambda: bool(signals))
         return int(stop.result() or 0) if stop.done() else 0
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         return 0
@@ -273,13 +208,4 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         return 1
     finally:
         starting = False
-        # On this thread and before the end, else rclpy 7.1 crashes at exit.
-        if executor is not None:
-            executor.shutdown()
-        if node is not None:
-            node.destroy_node()
-        # What a node has frozen is not collected before the libraries are gone that Fast DDS
-        # needs to leave: over TLS that crashes.
-        gc.unfreeze()
-        with suppress(RCLError):  # a signal's own shutdown may come between check and call
-            rclpy.try_shutdown()
+        shut_down(executor, node)
