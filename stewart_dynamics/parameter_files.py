@@ -89,7 +89,8 @@ def parameters_of(document: Mapping[str, Any], node: str, source: str,
             for parameter, value in flat(parameters, '', source):
                 if parameter in seen:
                     raise ParameterError(
-                        f'{source}: {shown_name(parameter)}: given twice under {shown_name(section)}')
+                        f'{source}: {shown_name(parameter)}: given twice under '
+                        f'{shown_name(section)}')
                 seen.add(parameter)
                 if not is_meant:
                     continue
@@ -119,8 +120,9 @@ def _is_meant(section: str, node: str) -> bool:
 def flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
     """Yield dotted names and values of groups within groups."""
     if not isinstance(tree, dict):
-        raise ParameterError(f'{source}: {shown_name(prefix or "ros__parameters")}: {shown(tree)}: '
-                             'must hold names and values')
+        name = prefix or 'ros__parameters'
+        raise ParameterError(
+            f'{source}: {shown_name(name)}: {shown(tree)}: must hold names and values')
     for key, value in tree.items():
         name = f'{prefix}{key}'
         if isinstance(value, dict):
@@ -128,8 +130,8 @@ def flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
             continue
         if isinstance(value, list) and any(isinstance(each, list | dict) for each in value):
             raise ParameterError(
-                f'{source}: {shown_name(name)}: {shown(value)}: has a list or a group in the list: '
-                'write the numbers one after the other, [x1, y1, z1, x2, y2, z2]')
+                f'{source}: {shown_name(name)}: {shown(value)}: has a list or a group in the '
+                'list: write the numbers one after the other, [x1, y1, z1, x2, y2, z2]')
         yield name, value
 
 
@@ -212,4 +214,5 @@ def _written(value: Any) -> str:
         return text if '.' in text else text.replace('e', '.0e')
     if _NAME.fullmatch(value) and scalar(value) == value:
         return str(value)
-    return "'" + value.replace("'", "''") + "'"
+    quoted = value.replace("'", "''")
+    return f"'{quoted}'"

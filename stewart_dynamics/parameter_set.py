@@ -126,7 +126,8 @@ class ParameterSet(Mapping[str, Any]):
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters', *,
                  exact_types: bool = False) -> None:
         if not isinstance(values, Mapping):
-            raise ParameterError(f'{source}: {shown(values)}: must be a mapping of names to values')
+            raise ParameterError(
+                f'{source}: {shown(values)}: must be a mapping of names to values')
         for name, value in values.items():
             self.declared(name, value, source)
         self._given = {
@@ -325,7 +326,7 @@ def _wrong_type(kind: str, entry: Any) -> str:
     if kind == 'double' and isinstance(entry, str) and len(entry) < 80:
         if re.fullmatch(r'[+-]?[0-9]+,[0-9]+', entry, re.ASCII):
             return f'must be a double; a decimal comma? write {entry.replace(",", ".")}'
-        if _is_number(entry):
+        if type(scalar(entry)) in (int, float):
             return 'must be a double, not a text: write it without quotes'
         if re.fullmatch(r'[+-]?[0-9][0-9_ ]*[0-9](\.[0-9_]*)?', entry, re.ASCII):
             return 'must be a double: write its digits without anything between them'
@@ -334,14 +335,6 @@ def _wrong_type(kind: str, entry: Any) -> str:
     return f'must be a {kind}'
 
 
-def _is_number(text: str) -> bool:
-    try:
-        return type(scalar(text)) in (int, float)
-    except ValueError:
-        return False
-
-
 def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> ParameterError:
     unit = f' {parameter.unit}' if parameter.unit and isinstance(value, float) else ''
     return ParameterError(f'{source}: {parameter.name}: {shown(value)}{unit}: {rule}')
-

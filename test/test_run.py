@@ -36,10 +36,12 @@ from referees import ROOT
 from rosgraph_msgs.msg import Clock
 
 from stewart_dynamics import ParameterError, Parameters
-from stewart_dynamics.mechanics.reference_motion import TRAJECTORY_PARAMETERS, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import (
+    TRAJECTORY_PARAMETERS, TrajectoryParameters)
 from stewart_dynamics.nodes.rclpy_workarounds import reject_impossible_times
 from stewart_dynamics.nodes.run import declare_parameters
-from stewart_dynamics.parameters import PARAMETERS, ParameterSet
+from stewart_dynamics.parameter_set import ParameterSet
+from stewart_dynamics.parameters import PARAMETERS
 
 SECONDS = 30.0
 
