@@ -176,8 +176,8 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], units: Mapping[str, 
         for each in groups:
             group = group.setdefault(each, {})
         group[last] = value, units[name]
-    lines = ['/**:', '  ros__parameters:', *_lines(tree, '    ')]
     try:
+        lines = ['/**:', '  ros__parameters:', *_lines(tree, '    ')]
         Path(path).write_text('\n'.join(lines) + '\n', encoding='utf-8')
     except (OSError, TypeError, ValueError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else exc
@@ -211,6 +211,8 @@ def _written(value: Any) -> str:
         return 'true' if value else 'false'
     if isinstance(value, float):
         text = repr(value)
+        if not isinstance(scalar(text), float):
+            raise ValueError(f'{text}: ROS reads no number so small')
         return text if '.' in text else text.replace('e', '.0e')
     if _NAME.fullmatch(value) and scalar(value) == value:
         return str(value)
