@@ -36,12 +36,13 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.reference_motion import TrajectoryParameters
-from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.one import NODE, replay
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.plant import SimulatorParameters
 from stewart_dynamics.runtime.setpoints import Setpoints
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 matplotlib.use('Agg')
