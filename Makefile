@@ -90,7 +90,8 @@ docs: $(INSTALLED)
 
 # The pages as a site: docs/_build/html/index.html.
 docs-site: $(INSTALLED)
-	.venv/bin/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_build/html
+	.venv/bin/python -m sphinx --fresh-env --write-all --fail-on-warning --keep-going --quiet \
+	  docs docs/_build/html
 	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 
 environment: $(INSTALLED)

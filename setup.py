@@ -41,6 +41,7 @@ extras_require = {
         'docutils>=0.20',
         'furo>=2024.1',
         'myst-parser>=2',
+        'numpydoc>=1.6',
         'sphinx>=7.2',
     ],
     'parquet': ['pyarrow>=14'],

@@ -31,7 +31,7 @@ author = 'The stewart_dynamics developers'
 copyright = f'2026, {author}'  # noqa: A001
 release = ElementTree.parse(ROOT / 'package.xml').getroot().findtext('version')
 
-extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
+extensions = ['myst_parser', 'numpydoc', 'sphinx.ext.autodoc']
 exclude_patterns = ['_build', 'figures']
 
 myst_enable_extensions = ['dollarmath']
@@ -41,21 +41,17 @@ myst_heading_anchors = 4
 # Warnings are errors, and an unknown reference is a warning.
 nitpicky = True
 nitpick_ignore_regex = [
-    # Without an inventory from the network, other packages' names have no target.
+    # Types of other packages and of annotations: they have no page here.
     ('py:.*', r'(numpy|np|pathlib|collections|typing|typing_extensions)\..*'),
-    ('py:class', r'Array|ArrayLike|NDArray|Path|Any|Iterator|Mapping|Sequence|Callable'),
-    # Parts of the type fields of numpydoc docstrings: shapes and words.
-    ('py:class', r'optional|\.\.\.|\(.*|.*\)|[NM]|\d|of .*|mapping.*|shape.*|default.*|read-only'),
 ]
 
 autodoc_member_order = 'bysource'
 autodoc_typehints = 'none'
-autodoc_default_options = {'members': True, 'undoc-members': False}
-napoleon_google_docstring = False
-napoleon_use_rtype = False
+autodoc_default_options = {'members': True}
+numpydoc_show_class_members = False
 
 html_theme = 'furo'
-html_title = f'{project} {release}'
+html_title = project
 html_math_renderer = 'mathml'
 html_copy_source = False
 html_show_sphinx = False
@@ -64,7 +60,7 @@ html_theme_options = {
     'dark_css_variables': {'color-brand-primary': '#56b4e9', 'color-brand-content': '#56b4e9'},
 }
 html_static_path = ['_static']
-html_css_files = ['tables.css']
+html_css_files = ['site.css']
 
 
 # Formulas as MathML, which browsers draw themselves: the pages need no network and no script.

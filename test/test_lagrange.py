@@ -204,7 +204,8 @@ def test_skew_is_the_cross_product() -> None:
 @pytest.fixture(scope='module')
 def misprints() -> Any:
     """Return the script that writes the table."""
-    spec = importlib.util.spec_from_file_location('misprints', ROOT / 'docs' / 'figures' / 'misprints.py')
+    path = ROOT / 'docs' / 'figures' / 'misprints.py'
+    spec = importlib.util.spec_from_file_location('misprints', path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

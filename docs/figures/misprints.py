@@ -123,7 +123,7 @@ def random_states(p: Parameters) -> States:
         if p['limits.velocity_max'] is not None:
             within &= ~np.any(rates > p['limits.velocity_max'], axis=-1)
         if not np.any(within):
-            raise SystemExit(f'{HEXAPOD}: no state in the ranges of this script is within its limits')
+            raise SystemExit(f'{HEXAPOD}: no state of this script is within its limits')
         kept.append(drawn[within])
         count += int(np.sum(within))
     return States(*np.moveaxis(np.concatenate(kept)[:STATES], 1, 0))
