@@ -56,6 +56,7 @@ lint: $(INSTALLED)
 	.venv/bin/python -m ruff check --quiet .
 	.venv/bin/python -m flake8
 	.venv/bin/python -m mypy
+	.venv/bin/lint-imports --no-logo --cache-dir $(CACHE)/import_linter
 
 demo: $(INSTALLED)
 	@.venv/bin/python demo/demo.py

@@ -63,6 +63,7 @@ extras_require = {
         'flake8-import-order',
         'flake8-quotes',
         'hypothesis',
+        'import-linter',
         'matplotlib',
         'mcap',
         'mcap-ros2-support',

@@ -32,9 +32,9 @@ from scipy.optimize import root
 
 from stewart_dynamics import Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics
-from stewart_dynamics.mechanics import kernel as runtime
 from stewart_dynamics.mechanics.forward_kinematics import FOUND
 from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES
 
 BEGIN, END = '<!-- forward: begin -->', '<!-- forward: end -->'
 
@@ -86,7 +86,7 @@ def steps_table(platform: StewartPlatform) -> list[str]:
     residuals = np.empty(GUESSES)
     forward_kinematics.poses(platform.machine, lengths, rows, codes, steps, residuals)
     found = codes == FOUND
-    determinants = [platform.solve(each.rows)[:, runtime.DETERMINANT] for each in (poses, guesses)]
+    determinants = [platform.solve(each.rows)[:, DETERMINANT] for each in (poses, guesses)]
     beyond = determinants[0] * determinants[1] <= 0.0
     right = found & np.all(np.abs(rows[:, :12] - poses.rows[:, :12]) < 1e-9, axis=-1)
     shares = [*((f'arrive in at most {most} steps', found & (steps <= most))
@@ -102,7 +102,7 @@ def steps_table(platform: StewartPlatform) -> list[str]:
 def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     """Return what is measured: forward dynamics, in batches as well, and forward kinematics."""
     motion = random_motions(SAMPLES)
-    forces = platform.solve(motion.rows)[:, runtime.FORCES:runtime.FORCES + 6].copy()
+    forces = platform.solve(motion.rows)[:, FORCES].copy()
     one = Motion(motion.position[0], motion.rotation[0], motion.linear_velocity[0],
                  motion.angular_velocity[0])
     row, force, no_wrench = motion.rows[:1].copy(), forces[:1].copy(), np.zeros((1, 6))

@@ -39,9 +39,9 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics import kernel as runtime
-from stewart_dynamics.mechanics import lagrange
+from stewart_dynamics.mechanics import kernel, lagrange
 from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.rows import FORCES, RESULT, WRENCH
 from stewart_dynamics.parameters import inertia_matrix
 
 Array = NDArray[np.float64]
@@ -206,7 +206,7 @@ def _rod(mass: float, center_of_mass: float, inertia: float) -> Any:
 
 
 def _friction(parameters: Parameters, rates: Array) -> Array:
-    slip = np.clip(rates / runtime.COULOMB_RATE, -1.0, 1.0)
+    slip = np.clip(rates / kernel.COULOMB_RATE, -1.0, 1.0)
     force: Array = (parameters['actuator.viscous_friction'] * rates
                     + parameters['actuator.coulomb_friction'] * slip)
     return force
@@ -269,16 +269,16 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     machine = StewartPlatform(parameters)
     numbers = machine.machine
     motion = random_motions(samples)
-    rows, no_wrench = motion.rows, np.zeros((1, runtime.WRENCH))
-    results, c_results = (np.empty((samples, runtime.RESULT)) for _ in range(2))
+    rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
+    results, c_results = (np.empty((samples, RESULT)) for _ in range(2))
     c, tree = PlainC(), Tree(parameters)
 
-    wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, runtime.WRENCH))
+    wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
     for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
-        runtime.solve(numbers, rows, wrench, results)
+        kernel.solve(numbers, rows, wrench, results)
         c.function(*c.arguments(numbers, rows, wrench, c_results))
         check(name, c_results, results)
-    forces = results[:, runtime.FORCES:runtime.FORCES + 6]
+    forces = results[:, FORCES]
     few = [_part(motion, slice(k, k + 1)) for k in range(min(50, samples))]
     check('Pinocchio', np.array([tree.leg_forces(_single(one)) for one in few]),
           forces[:len(few)])
@@ -286,11 +286,11 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     check('Lagrange', lagrange_forces(parameters, part), forces[:len(part.rows)])
 
     one = _single(_part(motion, slice(0, 1)))
-    row, result = rows[:1].copy(), np.empty((1, runtime.RESULT))
+    row, result = rows[:1].copy(), np.empty((1, RESULT))
     q, v, a, _ = tree.state(one)
     single = [
         Contestant('`inverse_dynamics.solve`, one row: the compiled step', repeated(
-            'solve(machine, rows, wrenches, results)', solve=runtime.solve, machine=numbers,
+            'solve(machine, rows, wrenches, results)', solve=kernel.solve, machine=numbers,
             rows=row, wrenches=no_wrench, results=result), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
@@ -304,7 +304,7 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
             arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
     batch = [
         Contestant('`inverse_dynamics.solve`, one core', once(
-            samples, runtime.solve, numbers, rows, no_wrench, results), PLAIN_C),
+            samples, kernel.solve, numbers, rows, no_wrench, results), PLAIN_C),
         Contestant(PLAIN_C, once(
             samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),
         Contestant('`StewartPlatform.solve`: the default, all cores', once(

@@ -43,12 +43,13 @@ from latency import FIRST_STAMP, legs, MOTION, PARAMETERS, PERIOD
 import numpy as np
 from replay import table
 
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
 from stewart_dynamics.nodes.markers import Markers
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import ExternalWrench
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
-from stewart_dynamics.runtime.step import NO_WRENCH, Setpoint, Step
+from stewart_dynamics.runtime.step import Setpoint, Step
 
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
 BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'

@@ -37,8 +37,8 @@ import numpy as np
 from replay import table
 
 from stewart_dynamics import Parameters
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime import planned_trajectory as planned
-from stewart_dynamics.runtime.step import NO_WRENCH
 
 BEGIN, END = '<!-- planned: begin -->', '<!-- planned: end -->'
 POINTS = 10_000

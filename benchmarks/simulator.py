@@ -47,11 +47,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import read_yaml
 from stewart_dynamics.runtime.plant import _advance, Plant, SimulatorParameters
-from stewart_dynamics.runtime.step import NO_WRENCH, Six
 
 sys.path.append(str(HERE.parent / 'test'))
 from referees import energies, rng, smooth_motion  # noqa: E402, I100, I202

@@ -42,7 +42,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 from tqdm import tqdm
 
-from stewart_dynamics.mechanics import kernel as runtime
+from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES, LENGTHS, MOTION, RATES, RESULT
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.summary import Summary
@@ -133,12 +133,12 @@ def report(demo: Demo, parameters: Parameters) -> str:
     many = len(demo.states)
     stamps = np.array([_nanoseconds(state.header.stamp) for state in demo.states])
     forces = np.array([state.effort or [np.nan] * 6 for state in demo.states])
-    results = np.full((many, runtime.RESULT), np.nan)  # nan: not published
-    results[:, runtime.LENGTHS:runtime.LENGTHS + 6] = parameters['geometry.zero_length'] + [
+    results = np.full((many, RESULT), np.nan)  # nan: not published
+    results[:, LENGTHS] = parameters['geometry.zero_length'] + [
         list(state.position) for state in demo.states]
-    results[:, runtime.RATES:runtime.RATES + 6] = [list(s.velocity) for s in demo.states]
-    results[:, runtime.FORCES:runtime.FORCES + 6] = forces
-    results[:, runtime.DETERMINANT] = demo.determinants[:many]
+    results[:, RATES] = [list(s.velocity) for s in demo.states]
+    results[:, FORCES] = forces
+    results[:, DETERMINANT] = demo.determinants[:many]
     states = np.full((many, STATE), np.nan)
     changes = np.searchsorted([stamp for stamp, _ in demo.warnings], stamps, side='right')
     states[:, CAUSE] = [changed > 0 and demo.warnings[changed - 1][1] for changed in changes]
@@ -146,7 +146,7 @@ def report(demo: Demo, parameters: Parameters) -> str:
     summary = Summary(parameters)
     summary.add(
         (stamps - stamps[0]) * 1e-9,
-        Batch(stamps, np.full((many, runtime.MOTION), np.nan), np.zeros((1, 6)), none,
+        Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
               stamps),
         Outputs(every, stamps, results, forces, states, none, none))
     return summary.table()

@@ -37,9 +37,9 @@ from test_measured_legs import joint_state, JOINTS, message_of, ZERO_LENGTHS
 from test_simulator_node import Simulator, STEPPED
 
 from stewart_dynamics import StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.external_wrench import ExternalWrench, Measurement
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
-from stewart_dynamics.runtime.step import NO_WRENCH
 
 Start = Callable[..., DynamicsNode]
 

@@ -29,12 +29,12 @@ from test_external_wrench import (
     BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, six, swing)
 
 from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
 from stewart_dynamics.runtime.measured_legs import (
     LACKING, MEASURED_LEGS, MeasuredLegs, NO_POSE, SINGULAR, UNEVEN, UNSTAMPED, WITHOUT)
 from stewart_dynamics.runtime.setpoints import (
     MALFORMED, NOT_FINITE, OUT_OF_RANGE, Refusal, TOO_OLD, TWICE)
-from stewart_dynamics.runtime.step import NO_WRENCH
 
 KIND = 'sensor_msgs/msg/JointState'
 JOINTS = list(MACHINE['joints'])

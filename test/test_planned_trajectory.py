@@ -32,13 +32,13 @@ from referees import rng, ROOT
 from scipy.interpolate import CubicHermiteSpline
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.kernel import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.planned_trajectory import Outcome
-from stewart_dynamics.runtime.step import NO_WRENCH, Six
 
 Array = NDArray[np.float64]
 
@@ -289,7 +289,7 @@ def test_a_length_broken_between_points_alone_is_found(
     rows = LEAPS[whose].copy()
     rows[:, 7:] *= sign
     dense, motions = between_points(TIMES, rows)
-    of_platform = legs_of(FREE, motions)[:, LENGTHS:LENGTHS + 6]
+    of_platform = legs_of(FREE, motions)[:, LENGTHS]
     cubic_dense, of_legs, _ = cubic_between(TIMES, rows)
     extremes = {'platform': (sign * of_platform).max(), 'legs': (sign * of_legs).max()}
     other = {'platform': 'legs', 'legs': 'platform'}[whose]
@@ -314,7 +314,7 @@ def test_a_length_broken_between_points_alone_is_found(
 def test_a_rate_broken_between_points_alone_is_found(whose: str, acceleration: float) -> None:
     rows = heave(0.15, 0.0, acceleration, 0.0, -acceleration)
     dense, motions = between_points(TIMES, rows)
-    of_platform = legs_of(FREE, motions)[:, RATES:RATES + 6]
+    of_platform = legs_of(FREE, motions)[:, RATES]
     cubic_dense, _, of_legs = cubic_between(TIMES, rows)
     extremes = {'platform': of_platform.max(), 'legs': of_legs.max()}
     other = {'platform': 'legs', 'legs': 'platform'}[whose]
@@ -340,7 +340,7 @@ def test_a_force_broken_between_points_alone_is_found(duration: int) -> None:
     times = [0, duration]
     rows = heave(0.1 if duration == SECOND else 2e-4)
     dense, motions = between_points(times, rows)
-    forces = np.abs(legs_of(FREE, motions)[:, FORCES:FORCES + 6])
+    forces = np.abs(legs_of(FREE, motions)[:, FORCES])
     points = forces[[0, -1]].max()
     assert forces.max() > 1.2 * points
     bound = 0.5 * (forces.max() + points)
@@ -392,7 +392,7 @@ def test_the_singular_motion_is_refused(step: int) -> None:
                                    rows[::max(1, SECOND // 10 // step)])
     results = legs_of(FREE, motions)
     crossing = fine[np.argmax(results[:, DETERMINANT] * results[0, DETERMINANT] < 0.0)]
-    forces = fine[np.argmax(np.abs(results[:, FORCES:FORCES + 6]).max(axis=1) > 6000.0)]
+    forces = fine[np.argmax(np.abs(results[:, FORCES]).max(axis=1) > 6000.0)]
     stop = fine[np.argmax(results[:, CONDITION] >= 100.0)]
     for parameters, reason, time, words in (
             (PARAMETERS, planned.LIMIT, forces, 'beyond limits.force_max'),

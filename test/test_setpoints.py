@@ -35,10 +35,11 @@ from rclpy.serialization import serialize_message
 from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.setpoints import (
     ACCEL, COMBINED, MALFORMED, Messages, NOT_FINITE, NOT_JOINED, NOT_UNIT, POSE, Refusal,
     Setpoints, TOO_OLD, TWICE, TWIST, WAITING, WRENCH, WRONG_FRAME)
-from stewart_dynamics.runtime.step import NO_WRENCH, Setpoint
+from stewart_dynamics.runtime.step import Setpoint
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)

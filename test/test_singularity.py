@@ -26,7 +26,7 @@ from referees import (
     random_direction, random_parameters, rng, rotation_about, size_of, symmetric_parameters)
 
 from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.kernel import CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION
 from stewart_dynamics.mechanics.singularity import (
     Cause, LEAVING, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
 

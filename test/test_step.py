@@ -28,10 +28,10 @@ from referees import (
     QUARTER_TURN, random_motion, random_parameters, random_wrench, rng, symmetric_parameters)
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
-from stewart_dynamics.runtime.step import (
-    Excess, NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Six, Step)
+from stewart_dynamics.runtime.step import Excess, Output, OUTPUT_TYPES, Setpoint, Step
 
 PARAMETERS = symmetric_parameters()
 STEP = Step(PARAMETERS)

@@ -34,8 +34,8 @@ from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics import kernel as runtime
 from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.rows import MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME
 from stewart_dynamics.replay.summary import Summary, TOLD
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
@@ -61,8 +61,8 @@ def batch(stamps: NDArray[np.int64], restarts: NDArray[np.bool_] | None = None,
     """Return setpoints; what is not given is zero."""
     many = len(stamps)
     return Batch(
-        stamps, np.zeros((many, runtime.MOTION)) if motions is None else motions,
-        np.zeros((many, runtime.WRENCH)) if wrenches is None else wrenches,
+        stamps, np.zeros((many, MOTION)) if motions is None else motions,
+        np.zeros((many, WRENCH)) if wrenches is None else wrenches,
         np.zeros(many, dtype=bool) if restarts is None else restarts, stamps)
 
 
@@ -98,7 +98,7 @@ class Samples:
         results = np.concatenate([
             self.lengths, self.rates, self.demanded, self.unit_load, self.det[:, None],
             np.zeros((many, 1)), self.condition[:, None]], axis=1)
-        assert results.shape == (many, runtime.RESULT)
+        assert results.shape == (many, RESULT)
         states = np.zeros((many, STATE))
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         flags = np.zeros(many, dtype=bool)
@@ -502,7 +502,7 @@ def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
     p = symmetric_parameters()
     time = np.linspace(0.0, 1.0, 101)
     turn = 1.5 + 0.123 * time  # the machine is singular at a quarter turn
-    rows = np.zeros((101, runtime.MOTION))
+    rows = np.zeros((101, MOTION))
     rows[:, 2] = 1.0
     rows[:, 3], rows[:, 4] = np.cos(turn), -np.sin(turn)
     rows[:, 6], rows[:, 7] = np.sin(turn), np.cos(turn)

@@ -34,11 +34,12 @@ import matplotlib
 import numpy as np
 from playwright.sync_api import sync_playwright
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.one import NODE, replay
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.setpoints import Setpoints
-from stewart_dynamics.runtime.step import Array, Batch, Outputs, Step
+from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202

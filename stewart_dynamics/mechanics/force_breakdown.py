@@ -24,14 +24,13 @@ have only what causes it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stewart_dynamics.mechanics import kernel as runtime
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics.rows import ACCELERATION, CONDITION, FORCES, RATES, TWIST
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 CAUSES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench')
 
@@ -43,11 +42,6 @@ _NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.pisto
 
 # Samples that are split together: few enough for the processor's cache.
 _TOGETHER = 1024
-
-_VELOCITIES = slice(12, 18)
-_ACCELERATIONS = slice(18, 24)
-_FORCES = slice(runtime.FORCES, runtime.FORCES + 6)
-_RATES = slice(runtime.RATES, runtime.RATES + 6)
 
 
 class ForceCauses:
@@ -97,20 +91,20 @@ class ForceCauses:
         rows = motions.copy()
         rows[:, 12:] = 0.0  # at rest
         results = self._machine.solve(rows)
-        gravity[:] = results[:, _FORCES]
-        unsolvable = ~(results[:, runtime.CONDITION] < UNSOLVABLE_CONDITION)
-        wrench[:] = 0.0 if wrenches is None else self._weightless.solve(rows, wrenches)[:, _FORCES]
+        gravity[:] = results[:, FORCES]
+        unsolvable = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
+        wrench[:] = 0.0 if wrenches is None else self._weightless.solve(rows, wrenches)[:, FORCES]
 
-        rows[:, _ACCELERATIONS] = motions[:, _ACCELERATIONS]
-        platform_inertia[:] = self._platform_only.solve(rows)[:, _FORCES]
-        leg_inertia[:] = self._weightless.solve(rows)[:, _FORCES] - platform_inertia
+        rows[:, ACCELERATION] = motions[:, ACCELERATION]
+        platform_inertia[:] = self._platform_only.solve(rows)[:, FORCES]
+        leg_inertia[:] = self._weightless.solve(rows)[:, FORCES] - platform_inertia
 
-        rows[:, _ACCELERATIONS] = 0.0
-        rows[:, _VELOCITIES] = motions[:, _VELOCITIES]
+        rows[:, ACCELERATION] = 0.0
+        rows[:, TWIST] = motions[:, TWIST]
         results = self._weightless.solve(rows)
-        velocity_terms[:] = results[:, _FORCES]
+        velocity_terms[:] = results[:, FORCES]
         # The law itself: what it adds would drown in the other forces near a singularity.
-        rates = results[:, _RATES]
+        rates = results[:, RATES]
         friction[:] = self._viscous * rates + self._coulomb * np.clip(
-            rates / runtime.COULOMB_RATE, -1.0, 1.0)
+            rates / kernel.COULOMB_RATE, -1.0, 1.0)
         forces[unsolvable] = np.nan

@@ -25,19 +25,16 @@ Computations, 4th ed., 4.2).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined, source_digest
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.kernel import (
     BODY, LEG, leg_dynamics, leg_inertia, leg_line, platform_dynamics)
 from stewart_dynamics.mechanics.vectors import (
     add, Matrix3, rotate, scale, subtract, symmetric, Symmetric3, Vector3)
-
-Array = NDArray[np.float64]
 
 # Scratch memory: the lower triangle of M, and what becomes the acceleration.
 _RIGHT = 36
@@ -183,21 +180,14 @@ def acceleration(machine: Array, motion: Array, forces: Array, wrench: Array, wo
         motion[21 + n] = inverse_size * work[_RIGHT + 3 + n]
 
 
-def _entry_point(source: str) -> Callable[[Array, Array, Array, Array], None]:
-    @entry_point
-    def solve(machine: Array, motions: Array, forces: Array, wrenches: Array) -> None:
-        """
-        Write the accelerations of motions (N, MOTION) under forces (N, 6), see ``acceleration``.
+@entry_point
+def solve(machine: Array, motions: Array, forces: Array, wrenches: Array) -> None:
+    """
+    Write the accelerations of motions (N, MOTION) under forces (N, 6), see ``acceleration``.
 
-        The wrenches are (N, WRENCH), or (1, WRENCH): one row for all.
-        """
-        _ = source  # part of the key of the kept machine code: see source_digest
-        work = np.empty(WORK)
-        one_wrench = len(wrenches) == 1
-        for n in range(len(motions)):
-            acceleration(machine, motions[n], forces[n], wrenches[0 if one_wrench else n], work)
-
-    return solve
-
-
-solve = _entry_point(source_digest())
+    The wrenches are (N, WRENCH), or (1, WRENCH): one row for all.
+    """
+    work = np.empty(WORK)
+    one_wrench = len(wrenches) == 1
+    for n in range(len(motions)):
+        acceleration(machine, motions[n], forces[n], wrenches[0 if one_wrench else n], work)

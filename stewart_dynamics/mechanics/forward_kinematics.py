@@ -24,20 +24,14 @@ another assembly lies beyond a singularity.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined, source_digest
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.matrix6 import inverse_and_determinant, Rows
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.vectors import add, cross, dot6, Matrix3, scale, Vector3, Vector6
-
-Array = NDArray[np.float64]
-Codes = NDArray[np.int64]
 
 # The lengths of a pose that is found differ by no more than this from those given [m].
 RESIDUAL = 1e-12
@@ -195,23 +189,16 @@ def twist(machine: Array, rates: Array, motion: Array) -> None:
         motion[15 + n] = per_size * dot6(inverse[3 + n], rate)
 
 
-def _entry_points(source: str) -> tuple[Callable[..., None], Callable[..., None]]:
-    @entry_point
-    def poses(machine: Array, lengths: Array, motions: Array, codes: Codes, steps: Codes,
-              residuals: Array) -> None:
-        """Find the poses of lengths (N, 6), see ``pose``; the rest is (N, MOTION) and (N,)."""
-        _ = source  # part of the key of the kept machine code: see source_digest
-        for n in range(len(motions)):
-            codes[n], steps[n], residuals[n] = pose(machine, lengths[n], motions[n])
-
-    @entry_point
-    def twists(machine: Array, rates: Array, motions: Array) -> None:
-        """Write the twists of motions (N, MOTION) that leg rates (N, 6) belong to."""
-        _ = source
-        for n in range(len(motions)):
-            twist(machine, rates[n], motions[n])
-
-    return poses, twists
+@entry_point
+def poses(machine: Array, lengths: Array, motions: Array, codes: Integers, steps: Integers,
+          residuals: Array) -> None:
+    """Find the poses of lengths (N, 6), see ``pose``; the rest is (N, MOTION) and (N,)."""
+    for n in range(len(motions)):
+        codes[n], steps[n], residuals[n] = pose(machine, lengths[n], motions[n])
 
 
-poses, twists = _entry_points(source_digest())
+@entry_point
+def twists(machine: Array, rates: Array, motions: Array) -> None:
+    """Write the twists of motions (N, MOTION) that leg rates (N, 6) belong to."""
+    for n in range(len(motions)):
+        twist(machine, rates[n], motions[n])

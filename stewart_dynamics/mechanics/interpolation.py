@@ -33,11 +33,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.mechanics.kernel import MOTION
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.mechanics.rotation import from_quaternion
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from stewart_dynamics.mechanics.rows import MOTION
 
 # a, b and their derivatives (da/dt = a' (r . r'), likewise b) in powers of -|r|^2, for angles up
 # to one, where the closed forms lose digits.
@@ -101,7 +99,7 @@ class Interpolation:
         bend: Array = _length(acceleration[:, 1:3] - line, arm).max(axis=1)
         return bend
 
-    def at(self, which: Indices, part: NDArray[np.floating[Any]]) -> Array:
+    def at(self, which: Integers, part: NDArray[np.floating[Any]]) -> Array:
         """
         Return rows of motion (M, MOTION).
 

@@ -29,7 +29,7 @@ from typing import Any, cast, TypeVar
 
 import numpy as np
 
-__all__ = ['COMPILED', 'HINT', 'compiled', 'entry_point', 'inlined', 'source_digest']
+__all__ = ['COMPILED', 'HINT', 'compiled', 'entry_point', 'inlined']
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -79,22 +79,16 @@ else:
             return _quiet(function)
         kept = numba.njit(error_model='numpy', nogil=True, cache=True)
         try:
-            return cast('Function', kept(function))
+            dispatcher: Any = kept(function)
         except RuntimeError:  # no folder that numba may write to
             HINT = ('the compiled dynamics cannot be kept on disk: every start takes seconds; '
                     'let NUMBA_CACHE_DIR name a folder that can be written to')
             return compiled(function)
+        # numba takes kept machine code for valid while the file of the entry point is unchanged,
+        # whatever became of the files of the functions that it calls.
+        index = dispatcher._cache._cache_file
+        index._source_stamp = index._source_stamp, _MECHANICS
+        return cast('Function', dispatcher)
 
-
-def source_digest() -> str:
-    """
-    Return a digest of the sources of the mechanics.
-
-    numba takes kept machine code for valid while the file of the entry point is unchanged,
-    whatever became of the files of the functions it calls. What an entry point closes over
-    is part of its key, so an entry point closes over this.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob('*.py')):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    _MECHANICS = hashlib.sha256(b''.join(
+        path.read_bytes() for path in sorted(Path(__file__).parent.glob('*.py')))).hexdigest()

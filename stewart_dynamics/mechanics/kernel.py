@@ -23,20 +23,20 @@ and six forces along the legs carry the sum: ``J_inv^T f = wrench``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined, source_digest
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Tridiagonal, tridiagonal)
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
+    UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, dot6, Matrix3, rotate, rotate_back, scale, subtract, symmetric, Vector3,
     Vector6)
-
-Array = NDArray[np.float64]
 
 # The numbers of a machine, as ``solve`` takes them: the body's, then LEG for each leg.
 #   gravity 3, characteristic length, platform mass, CoM 3, inertia 6 (xx xy xz yy yz zz)
@@ -46,21 +46,6 @@ Array = NDArray[np.float64]
 BODY = 14
 LEG = 13
 MACHINE = BODY + 6 * LEG
-
-# A row of a motion: position 3, rotation 9 (row by row), linear velocity 3, angular velocity 3,
-# linear acceleration 3, angular acceleration 3.
-MOTION = 24
-WRENCH = 6
-
-# A row of the result.
-LENGTHS = 0
-RATES = 6
-FORCES = 12
-UNIT_LOAD_FORCES = 18
-DETERMINANT = 24
-DETERMINANT_RATE = 25
-CONDITION = 26
-RESULT = 27
 
 # Coulomb friction grows linearly up to this rate [m/s] and is constant beyond it.
 COULOMB_RATE = 1e-3
@@ -261,9 +246,9 @@ def _dynamics(machine: Array, tile: Array, k: int) -> None:
         (r0[4], r1[4], r2[4], r3[4], r4[4], r5[4]), (r0[5], r1[5], r2[5], r3[5], r4[5], r5[5]))
     det *= size * size * size
     at = k + _RESULT
-    _put6(tile, at + LENGTHS * LANES, l0, l1, l2, l3, l4, l5)
-    _put6(tile, at + RATES * LANES, v0, v1, v2, v3, v4, v5)
-    _put6(tile, at + FORCES * LANES, dot6(b0, wrench) + a0, dot6(b1, wrench) + a1,
+    _put6(tile, at + LENGTHS.start * LANES, l0, l1, l2, l3, l4, l5)
+    _put6(tile, at + RATES.start * LANES, v0, v1, v2, v3, v4, v5)
+    _put6(tile, at + FORCES.start * LANES, dot6(b0, wrench) + a0, dot6(b1, wrench) + a1,
           dot6(b2, wrench) + a2, dot6(b3, wrench) + a3, dot6(b4, wrench) + a4,
           dot6(b5, wrench) + a5)
     tile[at + DETERMINANT * LANES] = det
@@ -274,7 +259,7 @@ def _dynamics(machine: Array, tile: Array, k: int) -> None:
     h = gram(b0, b1, b2, b3, b4, b5)
     g_trace = g[0][0] + g[1][0] + g[2][0] + g[3][0] + g[4][0] + g[5][0]
     h_trace = h[0][0] + h[1][0] + h[2][0] + h[3][0] + h[4][0] + h[5][0]
-    _put6(tile, at + UNIT_LOAD_FORCES * LANES, math.sqrt(h[0][0]), math.sqrt(h[1][0]),
+    _put6(tile, at + UNIT_LOAD_FORCES.start * LANES, math.sqrt(h[0][0]), math.sqrt(h[1][0]),
           math.sqrt(h[2][0]), math.sqrt(h[3][0]), math.sqrt(h[4][0]), math.sqrt(h[5][0]))
     tile[at + CONDITION * LANES] = math.sqrt(g_trace) * math.sqrt(h_trace)
     _put_scaled(tile, k + _TRIDIAGONAL, tridiagonal(g), g_trace)
@@ -310,44 +295,37 @@ def _tile_eigenvalues(tile: Array, lanes: int) -> None:
         tile[k + _RESULT + CONDITION * LANES] *= math.sqrt(tile[at]) * math.sqrt(tile[at + LANES])
 
 
-def _entry_point(source: str) -> Callable[[Array, Array, Array, Array], None]:
-    @entry_point
-    def solve(machine: Array, motions: Array, wrenches: Array, results: Array) -> None:
-        """
-        Compute the result of every motion.
+@entry_point
+def solve(machine: Array, motions: Array, wrenches: Array, results: Array) -> None:
+    """
+    Compute the result of every motion.
 
-        Parameters
-        ----------
-        machine : (MACHINE,)
-            The machine's numbers in the order above.
-        motions : (N, MOTION)
-            Rows of position, rotation, twist and acceleration, SI units, base axes.
-        wrenches : (N, WRENCH) or (1, WRENCH)
-            Force [N] and moment [N m] on the platform at its origin, base axes; one row for all.
-        results : (N, RESULT)
-            Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
-            d(det)/dt [m^3/s] and the condition number.
+    Parameters
+    ----------
+    machine : (MACHINE,)
+        The machine's numbers in the order above.
+    motions : (N, MOTION)
+        Rows of position, rotation, twist and acceleration, SI units, base axes.
+    wrenches : (N, WRENCH) or (1, WRENCH)
+        Force [N] and moment [N m] on the platform at its origin, base axes; one row for all.
+    results : (N, RESULT)
+        Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
+        d(det)/dt [m^3/s] and the condition number.
 
-        """
-        _ = source  # part of the key of the kept machine code: see source_digest
-        tile = np.empty(_TILE)
-        many = len(motions)
-        one_wrench = len(wrenches) == 1
-        for first in range(0, many, LANES):
-            lanes = min(LANES, many - first)
-            for k in range(lanes):
-                for n in range(MOTION):
-                    tile[n * LANES + k] = motions[first + k, n]
-                row = 0 if one_wrench else first + k
-                for n in range(WRENCH):
-                    tile[_WRENCH + n * LANES + k] = wrenches[row, n]
-            _tile_dynamics(machine, tile, lanes)
-            _tile_eigenvalues(tile, lanes)
-            for k in range(lanes):
-                for n in range(RESULT):
-                    results[first + k, n] = tile[_RESULT + n * LANES + k]
-
-    return solve
-
-
-solve = _entry_point(source_digest())
+    """
+    tile = np.empty(_TILE)
+    many = len(motions)
+    one_wrench = len(wrenches) == 1
+    for first in range(0, many, LANES):
+        lanes = min(LANES, many - first)
+        for k in range(lanes):
+            for n in range(MOTION):
+                tile[n * LANES + k] = motions[first + k, n]
+            row = 0 if one_wrench else first + k
+            for n in range(WRENCH):
+                tile[_WRENCH + n * LANES + k] = wrenches[row, n]
+        _tile_dynamics(machine, tile, lanes)
+        _tile_eigenvalues(tile, lanes)
+        for k in range(lanes):
+            for n in range(RESULT):
+                results[first + k, n] = tile[_RESULT + n * LANES + k]

@@ -30,10 +30,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.parameters import inertia_matrix, Parameters
-
-Array = NDArray[np.float64]
 
 
 class Legs(NamedTuple):

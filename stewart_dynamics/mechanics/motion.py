@@ -17,13 +17,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import rotation as rotations
-from stewart_dynamics.mechanics.kernel import MOTION
-
-Array = NDArray[np.float64]
+from stewart_dynamics.mechanics.rows import MOTION
 
 # A rotation matrix further from orthogonal than this is refused.
 ORTHOGONALITY = 1e-6

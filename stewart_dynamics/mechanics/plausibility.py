@@ -27,14 +27,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import inertia_matrix, Parameters
-
-Array = NDArray[np.float64]
 
 # The largest there is, the six cables of a radio telescope's cabin, hang from towers on a circle
 # of 300 m, and the cabin's joints are 90 times nearer to each other.

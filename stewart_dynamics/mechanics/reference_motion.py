@@ -25,14 +25,13 @@ import math
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.parameters import Parameter, ParameterSet
-
-Array = NDArray[np.float64]
 
 _POSE = 'X Y Z alpha beta gamma'
 
@@ -79,7 +78,7 @@ class TrajectoryParameters(ParameterSet):
                                  f'{self["motion.type"]} needs it')
 
 
-def sample_times(parameters: TrajectoryParameters) -> NDArray[np.int64]:
+def sample_times(parameters: TrajectoryParameters) -> Integers:
     """
     Return the times of one way of the motion (N,) [ns], 0 and on at the rate.
 
@@ -97,9 +96,9 @@ def sample_count(parameters: TrajectoryParameters) -> int:
     return 1 + (near if is_near else math.ceil(exact))
 
 
-def sample_time(parameters: TrajectoryParameters, index: ArrayLike) -> NDArray[np.int64]:
+def sample_time(parameters: TrajectoryParameters, index: ArrayLike) -> Integers:
     """Return the times of samples by their index (...) [ns]; errors of rounding do not add up."""
-    times: NDArray[np.int64] = np.rint(
+    times: Integers = np.rint(
         np.asarray(index) * 1e9 / parameters['rate']).astype(np.int64)
     return times
 

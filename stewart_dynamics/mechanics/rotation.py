@@ -21,9 +21,9 @@ import math
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from stewart_dynamics.arrays import Array
 
 
 def from_euler(angles: ArrayLike) -> Array:

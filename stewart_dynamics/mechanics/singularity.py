@@ -28,10 +28,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.jit import inlined
 from stewart_dynamics.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 # From here on a solution of J_inv^T f = wrench keeps fewer than four of its sixteen digits:
 # forces are neither computed nor published.

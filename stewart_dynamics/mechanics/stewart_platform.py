@@ -23,18 +23,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics
-from stewart_dynamics.mechanics import kernel as runtime
-from stewart_dynamics.mechanics import lagrange
+from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics, kernel, lagrange
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.motion import as_array, common_shape, Motion
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
+    UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity import time_to_crossing, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
-
-Array = NDArray[np.float64]
 
 # A thread gets no fewer samples than this: a millisecond's work, far more than starting it costs.
 _SAMPLES_FOR_A_THREAD = 4096
@@ -95,7 +95,7 @@ class StewartPlatform:
         self.parameters = parameters
         self.machine = _machine_numbers(parameters)
         """Its numbers (MACHINE,) as ``inverse_dynamics`` (the module) takes them."""
-        self._no_wrench = np.zeros((1, runtime.WRENCH))
+        self._no_wrench = np.zeros((1, WRENCH))
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> StewartPlatform:
@@ -128,7 +128,7 @@ class StewartPlatform:
         results = self.solve(rows, wrenches)
         _check_finite(rows, results)
         _check_solvable(rows, results)
-        return self._named(results.reshape(*shape, runtime.RESULT))
+        return self._named(results.reshape(*shape, RESULT))
 
     def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
         """
@@ -140,8 +140,8 @@ class StewartPlatform:
         # Another layout in memory would be compiled for anew, for seconds.
         rows = _compiled_for(rows)
         wrenches = self._no_wrench if wrenches is None else _compiled_for(wrenches)
-        results = np.empty((len(rows), runtime.RESULT))
-        _in_parts(len(rows), lambda part: runtime.solve(
+        results = np.empty((len(rows), RESULT))
+        _in_parts(len(rows), lambda part: kernel.solve(
             self.machine, rows[part], wrenches if len(wrenches) == 1 else wrenches[part],
             results[part]))
         return results
@@ -167,7 +167,7 @@ class StewartPlatform:
 
         """
         pushes = as_array('forces', forces, (6,))
-        load = as_array('wrench', wrench, (runtime.WRENCH,))
+        load = as_array('wrench', wrench, (WRENCH,))
         shape = common_shape(motion=motion.shape, forces=pushes.shape[:-1],
                              wrench=load.shape[:-1])
         rows = _copies(motion.rows, shape)
@@ -175,7 +175,7 @@ class StewartPlatform:
         _in_parts(len(rows), lambda part: forward_dynamics.solve(
             self.machine, rows[part], pushes[part], load[part]))
         _check_finite(rows, rows)
-        return Motion.of_rows(rows.reshape(*shape, runtime.MOTION))
+        return Motion.of_rows(rows.reshape(*shape, MOTION))
 
     def forward_kinematics(
             self, lengths: ArrayLike, guess: Motion | Pose | tuple[ArrayLike, ArrayLike]) -> Pose:
@@ -242,8 +242,8 @@ class StewartPlatform:
     def inverse_kinematics(self, position: ArrayLike, rotation: ArrayLike) -> Array:
         """Return the six leg lengths at a pose, (..., 6) [m]; MotionError for what is none."""
         motion = Motion(position, rotation)
-        results = self.solve(motion.rows.reshape(-1, runtime.MOTION))
-        lengths = results[:, runtime.LENGTHS:runtime.LENGTHS + 6]
+        results = self.solve(motion.rows.reshape(-1, MOTION))
+        lengths = results[:, LENGTHS]
         if not np.isfinite(lengths).all():
             raise MotionError('position: out of range, the leg lengths overflow')
         return lengths.reshape(*motion.shape, 6).copy()
@@ -292,23 +292,23 @@ class StewartPlatform:
               ) -> tuple[Array, Array, tuple[int, ...]]:
         """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
         if wrench is None:
-            return motion.rows.reshape(-1, runtime.MOTION), self._no_wrench, motion.shape
-        load = as_array('wrench', wrench, (runtime.WRENCH,))
+            return motion.rows.reshape(-1, MOTION), self._no_wrench, motion.shape
+        load = as_array('wrench', wrench, (WRENCH,))
         shape = common_shape(motion=motion.shape, wrench=load.shape[:-1])
         rows = (_copies(motion.rows, shape) if shape != motion.shape
-                else motion.rows.reshape(-1, runtime.MOTION))
+                else motion.rows.reshape(-1, MOTION))
         return rows, _copies(load, shape), shape
 
     @staticmethod
     def _named(results: Array) -> InverseDynamics:
         return InverseDynamics(
-            results[..., runtime.LENGTHS:runtime.LENGTHS + 6],
-            results[..., runtime.RATES:runtime.RATES + 6],
-            results[..., runtime.FORCES:runtime.FORCES + 6],
-            results[..., runtime.UNIT_LOAD_FORCES:runtime.UNIT_LOAD_FORCES + 6],
+            results[..., LENGTHS],
+            results[..., RATES],
+            results[..., FORCES],
+            results[..., UNIT_LOAD_FORCES],
             # [()] makes a number of an array without a shape
-            results[..., runtime.DETERMINANT][()], results[..., runtime.DETERMINANT_RATE][()],
-            results[..., runtime.CONDITION][()])
+            results[..., DETERMINANT][()], results[..., DETERMINANT_RATE][()],
+            results[..., CONDITION][()])
 
 
 def _in_parts(many: int, do: Callable[[slice], None]) -> None:
@@ -342,7 +342,7 @@ def _check_finite(rows: Array, results: Array) -> None:
 
 def _check_solvable(rows: Array, results: Array) -> None:
     """Raise SingularityError where the results of rows of motion say that J_inv is singular."""
-    condition = results[:, runtime.CONDITION]
+    condition = results[:, CONDITION]
     unsolvable = condition >= UNSOLVABLE_CONDITION
     if unsolvable.any():
         at = int(np.argmax(unsolvable))

@@ -33,6 +33,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Bytes, Integers
+
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 # A builtin_interfaces/Time holds stamps below it [ns].
 STAMPS_END = 2 ** 31 * 1_000_000_000
@@ -437,8 +439,8 @@ class Layout:
         return fields[1] * 1_000_000_000 + fields[2], self._values(fields)
 
     def read(
-            self, data: NDArray[np.uint8], starts: NDArray[np.int64],
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+            self, data: Bytes, starts: Integers,
+    ) -> tuple[Integers, Array] | None:
         """
         Return stamps (N,) [ns] and numbers (N, ...) of messages; None if one has another layout.
 
@@ -458,7 +460,7 @@ class Layout:
             return None
         return stamps, np.concatenate([rows[name] for name in self._parts], axis=1)
 
-    def write(self, stamps: NDArray[np.int64] | None, *numbers: NDArray[np.float64],
+    def write(self, stamps: Integers | None, *numbers: Array,
               ) -> NDArray[np.void]:
         """Return messages (N,), each an entry of ``size`` bytes."""
         rows = np.empty(len(numbers[0]), dtype=self.dtype)
@@ -474,7 +476,7 @@ FLOAT64_ARRAY = Layout(float64_array(_ZEROS), [(20, 6)], stamped=False)
 FLOAT64 = Layout(float64(0.0), [(4, 1)], stamped=False)
 
 
-def at_any_byte(data: NDArray[np.uint8], size: int) -> NDArray[np.void]:
+def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:
     """
     Return the entries of a size that begin at each of the bytes; they share its memory.
 
@@ -598,8 +600,8 @@ class LegTrajectory:
         if self._shared:
             self._records[:1].view('<u4')[:2] = size, 6
 
-    def put(self, first: int, points: NDArray[np.void], positions: NDArray[np.float64],
-            velocities: NDArray[np.float64], efforts: NDArray[np.float64]) -> None:
+    def put(self, first: int, points: NDArray[np.void], positions: Array,
+            velocities: Array, efforts: Array) -> None:
         """Write points from an index on; their time_from_start is that of the other points."""
         records = self._records[first:first + len(points)]
         records['position'], records['velocity'] = positions, velocities

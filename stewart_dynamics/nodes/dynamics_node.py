@@ -43,10 +43,11 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.kernel import MOTION
 from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.nodes.markers import Markers
 from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
@@ -60,7 +61,7 @@ from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.runtime.planned_trajectory_diagnostics import PlannedDiagnostics
 from stewart_dynamics.runtime.repeated_events import Series
 from stewart_dynamics.runtime.setpoints import Refusal, Setpoints
-from stewart_dynamics.runtime.step import NO_WRENCH, Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.runtime.step import Output, OUTPUT_TYPES, Setpoint, Step
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,

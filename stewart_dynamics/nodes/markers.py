@@ -25,16 +25,15 @@ from collections.abc import Sequence
 from struct import pack, Struct
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Six
 from stewart_dynamics.mechanics.plausibility import level_axes
 from stewart_dynamics.mechanics.rotation import quaternion_of
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics import ERROR, OK, singularity_level, WARN
-from stewart_dynamics.runtime.step import Output, Six
+from stewart_dynamics.runtime.step import Output
 
-Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
 
 # Of visualization_msgs/Marker.

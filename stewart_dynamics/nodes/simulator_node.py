@@ -30,6 +30,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.messages import cdr
@@ -37,7 +38,6 @@ from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
 from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant, SimulatorParameters
 from stewart_dynamics.runtime.repeated_events import Series
 from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE, Refusal, Setpoints
-from stewart_dynamics.runtime.step import Six
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,

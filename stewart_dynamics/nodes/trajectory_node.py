@@ -31,10 +31,10 @@ from rclpy.time import Time
 from std_msgs.msg import Header
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from stewart_dynamics.mechanics.kernel import MOTION
 from stewart_dynamics.mechanics.reference_motion import (
     motion_at, sample_count, sample_time, TrajectoryParameters)
 from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
 from stewart_dynamics.runtime import setpoints as inputs
 

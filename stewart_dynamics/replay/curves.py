@@ -27,9 +27,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.replay.summary import FIRST, longest_step
-
-Array = NDArray[np.float64]
 
 # More buckets than a plot has pixels across gain nothing. Even, since neighbours are merged.
 BUCKETS = 1024
@@ -145,7 +144,7 @@ class Curves:
         return times, values
 
     def _fold(self, buckets: slice, seconds: Array, values: Array,
-              missing: NDArray[np.bool_] | None) -> None:
+              missing: Flags | None) -> None:
         """Put samples, equally many for each of these buckets, into them."""
         shape = (len(values), buckets.stop - buckets.start, -1)
         times = seconds.reshape(shape[1:])

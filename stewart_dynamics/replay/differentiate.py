@@ -51,16 +51,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics import rotation as rotations
-from stewart_dynamics.mechanics.kernel import MOTION, WRENCH
+from stewart_dynamics.mechanics.rows import MOTION, WRENCH
 from stewart_dynamics.runtime.step import Batch
-
-Array = NDArray[np.float64]
-Stamps = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # Poses that are worked off at once.
 WINDOW = 4096

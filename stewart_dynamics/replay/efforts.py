@@ -22,16 +22,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stewart_dynamics.arrays import Array, Bytes, Flags, Stamps
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE
-
-Array = NDArray[np.float64]
-Stamps = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-Flags = NDArray[np.bool_]
 
 # Why a message is refused, beside being malformed or not finite.
 LACKING = 'lacks one of the joints'

@@ -41,14 +41,11 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, Footer, Statistics
 import numpy as np
-from numpy.typing import NDArray
 import zstandard
 
+from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.errors import BagError, one_line
 from stewart_dynamics.mechanics.jit import entry_point
-
-Integers = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 
 MAGIC = b'\x89MCAP0\r\n'
 

@@ -73,15 +73,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
 from stewart_dynamics.mechanics.kernel import COULOMB_RATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.step import Batch, Outputs
-
-Array = NDArray[np.float64]
-Stamps = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # What waits for the other side at most, setpoints and measured samples.
 _SETPOINTS_WAITING = 2 ** 15
@@ -345,7 +341,7 @@ def _interpolated(stamps: Stamps, at: Stamps, values: Array, gap: int) -> Array:
 
 class _Rows(NamedTuple):
     stamps: Stamps
-    passes: NDArray[np.int64]
+    passes: Integers
     rows: Array
 
     def part(self, which: slice | Stamps | Flags) -> _Rows:

@@ -35,8 +35,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.mechanics.force_breakdown import ForceCauses
 from stewart_dynamics.mechanics.singularity import Singularity
@@ -50,7 +50,7 @@ from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime import setpoints as inputs
 from stewart_dynamics.runtime.setpoints import Messages, Refusal, Setpoints
-from stewart_dynamics.runtime.step import Batch, Stamps, Step
+from stewart_dynamics.runtime.step import Batch, Step
 
 DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
 NODE = '/stewart_dynamics'
@@ -306,7 +306,7 @@ class _Run:
             self._compared(self._comparison.add_setpoints(seconds, setpoints, outputs))
         return len(setpoints.stamps)
 
-    def _seconds(self, stamps: Stamps) -> NDArray[np.float64]:
+    def _seconds(self, stamps: Stamps) -> Array:
         """Return the time of the motion since the first setpoint; it never goes back."""
         steps = np.diff(stamps, prepend=stamps[0] if self._stamp is None else self._stamp)
         # Seconds apart from nanoseconds: clocks that differ by years sum up to more than 2^63 ns.
@@ -314,10 +314,10 @@ class _Run:
         whole, rest = self._elapsed[0] + np.cumsum(whole), self._elapsed[1] + np.cumsum(rest)
         self._stamp = int(stamps[-1])
         self._elapsed = int(whole[-1] + rest[-1] // _SECOND), int(rest[-1] % _SECOND)
-        seconds: NDArray[np.float64] = (whole + rest // _SECOND) + (rest % _SECOND) * 1e-9
+        seconds: Array = (whole + rest // _SECOND) + (rest % _SECOND) * 1e-9
         return seconds
 
-    def _take_measured(self, messages: Messages, which: NDArray[np.bool_]) -> None:
+    def _take_measured(self, messages: Messages, which: Flags) -> None:
         assert self._comparison is not None
         stamps, efforts, refused = self._efforts.read(
             messages.data, messages.starts[which], messages.sizes[which])

@@ -29,15 +29,15 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
 import numpy as np
-from numpy.typing import NDArray
 import orjson
 from rosbags.typesys import get_typestore, Stores
 import yaml  # type: ignore[import-untyped]
 
+from stewart_dynamics.arrays import Bytes, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.messages.cdr import at_any_byte
 from stewart_dynamics.replay.mcap_file import MAGIC
-from stewart_dynamics.runtime.step import OUTPUT_TYPES, Outputs, Stamps, Step
+from stewart_dynamics.runtime.step import OUTPUT_TYPES, Outputs, Step
 
 _LIBRARY = 'stewart_dynamics'
 # Of a message record: opcode, length, channel, sequence, when it was logged and published.
@@ -140,7 +140,7 @@ class OutputBag:
     def _declarations(self) -> bytes:
         return b''.join(map(_bytes, (*self._schemas, *self._channels.values())))
 
-    def _write_chunk(self, content: NDArray[np.uint8], begin: int, end: int,
+    def _write_chunk(self, content: Bytes, begin: int, end: int,
                      indexes: dict[int, list[tuple[Stamps, Stamps]]]) -> None:
         at = self._file.tell()
         # As mcap's Chunk writes it, without two copies of the content.

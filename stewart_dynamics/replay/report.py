@@ -35,16 +35,15 @@ import re
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.force_breakdown import CAUSES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.curves import Curves, Frames
 from stewart_dynamics.replay.report_tables import bag_name, parameter_table, Tables
 from stewart_dynamics.runtime.step import Batch, Outputs
-
-Array = NDArray[np.float64]
 
 TEMPLATE = Path(__file__).with_suffix('.html')
 

@@ -28,14 +28,11 @@ import textwrap
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.force_breakdown import CAUSES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.step import Batch, LIMITS, Outputs
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # So many crossings and warnings are told one by one; all of them are counted.
 TOLD = 100
@@ -184,7 +181,7 @@ class _Broken(NamedTuple):
     """By leg, how often a limit is broken, and when first."""
 
     bound: Array
-    setpoints: NDArray[np.int64]
+    setpoints: Integers
     first_at: Array
 
     def add(self, seconds: Array, broken: Flags) -> None:

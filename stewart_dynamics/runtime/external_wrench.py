@@ -41,27 +41,24 @@ the difference quotient alone has sqrt(2) M s / dt.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 import math
 from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics import forward_kinematics
-from stewart_dynamics.mechanics import kernel as runtime
-from stewart_dynamics.mechanics.jit import entry_point, inlined, source_digest
+from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.plausibility import homes
+from stewart_dynamics.mechanics.rows import FORCES, MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.step import NO_WRENCH, Six
-
-Array = NDArray[np.float64]
 
 # Under the node's name.
 EXTERNAL_WRENCH = 'external_wrench'
@@ -73,17 +70,17 @@ _OUT_OF_RANGE = 3
 # the filter, time since the last one (0: there is none), motion of the last one or guess; then,
 # written, motion (behind the last one: two rows for solve), filter after, measured - model forces,
 # steps and residual of the pose, code.
-_LENGTHS = runtime.MACHINE
+_LENGTHS = kernel.MACHINE
 _RATES = _LENGTHS + 6
 _FORCES = _RATES + 6
 _KNOWN = _FORCES + 6
-_BEFORE = _KNOWN + runtime.WRENCH
+_BEFORE = _KNOWN + WRENCH
 _GAIN = _BEFORE + 6
 _INTERVAL = _GAIN + 1
 _MOTION = _INTERVAL + 1
-_RESULT = _MOTION + runtime.MOTION
+_RESULT = _MOTION + MOTION
 _MOTION_AFTER = _RESULT
-_AFTER = _MOTION_AFTER + runtime.MOTION
+_AFTER = _MOTION_AFTER + MOTION
 _DIFFERENCES = _AFTER + 6
 _STEPS = _DIFFERENCES + 6
 _RESIDUAL = _STEPS + 1
@@ -144,53 +141,46 @@ def _add_end(numbers: Array, machine: Array, motion: Array, result: Array) -> No
     rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
                 motion[10], motion[11])
     for leg in range(6):
-        a, _length, _inverse_length, s = runtime.leg_line(machine, leg, position, rotation)
+        a, _length, _inverse_length, s = kernel.leg_line(machine, leg, position, rotation)
         m = cross(a, s)
-        half = 0.5 * (numbers[_FORCES + leg] - result[runtime.FORCES + leg])
+        half = 0.5 * (numbers[_FORCES + leg] - result[FORCES.start + leg])
         numbers[_DIFFERENCES + leg] += half
         for n in range(3):
             numbers[_AFTER + n] -= half * s[n]
             numbers[_AFTER + 3 + n] -= half * m[n]
 
 
-def _entry_point(source: str) -> Callable[[Array], None]:
-    @entry_point
-    def one(numbers: Array) -> None:
-        """Write what one measurement gives; an array costs time to pass."""
-        _ = source  # part of the key of the kept machine code: see source_digest
-        machine = numbers[:runtime.MACHINE]
-        motion = numbers[_MOTION_AFTER:_MOTION_AFTER + runtime.MOTION]
-        motion[:] = numbers[_MOTION:_MOTION + runtime.MOTION]
-        code, numbers[_STEPS], numbers[_RESIDUAL] = forward_kinematics.pose(
-            machine, numbers[_LENGTHS:_LENGTHS + 6], motion)
-        numbers[_CODE] = code
-        if code != forward_kinematics.FOUND:
-            return
-        forward_kinematics.twist(machine, numbers[_RATES:_RATES + 6], motion)
-        dt = numbers[_INTERVAL]
+@entry_point
+def _one(numbers: Array) -> None:
+    """Write what one measurement gives; an array costs time to pass."""
+    machine = numbers[:kernel.MACHINE]
+    motion = numbers[_MOTION_AFTER:_MOTION_AFTER + MOTION]
+    motion[:] = numbers[_MOTION:_MOTION + MOTION]
+    code, numbers[_STEPS], numbers[_RESIDUAL] = forward_kinematics.pose(
+        machine, numbers[_LENGTHS:_LENGTHS + 6], motion)
+    numbers[_CODE] = code
+    if code != forward_kinematics.FOUND:
+        return
+    forward_kinematics.twist(machine, numbers[_RATES:_RATES + 6], motion)
+    dt = numbers[_INTERVAL]
+    for n in range(6):
+        motion[18 + n] = (motion[12 + n] - numbers[_MOTION + 12 + n]) / dt if dt > 0.0 else 0.0
+        numbers[_MOTION + 18 + n] = motion[18 + n]
+        numbers[_AFTER + n] = 0.0
+        numbers[_DIFFERENCES + n] = 0.0
+    if dt > 0.0:
+        motions = numbers[_MOTION:_MOTION_AFTER + MOTION].reshape(2, MOTION)
+        results = np.empty((2, RESULT))
+        kernel.solve(machine, motions, numbers[_KNOWN:_KNOWN + WRENCH].reshape(
+            1, WRENCH), results)
+        for end in range(2):
+            _add_end(numbers, machine, motions[end], results[end])
         for n in range(6):
-            motion[18 + n] = (motion[12 + n] - numbers[_MOTION + 12 + n]) / dt if dt > 0.0 else 0.0
-            numbers[_MOTION + 18 + n] = motion[18 + n]
-            numbers[_AFTER + n] = 0.0
-            numbers[_DIFFERENCES + n] = 0.0
-        if dt > 0.0:
-            motions = numbers[_MOTION:_MOTION_AFTER + runtime.MOTION].reshape(2, runtime.MOTION)
-            results = np.empty((2, runtime.RESULT))
-            runtime.solve(machine, motions, numbers[_KNOWN:_KNOWN + runtime.WRENCH].reshape(
-                1, runtime.WRENCH), results)
-            for end in range(2):
-                _add_end(numbers, machine, motions[end], results[end])
-            for n in range(6):
-                before = numbers[_BEFORE + n]
-                numbers[_AFTER + n] = before + numbers[_GAIN] * (numbers[_AFTER + n] - before)
-        for n in range(_RESULT, _STEPS):
-            if not math.isfinite(numbers[n]):
-                numbers[_CODE] = _OUT_OF_RANGE
-
-    return one
-
-
-_one = _entry_point(source_digest())
+            before = numbers[_BEFORE + n]
+            numbers[_AFTER + n] = before + numbers[_GAIN] * (numbers[_AFTER + n] - before)
+    for n in range(_RESULT, _STEPS):
+        if not math.isfinite(numbers[n]):
+            numbers[_CODE] = _OUT_OF_RANGE
 
 
 class ExternalWrench:
@@ -209,7 +199,7 @@ class ExternalWrench:
         self._parameters = parameters
         self._numbers = np.zeros(_NUMBERS)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[:runtime.MACHINE] = StewartPlatform(parameters).machine
+        self._numbers[:kernel.MACHINE] = StewartPlatform(parameters).machine
         self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
         self._most_force, self._most_moment = (
@@ -254,7 +244,7 @@ class ExternalWrench:
                     break
         if result[_CODE - _RESULT] != forward_kinematics.FOUND:
             raise _error(measurement, result)
-        motion = result[:runtime.MOTION]
+        motion = result[:MOTION]
         if not 0 < interval <= self._longest_gap:
             return Estimate(measurement.stamp, motion, None, None)
         fx, fy, fz, tx, ty, tz = result[_AFTER - _RESULT:_DIFFERENCES - _RESULT]

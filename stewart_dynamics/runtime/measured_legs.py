@@ -26,13 +26,13 @@ from operator import itemgetter
 from struct import Struct
 from typing import Any
 
+from stewart_dynamics.arrays import Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
 from stewart_dynamics.runtime.setpoints import (
     MALFORMED, NOT_FINITE, OUT_OF_RANGE, Refusal, TOO_OLD, TWICE)
-from stewart_dynamics.runtime.step import Six
 
 # Under the node's name.
 MEASURED_LEGS = 'measured_legs'

@@ -31,11 +31,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Flags, Integers, Six
 from stewart_dynamics.mechanics import forward_kinematics
-from stewart_dynamics.mechanics import kernel as runtime
 from stewart_dynamics.mechanics.interpolation import Cubics, Interpolation
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages import cdr
@@ -43,7 +45,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.setpoints import (
     frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, QUATERNION_TOLERANCE,
     unit_details, WRONG_FRAME)
-from stewart_dynamics.runtime.step import Array, Excess, LIMITS, Six
+from stewart_dynamics.runtime.step import Excess, LIMITS
 
 INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
@@ -92,7 +94,7 @@ class Outcome(NamedTuple):
 
 
 # Behind which points of a block samples are (M,), and how much of the way is done there (M,).
-_Samples = tuple[NDArray[np.int64], Array]
+_Samples = tuple[Integers, Array]
 
 
 class _Refused(Exception):
@@ -104,7 +106,7 @@ class _Refused(Exception):
 
 def compile_ahead(parameters: Parameters) -> None:
     """Compile what the work on a trajectory calls: setpoints shall not wait for the first one."""
-    platform, rows = StewartPlatform(parameters), np.zeros((1, runtime.MOTION))
+    platform, rows = StewartPlatform(parameters), np.zeros((1, MOTION))
     platform.solve(rows)
     forward_kinematics.twists(platform.machine, np.zeros((1, 6)), rows)
     codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
@@ -170,7 +172,7 @@ class _Work:
         self._checks = _Checks(parameters)
         self._legs_checks = _Checks(parameters)
         self._times = np.empty(many, dtype=np.int64)  # [ns]
-        self._motions = np.empty((many, runtime.MOTION))
+        self._motions = np.empty((many, MOTION))
         self._quaternions = np.empty((many, 4))
         self._samples = 0
 
@@ -230,17 +232,17 @@ class _Work:
         block = slice(first, end + 1)
         motions, times = self._motions[block], _seconds(self._times[block])
         results = self._platform.solve(motions, self._wrench)
-        lengths = results[:, runtime.LENGTHS:runtime.LENGTHS + 6]
+        lengths = results[:, LENGTHS]
         self._answer.put(
             first, self._message.points(first, end + 1),
             lengths - self._parameters['geometry.zero_length'],
-            results[:, runtime.RATES:runtime.RATES + 6],
-            results[:, runtime.FORCES:runtime.FORCES + 6])
+            results[:, RATES],
+            results[:, FORCES])
         durations = _seconds(np.diff(self._times[block]))
         with np.errstate(all='ignore'):
             between = Interpolation(durations, motions, self._quaternions[block])
             many = self._samples_between(first, between)
-        legs = Cubics.between(lengths, results[:, runtime.RATES:runtime.RATES + 6],
+        legs = Cubics.between(lengths, results[:, RATES],
                               durations[:, None])
         near = many == 1.0
         dips = self._checks.take(times, durations, results, np.ones_like(near), near)
@@ -353,7 +355,7 @@ class _Work:
         return float(self._times[-1] - self._times[0]) * 1e-9
 
 
-def _seconds(nanoseconds: NDArray[np.int64]) -> Array:
+def _seconds(nanoseconds: Integers) -> Array:
     return np.multiply(nanoseconds, 1e-9, dtype=float)
 
 
@@ -393,8 +395,8 @@ class _Checks:
             self._shortest - _LENGTH_TOLERANCE, self._longest + _LENGTH_TOLERANCE)
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
 
-    def take(self, times: Array, durations: Array, results: Array, joined: NDArray[np.bool_],
-             near: NDArray[np.bool_]) -> list[int]:
+    def take(self, times: Array, durations: Array, results: Array, joined: Flags,
+             near: Flags) -> list[int]:
         """
         Note what is wrong with samples and between them.
 
@@ -433,13 +435,13 @@ class _Checks:
             time, -1, SINGULAR, ": the legs' way leads to no pose on this side of a singularity"))
 
     def take_singularities(self, times: Array, durations: Array, results: Array,
-                           near: NDArray[np.bool_]) -> list[int]:
+                           near: Flags) -> list[int]:
         """Do what ``take`` does, for singularities alone."""
         self._take_conditions(times, results)
         return self._take_determinants(times, durations, results, near)
 
     def _take_conditions(self, times: Array, results: Array) -> None:
-        condition = results[:, runtime.CONDITION]
+        condition = results[:, CONDITION]
         n = int(np.argmax(condition))
         if condition[n] > self.condition:
             self.condition, self.condition_time = float(condition[n]), float(times[n])
@@ -450,7 +452,7 @@ class _Checks:
 
     def _take_forces(self, results: Array) -> None:
         """Note the largest."""
-        forces = np.abs(results[:, runtime.FORCES:runtime.FORCES + 6])
+        forces = np.abs(results[:, FORCES])
         largest = float(forces.max())
         if largest > self.force:
             self.force, self.force_leg = largest, int(np.argmax(forces)) % 6
@@ -458,8 +460,8 @@ class _Checks:
 
     def _take_limits(self, times: Array, results: Array) -> None:
         """Check the samples themselves."""
-        lengths, rates, forces = (results[:, at:at + 6] for at in (
-            runtime.LENGTHS, runtime.RATES, runtime.FORCES))
+        lengths, rates, forces = (results[:, at] for at in (
+            LENGTHS, RATES, FORCES))
         for limit, values, bounds, broken in (
                 ('limits.length_min', lengths, self._shortest, lengths < self._low),
                 ('limits.length_max', lengths, self._longest, lengths > self._high),
@@ -469,9 +471,9 @@ class _Checks:
                 times[:, None], broken.shape))
 
     def _take_cubics(self, times: Array, durations: Array, results: Array,
-                     joined: NDArray[np.bool_]) -> None:
+                     joined: Flags) -> None:
         """Check polynomials of third degree that have the samples' lengths and rates."""
-        lengths, rates = (results[:, at:at + 6] for at in (runtime.LENGTHS, runtime.RATES))
+        lengths, rates = (results[:, at] for at in (LENGTHS, RATES))
         cubics = Cubics.between(lengths, rates, durations[:, None])
         # Most are within their control points, and those within the limits.
         low, high = cubics.hull()
@@ -495,11 +497,11 @@ class _Checks:
                           np.abs(values) > self._fastest, begin + part * duration)
 
     def _take_determinants(self, times: Array, durations: Array, results: Array,
-                           near: NDArray[np.bool_]) -> list[int]:
+                           near: Flags) -> list[int]:
         """Check whether det(J) passes zero between samples; return where that is not clear."""
-        determinants = results[:, runtime.DETERMINANT]
-        condition = results[:, runtime.CONDITION]
-        cubics = Cubics.between(determinants, results[:, runtime.DETERMINANT_RATE], durations)
+        determinants = results[:, DETERMINANT]
+        condition = results[:, CONDITION]
+        cubics = Cubics.between(determinants, results[:, DETERMINANT_RATE], durations)
         cubics = Cubics._make(each * np.sign(determinants[:-1]) for each in cubics)
         if (crossed := near & (cubics.end < 0.0)).any():
             n = int(np.argmax(crossed))
@@ -514,7 +516,7 @@ class _Checks:
             (lowest < smaller) & (foretold >= self._stop * lowest))].tolist()
         return found
 
-    def _take_broken(self, limit: str, values: Array, bounds: Array, broken: NDArray[np.bool_],
+    def _take_broken(self, limit: str, values: Array, bounds: Array, broken: Flags,
                      times: Array) -> None:
         """Note the first of the places (M, 6) where a limit is broken."""
         if not broken.any():
@@ -525,6 +527,6 @@ class _Checks:
             float(times[n, leg]), excess.leg, LIMIT, f' {excess.words(self._joints)}'))
 
     def _singular(self, time: float, result: Array, words: str) -> None:
-        leg = int(np.argmax(result[runtime.UNIT_LOAD_FORCES:runtime.UNIT_LOAD_FORCES + 6]))
+        leg = int(np.argmax(result[UNIT_LOAD_FORCES]))
         self.troubles.append(_Trouble(
             float(time), leg, SINGULAR, f': {words}, worst for {self._joints[leg]}'))

@@ -29,7 +29,7 @@ but the error of the method.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 import math
 from operator import sub
 from struct import Struct
@@ -37,20 +37,18 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stewart_dynamics.arrays import Array, Six
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.forward_dynamics import acceleration, WORK
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined, source_digest
-from stewart_dynamics.mechanics.kernel import COULOMB_RATE, leg_line, MOTION
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.kernel import COULOMB_RATE, leg_line
 from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, scale, Vector3
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import inertia_matrix, Parameter, PARAMETERS, Parameters
-from stewart_dynamics.runtime.step import Six
-
-Array = NDArray[np.float64]
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
@@ -232,79 +230,72 @@ def _legs_of(machine: Array, state: Array, result: Array) -> float:
     return fastest
 
 
-def _entry_point(source: str) -> Callable[..., None]:
-    @entry_point
-    def advance(machine: Array, legs: Array, loads: Array, state: Array, result: Array,
-                steps: int, h: float) -> None:
-        """
-        Take steps of h [s] and write the state and, beside it, the result.
+@entry_point
+def _advance(machine: Array, legs: Array, loads: Array, state: Array, result: Array,
+             steps: int, h: float) -> None:
+    """
+    Take steps of h [s] and write the state and, beside it, the result.
 
-        Parameters
-        ----------
-        machine : (MACHINE,)
-            The machine's numbers as ``inverse_dynamics`` has them.
-        legs : (36,)
-            Shortest and longest length, stiffness and damping of the stops, strongest force.
-        loads : (12,)
-            Six commands, force and moment on the platform; the commands are clipped in place.
-        state : (13,)
-            Where it begins, and then where it ends: in the last state that was sound, with its
-            twist taken away, where a step cannot be computed.
-        result : (25,)
-            Written.
-        steps, h
-            How many, and how long.
+    Parameters
+    ----------
+    machine : (MACHINE,)
+        The machine's numbers as ``inverse_dynamics`` has them.
+    legs : (36,)
+        Shortest and longest length, stiffness and damping of the stops, strongest force.
+    loads : (12,)
+        Six commands, force and moment on the platform; the commands are clipped in place.
+    state : (13,)
+        Where it begins, and then where it ends: in the last state that was sound, with its
+        twist taken away, where a step cannot be computed.
+    result : (25,)
+        Written.
+    steps, h
+        How many, and how long.
 
-        """
-        _ = source  # part of the key of the kept machine code: see source_digest
-        motion, forces, work = np.empty(MOTION), np.empty(6), np.empty(WORK)
-        stage, slope, mean = np.empty(_STATE), np.empty(_STATE), np.empty(_STATE)
-        for leg in range(6):
-            most = legs[_STRONGEST + leg]
-            loads[leg] = min(max(loads[leg], -most), most)
-            result[_FORCES + leg] = loads[leg]
-        sound = h * _legs_of(machine, state, result) <= _LARGEST_MOVE
-        for _step in range(steps):
-            _slope(machine, legs, state, loads, motion, forces, work, slope)
-            for n in range(_STATE):
-                mean[n] = slope[n]
-                stage[n] = state[n] + 0.5 * h * slope[n]
-            _slope(machine, legs, stage, loads, motion, forces, work, slope)
-            for n in range(_STATE):
-                mean[n] += 2.0 * slope[n]
-                stage[n] = state[n] + 0.5 * h * slope[n]
-            _slope(machine, legs, stage, loads, motion, forces, work, slope)
-            for n in range(_STATE):
-                mean[n] += 2.0 * slope[n]
-                stage[n] = state[n] + h * slope[n]
-            _slope(machine, legs, stage, loads, motion, forces, work, slope)
-            square = 0.0
-            for n in range(_STATE):
-                stage[n] = state[n] + h / 6.0 * (mean[n] + slope[n])
-                sound = sound and math.isfinite(stage[n])
-                square += stage[n] * stage[n] if _QUATERNION <= n < _TWIST else 0.0
-            for n in range(_QUATERNION, _TWIST):
-                stage[n] /= math.sqrt(square)
-            sound = sound and h * _legs_of(machine, stage, result) <= _LARGEST_MOVE
-            if not sound:
-                break
-            for n in range(_STATE):
-                state[n] = stage[n]
+    """
+    motion, forces, work = np.empty(MOTION), np.empty(6), np.empty(WORK)
+    stage, slope, mean = np.empty(_STATE), np.empty(_STATE), np.empty(_STATE)
+    for leg in range(6):
+        most = legs[_STRONGEST + leg]
+        loads[leg] = min(max(loads[leg], -most), most)
+        result[_FORCES + leg] = loads[leg]
+    sound = h * _legs_of(machine, state, result) <= _LARGEST_MOVE
+    for _step in range(steps):
         _slope(machine, legs, state, loads, motion, forces, work, slope)
-        for n in range(6):
-            sound = sound and math.isfinite(slope[_TWIST + n])
-        for n in range(6):
-            if not sound:
-                state[_TWIST + n] = 0.0
-                result[_FORCES + n] = 0.0
-            result[_ACCELERATION + n] = slope[_TWIST + n] if sound else 0.0
-        _legs_of(machine, state, result)
-        result[_SOUND] = 1.0 if sound else 0.0
-
-    return advance
-
-
-_advance = _entry_point(source_digest())
+        for n in range(_STATE):
+            mean[n] = slope[n]
+            stage[n] = state[n] + 0.5 * h * slope[n]
+        _slope(machine, legs, stage, loads, motion, forces, work, slope)
+        for n in range(_STATE):
+            mean[n] += 2.0 * slope[n]
+            stage[n] = state[n] + 0.5 * h * slope[n]
+        _slope(machine, legs, stage, loads, motion, forces, work, slope)
+        for n in range(_STATE):
+            mean[n] += 2.0 * slope[n]
+            stage[n] = state[n] + h * slope[n]
+        _slope(machine, legs, stage, loads, motion, forces, work, slope)
+        square = 0.0
+        for n in range(_STATE):
+            stage[n] = state[n] + h / 6.0 * (mean[n] + slope[n])
+            sound = sound and math.isfinite(stage[n])
+            square += stage[n] * stage[n] if _QUATERNION <= n < _TWIST else 0.0
+        for n in range(_QUATERNION, _TWIST):
+            stage[n] /= math.sqrt(square)
+        sound = sound and h * _legs_of(machine, stage, result) <= _LARGEST_MOVE
+        if not sound:
+            break
+        for n in range(_STATE):
+            state[n] = stage[n]
+    _slope(machine, legs, state, loads, motion, forces, work, slope)
+    for n in range(6):
+        sound = sound and math.isfinite(slope[_TWIST + n])
+    for n in range(6):
+        if not sound:
+            state[_TWIST + n] = 0.0
+            result[_FORCES + n] = 0.0
+        result[_ACCELERATION + n] = slope[_TWIST + n] if sound else 0.0
+    _legs_of(machine, state, result)
+    result[_SOUND] = 1.0 if sound else 0.0
 
 
 class Plant:

@@ -30,13 +30,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stewart_dynamics.mechanics.kernel import MOTION
+from stewart_dynamics.arrays import Array, Bytes, Integers, NO_WRENCH, Six, Stamps
 from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.step import Array, Batch, NO_WRENCH, Setpoint, Six, Stamps
+from stewart_dynamics.runtime.step import Batch, Setpoint
 
 # Of each topic under the node's name: type, how it is read.
 POSE = 'setpoint/pose'
@@ -77,15 +77,15 @@ class Messages(NamedTuple):
 
     topics: tuple[str, ...]
     """Keys of INPUT_TYPES."""
-    of_topic: NDArray[np.int64]
+    of_topic: Integers
     """(M,): which of the topics."""
     times: Stamps
     """(M,): when each was recorded [ns]."""
-    data: NDArray[np.uint8]
+    data: Bytes
     """Bytes in which all of them are."""
-    starts: NDArray[np.int64]
+    starts: Integers
     """(M,): where each begins in them."""
-    sizes: NDArray[np.int64]
+    sizes: Integers
     """(M,): how long each is."""
 
     def chosen(self, which: Any) -> Messages:
@@ -398,7 +398,7 @@ class Setpoints:
         wrench_at, wrenches = came.get(WRENCH, _NOWHERE), samples.pop(WRENCH, (None, None))[1]
         stamps: dict[str, Stamps] = {}
         # Where each of a topic's samples came, -1 for those that wait already.
-        places: dict[str, NDArray[np.int64]] = {}
+        places: dict[str, Integers] = {}
         for topic in self.topics:
             fresh, places_of = samples.get(topic, _NO_SAMPLES)[0], came.get(topic, _NOWHERE)
             waiting = np.fromiter(self._waiting[topic], dtype=np.int64)
@@ -436,7 +436,7 @@ class Setpoints:
         return Batch(common, motions, loads, np.zeros(len(common), dtype=bool),
                      messages.times[complete])
 
-    def _samples(self, topic: str, messages: Messages, at: NDArray[np.int64],
+    def _samples(self, topic: str, messages: Messages, at: Integers,
                  ) -> tuple[Stamps, Array] | None:
         """Return stamps and values of a topic's messages; None where one is not ordinary."""
         if not len(at):
@@ -480,8 +480,8 @@ class Setpoints:
         return np.concatenate([np.array(waiting), fresh.reshape(-1, len(waiting[0]))])
 
     @staticmethod
-    def _overflows(stamps: Stamps, places: NDArray[np.int64], common: Stamps,
-                   complete: NDArray[np.int64]) -> bool:
+    def _overflows(stamps: Stamps, places: Integers, common: Stamps,
+                   complete: Integers) -> bool:
         """Return whether, at any time, more than WAITING samples of a topic wait."""
         if len(stamps) <= WAITING:
             return False

@@ -21,7 +21,7 @@ whether setpoints come one at a time or by the thousand.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 import math
 from operator import sub
 from struct import Struct
@@ -30,21 +30,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.mechanics import kernel as runtime
-from stewart_dynamics.mechanics.jit import entry_point, inlined, source_digest
+from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
+from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics.jit import entry_point, inlined
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
+    UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity import (
     advance, CAUSE, LAST, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
-
-Array = NDArray[np.float64]
-Stamps = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
-Six = tuple[float, float, float, float, float, float]
-
-NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 _QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
                'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
@@ -147,37 +143,37 @@ class Outputs(NamedTuple):
     @property
     def lengths(self) -> Array:
         """(N, 6) [m]."""
-        return self.results[:, runtime.LENGTHS:runtime.LENGTHS + 6]
+        return self.results[:, LENGTHS]
 
     @property
     def rates(self) -> Array:
         """(N, 6) [m/s]."""
-        return self.results[:, runtime.RATES:runtime.RATES + 6]
+        return self.results[:, RATES]
 
     @property
     def demanded_forces(self) -> Array:
         """As the dynamics have them (N, 6) [N]; nan where J_inv cannot be solved."""
-        return self.results[:, runtime.FORCES:runtime.FORCES + 6]
+        return self.results[:, FORCES]
 
     @property
     def unit_load_forces(self) -> Array:
         """(N, 6)."""
-        return self.results[:, runtime.UNIT_LOAD_FORCES:runtime.UNIT_LOAD_FORCES + 6]
+        return self.results[:, UNIT_LOAD_FORCES]
 
     @property
     def determinants(self) -> Array:
         """(N,) [m^3]."""
-        return self.results[:, runtime.DETERMINANT]
+        return self.results[:, DETERMINANT]
 
     @property
     def determinant_rates(self) -> Array:
         """(N,) [m^3/s]."""
-        return self.results[:, runtime.DETERMINANT_RATE]
+        return self.results[:, DETERMINANT_RATE]
 
     @property
     def conditions(self) -> Array:
         """(N,)."""
-        return self.results[:, runtime.CONDITION]
+        return self.results[:, CONDITION]
 
     @property
     def times_to_crossing(self) -> Array:
@@ -208,14 +204,14 @@ _SETTINGS = _LIMITS + 6 * len(LIMITS)
 
 # One setpoint in numbers: machine, settings, motion, wrench, state before, restart, whether the
 # stamp is one; then, written, state after, result, forces, whether it is answered and exceeds.
-_ONE_SETTINGS = runtime.MACHINE
+_ONE_SETTINGS = kernel.MACHINE
 _ONE_MOTION = _ONE_SETTINGS + _SETTINGS
-_ONE_WRENCH = _ONE_MOTION + runtime.MOTION
-_ONE_STATE = _ONE_WRENCH + runtime.WRENCH
+_ONE_WRENCH = _ONE_MOTION + MOTION
+_ONE_STATE = _ONE_WRENCH + WRENCH
 _ONE_RESTART = _ONE_STATE + STATE
 _ONE_STAMP = _ONE_RESTART + 1
 _ONE_RESULT = _ONE_STAMP + 1
-_ONE_FORCES = _ONE_RESULT + runtime.RESULT
+_ONE_FORCES = _ONE_RESULT + RESULT
 _ONE_AFTER = _ONE_FORCES + 6
 _ONE_ANSWERED = _ONE_AFTER + STATE
 _ONE_EXCEEDING = _ONE_ANSWERED + 1
@@ -229,24 +225,24 @@ def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result:
            forces: Array) -> tuple[bool, bool]:
     """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
     finite = is_stamp
-    for k in range(runtime.RESULT):
+    for k in range(RESULT):
         finite = finite and math.isfinite(result[k])
     if not finite:
         return False, False
     if restart:
         state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
-    condition = result[runtime.CONDITION]
-    advance(state, settings, result[runtime.DETERMINANT], result[runtime.DETERMINANT_RATE],
+    condition = result[CONDITION]
+    advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
     solved = condition < UNSOLVABLE_CONDITION
     published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS] > 0.0)
     exceeding = False
     for leg in range(6):
-        length, rate = result[runtime.LENGTHS + leg], result[runtime.RATES + leg]
-        force = result[runtime.FORCES + leg]
+        length, rate = result[LENGTHS.start + leg], result[RATES.start + leg]
+        force = result[FORCES.start + leg]
         most = settings[_LIMITS + 18 + leg]
         if not solved:
-            result[runtime.FORCES + leg] = np.nan
+            result[FORCES.start + leg] = np.nan
         forces[leg] = min(max(force, -most), most) if published else np.nan
         if (length < settings[_LIMITS + leg] or length > settings[_LIMITS + 6 + leg]
                 or abs(rate) > settings[_LIMITS + 12 + leg] or (solved and abs(force) > most)):
@@ -254,42 +250,36 @@ def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result:
     return True, exceeding
 
 
-def _entry_points(source: str) -> tuple[Callable[..., None], Callable[[Array], None]]:
-    @entry_point
-    def watch(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
-              forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
-        """Go through results in their order and write what becomes of them, see Outputs."""
-        _ = source  # part of the key of the kept machine code: see source_digest
-        state = before.copy()
-        restart = False
-        for n in range(len(results)):
-            # One that cannot be answered hands it on.
-            restart = restart or restarts[n]
-            is_stamp = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
-            answered[n], exceeding[n] = _watch(
-                settings, is_stamp, state, restart, results[n], forces[n])
-            restart = restart and not answered[n]
-            states[n] = state
-
-    @entry_point
-    def one(numbers: Array) -> None:
-        """Do with one setpoint what solve and watch do with many; an array costs time to pass."""
-        _ = source
-        state = numbers[_ONE_AFTER:_ONE_AFTER + STATE]
-        state[:] = numbers[_ONE_STATE:_ONE_STATE + STATE]
-        results = numbers[_ONE_RESULT:_ONE_RESULT + runtime.RESULT].reshape(1, runtime.RESULT)
-        runtime.solve(
-            numbers[:runtime.MACHINE],
-            numbers[_ONE_MOTION:_ONE_MOTION + runtime.MOTION].reshape(1, runtime.MOTION),
-            numbers[_ONE_WRENCH:_ONE_WRENCH + runtime.WRENCH].reshape(1, runtime.WRENCH), results)
-        numbers[_ONE_ANSWERED], numbers[_ONE_EXCEEDING] = _watch(
-            numbers[_ONE_SETTINGS:_ONE_SETTINGS + _SETTINGS], numbers[_ONE_STAMP] > 0.0, state,
-            numbers[_ONE_RESTART] > 0.0, results[0], numbers[_ONE_FORCES:_ONE_FORCES + 6])
-
-    return watch, one
+@entry_point
+def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
+                forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
+    """Go through results in their order and write what becomes of them, see Outputs."""
+    state = before.copy()
+    restart = False
+    for n in range(len(results)):
+        # One that cannot be answered hands it on.
+        restart = restart or restarts[n]
+        is_stamp = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
+        answered[n], exceeding[n] = _watch(
+            settings, is_stamp, state, restart, results[n], forces[n])
+        restart = restart and not answered[n]
+        states[n] = state
 
 
-_watch_many, _one = _entry_points(source_digest())
+@entry_point
+def _one(numbers: Array) -> None:
+    """Do with one setpoint what solve and watch do with many; an array costs time to pass."""
+    state = numbers[_ONE_AFTER:_ONE_AFTER + STATE]
+    state[:] = numbers[_ONE_STATE:_ONE_STATE + STATE]
+    results = numbers[_ONE_RESULT:_ONE_RESULT + RESULT].reshape(1, RESULT)
+    kernel.solve(
+        numbers[:kernel.MACHINE],
+        numbers[_ONE_MOTION:_ONE_MOTION + MOTION].reshape(1, MOTION),
+        numbers[_ONE_WRENCH:_ONE_WRENCH + WRENCH].reshape(1, WRENCH), results)
+    numbers[_ONE_ANSWERED], numbers[_ONE_EXCEEDING] = _watch(
+        numbers[_ONE_SETTINGS:_ONE_SETTINGS + _SETTINGS], numbers[_ONE_STAMP] > 0.0, state,
+        numbers[_ONE_RESTART] > 0.0, results[0], numbers[_ONE_FORCES:_ONE_FORCES + 6])
+
 
 _FIRST = Singularity()
 
@@ -353,8 +343,8 @@ class Step:
         return Output(
             stamp, lengths, rates, demanded if solved else None,
             forces if forces[0] == forces[0] else None, result[18:24],
-            result[runtime.DETERMINANT], result[runtime.DETERMINANT_RATE],
-            result[runtime.CONDITION], singularity,
+            result[DETERMINANT], result[DETERMINANT_RATE],
+            result[CONDITION], singularity,
             before is None or singularity.warning != before.warning,
             self._excesses(lengths, rates, demanded if solved else None)
             if result[_ONE_EXCEEDING - _ONE_RESULT] else ())

@@ -1,0 +1,34 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The types of arrays that all layers speak of."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+"""Indices, counts and codes."""
+Stamps = NDArray[np.int64]
+"""Times [ns]."""
+Flags = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
+
+Six = tuple[float, float, float, float, float, float]
+"""One number for each leg, or a wrench or twist."""
+
+NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

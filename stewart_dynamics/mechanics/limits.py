@@ -1,0 +1,104 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The limits of the legs: which there are, and when one is exceeded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Six
+from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.parameters import Parameters
+
+LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = LIMITS = (
+    'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+
+# A value exceeds a limit by more than this part of it: rounding is no motion.
+TOLERANCE = 1e-9
+
+_QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
+               VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N')}
+
+
+class Exceedance(NamedTuple):
+    """A limit that a leg exceeds."""
+
+    limit: str
+    """One of LIMITS."""
+    leg: int
+    value: float
+    bound: float
+
+    def words(self, joints: Sequence[str]) -> str:
+        """Return which leg exceeds the limit, and by how much."""
+        quantity, unit = _QUANTITIES[self.limit]
+        excess = abs(abs(self.value) - self.bound)
+        how = 'below' if self.limit == LENGTH_MIN else 'above'
+        return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {excess:.6g} {unit} '
+                f'{how} {self.limit}')
+
+
+class Limits:
+    """
+    The limits of the legs of a hexapod.
+
+    Attributes
+    ----------
+    bounds : dict of str to (6,)
+        Of each limit that is given [m, m/s, N].
+    thresholds : (4, 6)
+        Of each of LIMITS, what a value must pass to exceed it; infinite where it is not given.
+    force_max : (6,)
+        To which forces are clipped [N]; infinite where it is not given.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.bounds = {name: parameters[name] for name in LIMITS if parameters[name] is not None}
+        self.thresholds = np.array([
+            np.full(6, -math.inf if name == LENGTH_MIN else math.inf)
+            if name not in self.bounds else self.bounds[name] * (
+                1.0 - TOLERANCE if name == LENGTH_MIN else 1.0 + TOLERANCE) for name in LIMITS])
+        self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
+
+    def exceeds(self, limit: str, values: Array) -> Flags:
+        """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
+        threshold = self.thresholds[LIMITS.index(limit)]
+        exceeding: Flags = (values < threshold if limit == LENGTH_MIN
+                            else np.abs(values) > threshold)
+        return exceeding
+
+    def exceeded(self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Exceedance, ...]:
+        """Return all limits that one sample exceeds; forces may be unknown."""
+        found = []
+        for limit, bounds in self.bounds.items():
+            values = (rates if limit == VELOCITY_MAX else forces if limit == FORCE_MAX
+                      else lengths)
+            if values is not None:
+                found += [Exceedance(limit, leg, values[leg], float(bounds[leg]))
+                          for leg in np.flatnonzero(self.exceeds(limit, np.array(values)))]
+        return tuple(found)
+
+
+@inlined
+def any_exceeded(thresholds: Array, leg: int, length: float, rate: float, force: float) -> bool:
+    """Return whether a leg exceeds one of the thresholds (24,), flat; an unknown force is nan."""
+    return bool(length < thresholds[leg] or length > thresholds[6 + leg]
+                or abs(rate) > thresholds[12 + leg] or abs(force) > thresholds[18 + leg])

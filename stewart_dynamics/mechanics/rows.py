@@ -1,0 +1,47 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+One sample as a row of numbers: where each quantity stands in it.
+
+Motions, wrenches and results pass through all layers as rows of float64, SI units, base axes;
+``rows[..., FORCES]`` is a quantity of all samples.
+"""
+
+from __future__ import annotations
+
+# A row of a motion. The rotation is row by row.
+POSITION, ROTATION = slice(0, 3), slice(3, 12)
+POSE = slice(0, 12)
+LINEAR_VELOCITY, ANGULAR_VELOCITY = slice(12, 15), slice(15, 18)
+TWIST = slice(12, 18)
+LINEAR_ACCELERATION, ANGULAR_ACCELERATION = slice(18, 21), slice(21, 24)
+ACCELERATION = slice(18, 24)
+MOTION = 24
+
+# A row of a wrench: force and moment.
+WRENCH = 6
+
+# A row of a result.
+LENGTHS, RATES, FORCES = slice(0, 6), slice(6, 12), slice(12, 18)
+UNIT_LOAD_FORCES = slice(18, 24)
+DETERMINANT, DETERMINANT_RATE, CONDITION = 24, 25, 26
+RESULT = 27
+
+
+def consecutive(*sizes: int) -> tuple[slice, ...]:
+    """Return the places of parts of these sizes that stand one behind the other."""
+    ends = [sum(sizes[:n + 1]) for n in range(len(sizes))]
+    return tuple(slice(end - size, end) for end, size in zip(ends, sizes, strict=True))
