@@ -1,6 +1,6 @@
-# `make demo` and `make test` need nothing set up before: the environment is made in .venv, with
-# ROS 2 from PyPI, or with the machine's own where one is sourced. Nothing outside this folder is
-# changed; `make clean` leaves nothing behind inside it.
+# `make demo` and `make test` need no preparation: they create the environment in .venv, with ROS 2
+# from PyPI, or with the installed ROS 2 where it is sourced. Nothing outside this folder is changed;
+# `make clean` removes everything that make has created inside it.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
