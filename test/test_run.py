@@ -20,13 +20,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import gc
 import math
+from pathlib import Path
 import sys
 from typing import Any
 
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
@@ -36,10 +38,12 @@ from referees import ROOT
 from rosgraph_msgs.msg import Clock
 
 from stewart_dynamics import ParameterError, Parameters
-from stewart_dynamics.mechanics.reference_motion import TRAJECTORY_PARAMETERS, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import (
+    TRAJECTORY_PARAMETERS, TrajectoryParameters)
 from stewart_dynamics.nodes.rclpy_workarounds import reject_impossible_times
 from stewart_dynamics.nodes.run import declare_parameters
-from stewart_dynamics.parameters import PARAMETERS, ParameterSet
+from stewart_dynamics.parameter_set import ParameterSet
+from stewart_dynamics.parameters import PARAMETERS
 
 SECONDS = 30.0
 
@@ -95,7 +99,8 @@ def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
     gc.collect()
 
 
-SERVICES = {'describe_parameters': DescribeParameters, 'set_parameters': SetParameters,
+SERVICES = {'describe_parameters': DescribeParameters, 'get_parameters': GetParameters,
+            'set_parameters': SetParameters,
             'set_parameters_atomically': SetParametersAtomically}
 
 
@@ -159,13 +164,13 @@ def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
 
 
 def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
-    # It has none here: rclpy's would refuse these two, in its words.
+    # It has none here: rclpy's would reject these two, in its words.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     assert set_to(ask, 'platform.mass', -1.0) == (True, '')
     assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
 
 
-def test_a_value_that_ros_drops_without_a_word_is_refused(declared: Any) -> None:
+def test_a_value_that_ros_drops_without_a_word_is_rejected(declared: Any) -> None:
     # rclpy would go on with the file's 150.0.
     with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
         declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
@@ -188,12 +193,12 @@ def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
         assert each.description.startswith(parameter.text)
         assert each.additional_constraints.endswith('set only when the node starts')
     (rate,) = described(ask, 'rate')
-    assert rate.description == 'setpoints in a second [Hz]'
+    assert rate.description == 'rate of the setpoints [Hz]'
     assert bounds(rate) == [(1e-3, 1e4, 0.0)]
     assert rate.additional_constraints == (
         'at least 0.001, at most 10000; set only when the node starts')
     assert set_to(ask, 'rate', 50.0) == (
-        False, 'rate: only read when the node starts: start it anew')
+        False, 'rate: only read when the node starts: restart it')
     successful, reason = set_to(ask, 'rates', 50.0)
     assert not successful
     assert reason == 'parameters: rates: unknown parameter; do you mean rate?'
@@ -273,3 +278,35 @@ def test_a_time_that_ros_cannot_hold_is_not_followed(
     finally:
         node.destroy_node()
         context.try_shutdown()
+
+
+def test_null_in_a_file_is_not_given(declared: Any, tmp_path: Path) -> None:
+    # As `ros2 param dump` writes what has no value.
+    file = tmp_path / 'dump.yaml'
+    text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
+    file.write_text(text.replace('force_max: 6000.0', 'force_max: null').replace(
+        'base_frame: base', 'base_frame: ~') + '    external_wrench.force_max: null\n')
+    assert Parameters.from_yaml(file)['limits.force_max'] is None
+    ask = declared(LifecycleNode, Parameters, str(file))
+    values = ask('get_parameters', GetParameters.Request(
+        names=['limits.force_max', 'external_wrench.force_max', 'base_frame'])).values
+    assert [value.type for value in values] == [
+        ParameterType.PARAMETER_NOT_SET, ParameterType.PARAMETER_NOT_SET,
+        ParameterType.PARAMETER_STRING]
+    assert values[-1].string_value == 'base'
+
+
+def test_a_file_for_another_node_says_so(declared: Any, tmp_path: Path) -> None:
+    file = tmp_path / 'other.yaml'
+    text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
+    file.write_text(text.replace('/**:', 'stewart_dynamic:'))
+    with pytest.raises(ParameterError) as caught:
+        declared(LifecycleNode, Parameters, str(file), 'base_frame:=world')
+    assert str(caught.value) == (f"{file}: is for stewart_dynamic, not for '/stewart_dynamics': "
+                                 "rename the section, or use '/**'")
+
+
+def test_an_integer_from_ros_is_rejected(declared: Any, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match='150: is an integer, must be a double: write 150.0'):
+        declared(LifecycleNode, Parameters, 'platform.yaml', 'other:x:=1',
+                 'platform.mass:=150')

@@ -42,7 +42,8 @@ from stewart_dynamics.nodes.repeated_log import RepeatedLog
 from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
 from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics
-from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.parameter_files import is_of_ros
+from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, TICK, WARN

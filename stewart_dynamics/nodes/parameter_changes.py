@@ -54,7 +54,7 @@ def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool
             raise ParameterError(
                 f'{", ".join(fixed)}: only changed while the node is unconfigured, because its '
                 'topics and its model depend on it: deactivate and clean up first')
-    return parameters.replaced(changes)
+    return parameters.replaced(changes, exact_types=True)
 
 
 def log_lines(before: Parameters, after: Parameters) -> Iterator[LogLine]:

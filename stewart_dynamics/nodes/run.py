@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the executables that are ROS nodes share: parameters, spinning, exit codes."""
+"""What the nodes share: parameters from ROS, start, spinning, exit codes."""
 
 from __future__ import annotations
 
@@ -36,12 +36,15 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.nodes.programs import parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
     describe_by, make_executor, reject_impossible_times, set_parameters_together, shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries
-from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
+from stewart_dynamics.parameter_files import is_of_ros, other_nodes
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters_yaml import NULL
 
-# What is the user's to mend, said in one line: all else is a fault of ours.
+# Errors that the user can mend: said in one line. All else is a defect of this package.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
 
 _TYPES = {
@@ -52,14 +55,8 @@ _TYPES = {
 Kind = TypeVar('Kind', bound=ParameterSet)
 
 
-def parameter_files(arguments: Sequence[str]) -> list[str]:
-    """Return the parameter files that a command line names."""
-    return [value for option, value in zip(arguments, arguments[1:], strict=False)
-            if option == '--params-file']
-
-
 def _overrides(arguments: Sequence[str], node: str) -> list[tuple[str, str]]:
-    """Return names and texts of the values that a command line sets, for all nodes or this."""
+    """Return names and texts of the values that a command line sets, for this node or all."""
     rules = [rule.partition(':=') for option, rule in zip(arguments, arguments[1:], strict=False)
              if option in ('-p', '--param')]
     return [(name.rpartition(':')[2], text) for name, _, text in rules
@@ -70,38 +67,56 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
-    The node must have been made with ``automatically_declare_parameters_from_overrides``.
-    Types and ranges are left to the table's own check, whose texts say more than ROS's. A node
-    without a lifecycle takes no changes. Raises ParameterError, for an unknown name as well.
+    The node must have been made with ``automatically_declare_parameters_from_overrides``. Types
+    and ranges are left to the table's own check, whose texts say more than ROS's. A node without
+    a lifecycle accepts no changes. Raises ParameterError, for an unknown name as well.
     """
-    sources = parameter_files(sys.argv)
+    files = parameter_files(sys.argv)
+    sources = list(files)
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
-    # ROS drops a value silently that is of another type than that in a file.
+    # ROS drops a value without a word that is of another type than that in a file.
     for name, text in _overrides(sys.argv, kind.node):
         kind.check_value(name, text, 'command line')
     declared: dict[str, Any] = node.get_parameters_by_prefix('')
-    given = {name: parameter.value for name, parameter in declared.items() if not is_of_ros(name)}
-    parameters = kind(given, source)
+    # A null of a file, as `ros2 param dump` writes it, is a text for rcl.
+    given = {name: parameter.value for name, parameter in declared.items()
+             if not is_of_ros(name) and parameter.value not in NULL}
+    try:
+        parameters = kind(given, source, exact_types=True)
+    except ParameterError as exc:
+        raise _of_other_nodes(files, node.get_fully_qualified_name()) or exc from exc
     for name, parameter in kind.table.items():
         unchecked = ParameterDescriptor(dynamic_typing=True)
-        if node.has_parameter(name):
+        if name in given:
             node.set_descriptor(name, unchecked)
-        else:
-            default = parameter.default
-            if isinstance(default, tuple):
-                default = list(default) or None
-            node.declare_parameter(name, default, unchecked)
+            continue
+        if node.has_parameter(name):
+            node.undeclare_parameter(name)
+        default = parameter.default
+        if isinstance(default, tuple):
+            default = list(default) or None
+        node.declare_parameter(name, default, unchecked, ignore_override=True)
     if not isinstance(node, LifecycleNode):
-        node.add_on_set_parameters_callback(partial(_refuse_changes, kind))
+        node.add_on_set_parameters_callback(partial(_reject_changes, kind))
     set_parameters_together(node)
     describe_by(node, lambda name: _descriptor(
         kind.table[name], node) if name in kind.table else None)
     return parameters
 
 
-def _refuse_changes(
+def _of_other_nodes(files: Sequence[str], node: str) -> ParameterError | None:
+    """Return what is wrong where no file has a section for the node."""
+    others = [other_nodes(file, node) for file in files]
+    if not others or not all(others):
+        return None
+    return ParameterError('; '.join(
+        f"{file}: is for {other}, not for '{node}': rename the section, or use '/**'"
+        for file, other in zip(files, others, strict=True)))
+
+
+def _reject_changes(
         kind: type[ParameterSet], changes: Sequence[RosParameter]) -> SetParametersResult:
     for change in changes:
         if not is_of_ros(change.name):
@@ -110,7 +125,7 @@ def _refuse_changes(
             except ParameterError as exc:
                 return SetParametersResult(successful=False, reason=str(exc))
             return SetParametersResult(successful=False, reason=(
-                f'{change.name}: only read when the node starts: start it anew'))
+                f'{change.name}: only read when the node starts: restart it'))
     return SetParametersResult(successful=True)
 
 
@@ -124,7 +139,7 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
     constraints = [f'{sizes} entries' if sizes else '', parameter.rule, f'set {when}']
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     in_range = math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum)
-    # What may be one number or six is of the type that it has now.
+    # A parameter of one number or six has the type of its present value.
     type_ = node.get_parameter(parameter.name).type_.value
     if type_ == ParameterType.PARAMETER_NOT_SET:
         type_ = _TYPES[parameter.kind][bool(parameter.sizes)]
@@ -136,32 +151,21 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
             from_value=parameter.minimum, to_value=parameter.maximum)] if in_range else [])
 
 
-def _usage(kind: type[ParameterSet]) -> str:
-    parameters = [f'  {name} ({parameter.ros_type}{parameter.unit and ", "}{parameter.unit}): '
-                  f'{parameter.text}' for name, parameter in kind.table.items()]
-    return '\n'.join([
-        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]', '',
-        'parameters:', *parameters])
-
-
 def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         done: Future | None = None) -> int:
     """
-    Make a node, spin it until it is told to stop, and return the exit code.
+    Make a node, spin it until a signal or ``done`` stops it, and return the exit code.
 
     Parameters
     ----------
     make_node : callable
-        Called once ROS is up; a StewartError that it raises is said in one line, exit code 1.
+        Called after rclpy.init; a StewartError that it raises is said in one line, exit code 1.
     kind : type of ParameterSet
-        What the parameter files on the command line are checked by before ROS sees them.
+        Its parameters; their files have been checked by ``programs``.
     done : Future, optional
         When it is done, its result is the exit code.
 
     """
-    if {'-h', '--help'} & set(sys.argv[1:]):
-        print(_usage(kind))
-        return 0
     stop = done or Future()
     executor = node = None
     starting = True
@@ -169,8 +173,8 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
 
     def on_signal(number: int, frame: Any) -> None:
         # rclpy's handlers, which init sets, shut ROS down before they call this one, and that
-        # ends the spinning. An exception would strike in the middle of whatever callback runs,
-        # and be logged as an error of it.
+        # ends the spinning. An exception would be raised in whatever callback runs, and logged as
+        # an error of it.
         signals.append(number)
         if starting:
             raise KeyboardInterrupt
@@ -179,9 +183,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         signal.signal(number, on_signal)
     try:
         if parameter_files(sys.argv) and '--ros-args' not in sys.argv:
-            raise ParameterError('--params-file is read only behind --ros-args')
-        for path in parameter_files(sys.argv):
-            kind.check_file(path)
+            raise ParameterError('--params-file is only read after --ros-args')
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
         warning = check_environment(sys.argv)
@@ -201,7 +203,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
     except Exception as exc:
         starting = False
         if signals and not rclpy.ok():
-            return 0  # a signal has shut ROS down in the middle of anything
+            return 0  # a signal has shut ROS down in the middle of a call
         if not isinstance(exc, _OF_THE_USER):
             raise
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
