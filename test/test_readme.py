@@ -25,8 +25,8 @@ import numpy as np
 import pytest
 
 from stewart_dynamics.parameters import PARAMETERS
+from stewart_dynamics.runtime import input_topics, output_messages, plant
 from stewart_dynamics.runtime import planned_trajectory as planned
-from stewart_dynamics.runtime import plant, setpoints, step
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / 'README.md').read_text(encoding='utf-8')
@@ -42,7 +42,7 @@ def test_tables_of_parameters_are_those_of_the_code(monkeypatch: pytest.MonkeyPa
 
 
 def test_topics_are_those_of_the_code() -> None:
-    for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
+    for topic, kind in (*input_topics.INPUT_TYPES.items(), *output_messages.OUTPUT_TYPES.items(),
                         ('markers', 'visualization_msgs/msg/MarkerArray'),
                         (planned.INPUT, planned.INPUT_TYPE), (planned.OUTPUT, planned.OUTPUT_TYPE),
                         *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
