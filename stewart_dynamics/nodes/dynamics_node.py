@@ -48,8 +48,11 @@ from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
+from stewart_dynamics.runtime.input_topics import WRENCH
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs
-from stewart_dynamics.runtime.setpoints import NOT_EXCLUSIVE, Refusal, Setpoints, WRENCH
+from stewart_dynamics.runtime.output_messages import OutputMessages
+from stewart_dynamics.runtime.rejections import NOT_EXCLUSIVE, Rejection
+from stewart_dynamics.runtime.setpoints import Setpoints
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
 
 
@@ -171,6 +174,7 @@ class DynamicsNode(LifecycleNode):
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
         for mistake in doubts(self._settings):
             self.get_logger().warning(mistake)
+        self._messages = OutputMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
@@ -199,7 +203,7 @@ class DynamicsNode(LifecycleNode):
             writers = self._topics.writers_of(topic)
             self._diagnostics.setpoints.found_writers(topic, writers)
             if writers > 1:
-                self._setpoints.refuse(topic, NOT_EXCLUSIVE, f'{writers} writers')
+                self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
                 return
         setpoint = self._setpoints.take(topic, data, self._ros_time)
         if setpoint is not None:
@@ -218,7 +222,7 @@ class DynamicsNode(LifecycleNode):
 
     def _publish(self, setpoint: Setpoint, output: Output, came: float) -> None:
         publishers = self._topics.publishers
-        for topic, message in self._models.step.messages(output):
+        for topic, message in self._messages.of_output(output):
             publishers[topic].publish(message)
         self._markers.answered(setpoint, output)
         if self._diagnostics.answered(output, came, time.monotonic()):
@@ -246,7 +250,7 @@ class DynamicsNode(LifecycleNode):
             return
         if estimate.wrench is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
-                self._measured_legs.step.message(estimate))
+                self._messages.of_estimate(estimate))
         if diagnostics.estimated(estimate, target, now):
             self._report()
 
@@ -274,14 +278,12 @@ class DynamicsNode(LifecycleNode):
 
     # -- diagnostics and log ----------------------------------------------------------------
 
-    def _on_rejection(self, rejection: Refusal, details: str) -> None:
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
         self._diagnostics.rejected(rejection, details, time.monotonic())
-        how = '' if rejection.reason.startswith('passed over') else 'rejected: '
-        self._log.write([LogLine(
-            WARN, f'{rejection.topic} {how}{rejection.reason}: {details}', rejection)])
+        self._log.write([LogLine(WARN, rejection.words(details), rejection)])
 
     def _reject_joined(self, reason: str, details: str) -> None:
-        self._setpoints.refuse('setpoint', reason, details)
+        self._setpoints.reject('setpoint', reason, details)
 
     def _on_notice(self, text: str) -> None:
         # Two writers whose clocks differ restart with every setpoint.

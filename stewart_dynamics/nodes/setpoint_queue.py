@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from stewart_dynamics.runtime.setpoints import OUT_OF_RANGE, PASSED_OVER
+from stewart_dynamics.runtime.rejections import DROPPED, OUT_OF_RANGE
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
 
 # When more setpoints wait, the node has fallen behind: only the newest is answered.
@@ -100,7 +100,7 @@ class SetpointQueue:
     def _drop_all_but_the_newest(self) -> None:
         newest, came = self._waiting.pop()
         for dropped, _ in self._waiting:
-            self._reject(PASSED_OVER, f'stamp {dropped.stamp} ns')
+            self._reject(DROPPED, f'stamp {dropped.stamp} ns')
         restart = newest.restart or any(dropped.restart for dropped, _ in self._waiting)
         self._waiting.clear()
         self._waiting.append((newest._replace(restart=restart), came))

@@ -37,9 +37,9 @@ from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
+from stewart_dynamics.runtime.input_topics import INPUT_TYPES, SOURCES
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
-from stewart_dynamics.runtime.setpoints import INPUT_TYPES, SOURCES
-from stewart_dynamics.runtime.step import OUTPUT_TYPES
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
 
 # Publishers, beside those of OUTPUT_TYPES.
 DIAGNOSTICS, MARKERS, LEG_TRAJECTORY = 'diagnostics', 'markers', planned.OUTPUT

@@ -27,7 +27,7 @@ from stewart_dynamics.runtime.diagnostics.setpoints import Answers, SetpointDiag
 from stewart_dynamics.runtime.diagnostics.singularity import SingularityDiagnostics
 from stewart_dynamics.runtime.diagnostics.timing import TimingDiagnostics
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
-from stewart_dynamics.runtime.setpoints import Refusal
+from stewart_dynamics.runtime.rejections import Rejection
 from stewart_dynamics.runtime.step import Output
 
 
@@ -74,7 +74,7 @@ class DynamicsDiagnostics:
         crossed = self.singularity.answered(output, now)
         return crossed or self.report.due(now)
 
-    def rejected(self, rejection: Refusal, details: str, now: float) -> None:
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection of whatever topic."""
         if rejection.topic == MEASURED_LEGS:
             self.external_wrench.rejected(rejection, details, now)

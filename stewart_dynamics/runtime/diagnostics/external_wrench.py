@@ -24,7 +24,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.report import (
     ERROR, Held, Level, LevelLog, LogLine, OK, STALE, Status, WARN)
 from stewart_dynamics.runtime.external_wrench import Estimate, Overload
-from stewart_dynamics.runtime.setpoints import Refusal
+from stewart_dynamics.runtime.rejections import Rejection
 
 _NAME = 'external wrench'
 _NEVER = -math.inf
@@ -52,7 +52,7 @@ class ExternalWrenchDiagnostics:
         self._estimated = 0
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._rejections: Counter[Refusal] = Counter()
+        self._rejections: Counter[Rejection] = Counter()
         self._held = Held()
         self._log = LevelLog(_NAME)
         self._reported = OK  # the level in the last report
@@ -63,7 +63,7 @@ class ExternalWrenchDiagnostics:
         if self._begun == _NEVER:
             self._begun = now
 
-    def rejected(self, rejection: Refusal, details: str, now: float) -> None:
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection."""
         self._rejections[rejection] += 1
         self._held.happened(

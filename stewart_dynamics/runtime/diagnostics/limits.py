@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from stewart_dynamics.mechanics.limits import FORCE_MAX, LIMITS
+from stewart_dynamics.mechanics.limits import Exceedance, FORCE_MAX, LIMITS
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.report import (
     ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status)
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers
-from stewart_dynamics.runtime.step import Excess, Output
+from stewart_dynamics.runtime.step import Output
 
 _NAME = 'limits'
 
@@ -36,9 +36,10 @@ class _Limit:
         self.log = LevelLog(_NAME)
         self.setpoints = 0
         """How many have exceeded it."""
-        self.worst: Excess | None = None
+        self.worst: Exceedance | None = None
 
-    def see(self, exceeded: Sequence[Excess], words: Callable[[Excess], str], now: float) -> None:
+    def see(self, exceeded: Sequence[Exceedance], words: Callable[[Exceedance], str],
+            now: float) -> None:
         """Note which legs exceed it with a setpoint."""
         if not exceeded:
             self.held.see(FINE, now)
@@ -81,11 +82,11 @@ class LimitsDiagnostics:
             if max(forces) > largest or min(forces) < -largest:
                 self._largest_force = max(forces, key=abs)
                 self._its_leg = forces.index(self._largest_force)
-        if output.excesses or self._exceeding:
+        if output.exceedances or self._exceeding:
             self._held = True
-            self._exceeding = bool(output.excesses)
+            self._exceeding = bool(output.exceedances)
             for name, limit in self._limits.items():
-                limit.see([each for each in output.excesses if each.limit == name],
+                limit.see([each for each in output.exceedances if each.limit == name],
                           self._words, now)
 
     def level(self, now: float) -> int:
@@ -132,10 +133,10 @@ class LimitsDiagnostics:
         return Level(state.level, f'{name}: no longer exceeded; {limit.setpoints} setpoints since '
                      f'activation, worst: {self._words(limit.worst)}')
 
-    def _words(self, excess: Excess) -> str:
-        clipped = ', clipped' if excess.limit == FORCE_MAX else ''
-        return excess.words(self._joints) + clipped
+    def _words(self, exceedance: Exceedance) -> str:
+        clipped = ', clipped' if exceedance.limit == FORCE_MAX else ''
+        return exceedance.words(self._joints) + clipped
 
 
-def _amount(excess: Excess) -> float:
-    return abs(abs(excess.value) - excess.bound)
+def _amount(exceedance: Exceedance) -> float:
+    return abs(abs(exceedance.value) - exceedance.bound)

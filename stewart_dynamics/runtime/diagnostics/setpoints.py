@@ -23,8 +23,8 @@ import math
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.report import (
     ERROR, Held, Level, LogLine, STALE, Status, WARN)
+from stewart_dynamics.runtime.rejections import NOT_JOINED, Rejection
 from stewart_dynamics.runtime.repeated_events import SECONDS
-from stewart_dynamics.runtime.setpoints import NOT_JOINED, Refusal
 
 _NEVER = -math.inf
 
@@ -93,7 +93,7 @@ class SetpointDiagnostics:
         self._readers: dict[str, int] = {}
         self._namesakes = '', 1
         self._trouble: list[str] = []  # who publishes that should not
-        self._rejections: Counter[Refusal] = Counter()
+        self._rejections: Counter[Rejection] = Counter()
         self._rejected = Held()
         self._incomplete = Held()
         # Since when messages arrive that complete no setpoint, as reports have seen it.
@@ -135,7 +135,7 @@ class SetpointDiagnostics:
         if writers != self._writers.get(topic):
             self.found({topic: writers}, {}, *self._namesakes)
 
-    def rejected(self, rejection: Refusal, details: str, now: float) -> None:
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection."""
         self._rejections[rejection] += 1
         held = self._incomplete if rejection.reason == NOT_JOINED else self._rejected

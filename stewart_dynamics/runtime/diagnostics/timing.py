@@ -22,10 +22,10 @@ from statistics import median
 from stewart_dynamics.runtime.diagnostics.report import (
     Held, Level, LevelLog, LogLine, Status, WARN)
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers
-from stewart_dynamics.runtime.setpoints import NOT_JOINED, PASSED_OVER, Refusal
+from stewart_dynamics.runtime.rejections import DROPPED, NOT_JOINED, Rejection
 
 _NAME = 'timing'
-_COUNTED = {PASSED_OVER: 'dropped', NOT_JOINED: 'incomplete'}
+_COUNTED = {DROPPED: 'dropped', NOT_JOINED: 'incomplete'}
 
 
 class TimingDiagnostics:
@@ -55,11 +55,11 @@ class TimingDiagnostics:
         """Note how long a setpoint took, from its last message on."""
         self._times.append(seconds)
 
-    def rejected(self, rejection: Refusal, details: str, now: float) -> None:
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection; only what was dropped counts here."""
         if rejection.reason in _COUNTED:
             self._counts[rejection.reason] += 1
-        if rejection.reason == PASSED_OVER:
+        if rejection.reason == DROPPED:
             self._held.happened(
                 Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
 
