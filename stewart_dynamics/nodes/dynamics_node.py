@@ -44,13 +44,14 @@ from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
 from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics
 from stewart_dynamics.parameter_files import is_of_ros
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime import planned_trajectory as planned
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
 from stewart_dynamics.runtime.input_topics import WRENCH
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.runtime.output_messages import OutputMessages
+from stewart_dynamics.runtime.planned_trajectory import compile_ahead
 from stewart_dynamics.runtime.rejections import NOT_EXCLUSIVE, Rejection
 from stewart_dynamics.runtime.setpoints import Setpoints
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
@@ -69,7 +70,7 @@ class _Models(NamedTuple):
     def compile_ahead(self) -> None:
         """Make the first calls, which compile: no message shall wait for that."""
         self.step(Setpoint(0, (0.0,) * MOTION), None)
-        planned.compile_ahead(self.step.parameters)
+        compile_ahead(self.step.parameters)
         with suppress(StewartError):  # no pose has such lengths
             self.external_wrench(
                 Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)
@@ -260,7 +261,7 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         if self._planned.full:
             self._on_outcome(
-                planned.refused(planned.TOO_MANY, f'{LENGTH} are in work or wait'), now)
+                planned.rejected(planned.QUEUE_FULL, f'{LENGTH} are in work or wait'), now)
             return
         # Parameters and load are those of now, whatever changes meanwhile.
         self._planned.add(planned.answer(self._settings, self._setpoints.wrench, data), now)

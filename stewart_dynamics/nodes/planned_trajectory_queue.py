@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from stewart_dynamics.runtime.planned_trajectory import Outcome
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 # So many are in work or wait.
 LENGTH = 5

@@ -35,7 +35,7 @@ from visualization_msgs.msg import MarkerArray
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH
 from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime import planned_trajectory as planned
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
 from stewart_dynamics.runtime.input_topics import INPUT_TYPES, SOURCES
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS

@@ -20,7 +20,7 @@ from collections import Counter
 
 from stewart_dynamics.runtime.diagnostics.report import (
     ERROR, Level, LevelLog, LogLine, OK, Status, WARN)
-from stewart_dynamics.runtime.planned_trajectory import Outcome
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 _NAME = 'planned trajectory'
 
