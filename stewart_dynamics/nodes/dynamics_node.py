@@ -168,6 +168,7 @@ class DynamicsNode(LifecycleNode):
         """Answer no more."""
         self._active = False
         self._give_up_plans()
+        self._end_series(self.get_logger())
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -185,10 +186,13 @@ class DynamicsNode(LifecycleNode):
     def destroy_node(self) -> None:
         """Say what is left to say, and end."""
         # Its own logger would complain that /rosout is gone where a signal has ended ROS.
-        logger = get_logger(f'{self.get_name()}.last')
+        self._end_series(get_logger(f'{self.get_name()}.last'))
+        super().destroy_node()
+
+    def _end_series(self, logger: Any) -> None:
+        """Say the last of each series of alike events: what comes later is the first of one."""
         for line in self._series.over(math.inf):
             logger.warning(line)
-        super().destroy_node()
 
     def _configure(self) -> None:
         self._step = Step(self._settings)
