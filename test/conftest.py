@@ -20,6 +20,9 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, ExitStack
 from itertools import count
 from pathlib import Path
+import subprocess
+from subprocess import DEVNULL
+import sys
 from typing import Any, TYPE_CHECKING
 
 import pytest
@@ -27,7 +30,31 @@ import pytest
 if TYPE_CHECKING:
     from running import DynamicsNode, NodeProcess
 
+COMPILE_AHEAD = Path(__file__).with_name('compile_ahead.py')
+
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Before several processes run the tests, compile what each of them would compile."""
+    is_worker = hasattr(session.config, 'workerinput')
+    if not is_worker and getattr(session.config.option, 'numprocesses', None):
+        programs = [subprocess.Popen([sys.executable, COMPILE_AHEAD, part], stdin=DEVNULL,
+                                     stdout=DEVNULL, cwd=COMPILE_AHEAD.parent)
+                    for part in ('step', 'plant', 'library')]
+        for program in programs:
+            if program.wait():
+                raise pytest.UsageError(f'{program.args}: exit code {program.returncode}')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests with ROS, and put their modules first: they wait most; then slow ones."""
+    for item in items:
+        if 'ros_environment' in getattr(item, 'fixturenames', ()):
+            item.add_marker('ros')
+    slow = {mark: {item.path for item in items if item.get_closest_marker(mark)}
+            for mark in ('ros', 'slow')}
+    items.sort(key=lambda item: (item.path not in slow['ros'], item.path not in slow['slow']))
 
 
 @pytest.fixture(scope='session')

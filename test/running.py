@@ -61,6 +61,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.task import Future
 from rclpy.time import Time
 from referees import ROOT
 from sensor_msgs.msg import JointState
@@ -233,14 +234,16 @@ class Inside:
         Its ROS domain.
     said : callable
         Returns what this process has said on stderr since it was last asked.
+    done : Future, optional
+        When it is done, its result is the exit code.
 
     """
 
     def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
-                 said: Callable[[], str]) -> None:
+                 said: Callable[[], str], done: Future | None = None) -> None:
         from rclpy.experimental.events_executor import EventsExecutor
 
-        self._said, self._stderr = said, ''
+        self._said, self._stderr, self._done = said, '', done
         with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
             rclpy.init(args=sys.argv, domain_id=domain)
             self._stack = ExitStack()
@@ -269,6 +272,15 @@ class Inside:
     def ended(self) -> bool:
         """Whether an exception has ended its thread."""
         return not self._thread.is_alive()
+
+    def wait(self) -> int:
+        """Return its exit code once it is done."""
+        assert self._done is not None
+        end = time.monotonic() + DEADLINE
+        while not self._done.done():
+            assert time.monotonic() < end, f'it does not end:\n{self.stderr}'
+            self._thread.join(0.01)
+        return int(self._done.result())
 
     def kill(self) -> None:
         """End it, and check what it has said."""

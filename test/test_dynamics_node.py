@@ -893,8 +893,10 @@ GOOD = """\
     autostart: true
 """
 
-# All rules are in test_parameters.py; these three are found in different places.
+# All rules are in test_parameters.py; these are found in different places.
 BROKEN = {
+    'integer for a double': ('mass: 150.0', 'mass: 150', 'platform.mass: 150: is an integer, '
+                             'must be a double: write 150.0'),
     'not YAML': ('platform:\n', 'platform: [\n', 'not YAML: '),
     'unknown name': ('mass: 150.0', 'mass: 150.0\n      mas: 1.0',
                      'platform.mas: unknown parameter; do you mean platform.mass?'),
