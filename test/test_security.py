@@ -47,9 +47,9 @@ from running import (  # noqa: E402
     assert_only_log_lines, DEADLINE, DynamicsNode, executable, INPUTS, log_lines, NODE, OUTPUTS,
     Peer, PLATFORM, Program)
 
-from stewart_dynamics.runtime import plant  # noqa: E402
 from stewart_dynamics.errors import StewartError  # noqa: E402
 from stewart_dynamics.nodes.security import check_environment  # noqa: E402
+from stewart_dynamics.runtime import plant  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
@@ -124,12 +124,13 @@ def test_the_policy_is_one_of_sros2() -> None:
             assert re.fullmatch(r'[~/]?[a-z_/]+', element.text or ''), element.text
 
 
-def test_the_policy_is_what_the_node_does(start: Start) -> None:
+def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     """Each name that the node has with any source of setpoints is in it, and no other."""
-    nodes = [start('setpoint.source:=separate'), start('setpoint.source:=combined'),
-             start('setpoint.source:=pose', 'use_sim_time:=true')]
     union: dict[str, set[str]] = {}
-    for node in nodes:
+    for begin, overrides in ((fresh, ('setpoint.source:=separate',)),
+                             (fresh, ('setpoint.source:=combined',)),
+                             (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
+        node = begin(*overrides)
         node.until_active()
         of_inputs = {f'{NODE}/{topic}' for topic in (
             *node.topics, 'wrench', 'measured_legs')}

@@ -146,6 +146,7 @@ class DynamicsNode(LifecycleNode):
         """Answer no more."""
         self._active = False
         self._drop_planned_trajectories()
+        self._log.write_last()
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
