@@ -20,7 +20,8 @@ from typing import Any
 
 from referees import random_parameters, rng, ROOT, size_of
 
-from stewart_dynamics.parameters import Parameters, read_yaml
+from stewart_dynamics.parameter_files import read_yaml
+from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 MACHINE = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')

@@ -30,7 +30,7 @@ from simulated import FRICTIONLESS, MACHINE, MASSLESS, random_simulated, simulat
 from stewart_dynamics import Motion, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.plant_dynamics import STATE_TWIST
 from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.parameters import read_yaml
+from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.plant import Plant, State
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 

@@ -124,12 +124,13 @@ def test_the_policy_is_one_of_sros2() -> None:
             assert re.fullmatch(r'[~/]?[a-z_/]+', element.text or ''), element.text
 
 
-def test_the_policy_is_what_the_node_does(start: Start) -> None:
+def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     """Each name that the node has with any source of setpoints is in it, and no other."""
-    nodes = [start('setpoint.source:=separate'), start('setpoint.source:=combined'),
-             start('setpoint.source:=pose', 'use_sim_time:=true')]
     union: dict[str, set[str]] = {}
-    for node in nodes:
+    for begin, overrides in ((fresh, ('setpoint.source:=separate',)),
+                             (fresh, ('setpoint.source:=combined',)),
+                             (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
+        node = begin(*overrides)
         node.until_active()
         of_inputs = {f'{NODE}/{topic}' for topic in (
             *node.topics, 'wrench', 'measured_legs')}
@@ -311,7 +312,7 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
     """Fast DDS would take nothing in its place."""
     environment(**TLS)
     monkeypatch.delenv('STEWART_KEYS')
-    with pytest.raises(StewartError, match='needs the variable STEWART_KEYS, which is not set'):
+    with pytest.raises(StewartError, match='the variable STEWART_KEYS is not set'):
         check_environment([])
 
 
@@ -669,7 +670,7 @@ def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> No
     (['source=127.0.0.256:7001'], 'source=127.0.0.256:7001: must be NAME=ADDRESS:PORT'),
     (['source=127.0.0.1:65536'], 'source=127.0.0.1:65536: the port must be at most 65535'),
     (['../ca=127.0.0.1:7001'], '../ca=127.0.0.1:7001: must be NAME=ADDRESS:PORT'),
-    (['node=127.0.0.1:7001'], 'node: given twice, or ca or node, which are made anyway'),
+    (['node=127.0.0.1:7001'], 'node: given twice, or ca or node, which are created in any case'),
     (['a=127.0.0.1:7001', 'a=127.0.0.1:7002'], 'a: given twice'),
 ])
 def test_what_no_keys_can_be_made_for_is_said(tmp_path: Path, peers: list[str],

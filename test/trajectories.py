@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from referees import rng, ROOT
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
 
 Array = NDArray[np.float64]

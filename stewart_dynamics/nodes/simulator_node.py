@@ -35,7 +35,8 @@ from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
-from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
+from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
+from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.nodes.simulator_messages import INPUT_TYPES, OUTPUT_TYPES, StateMessages
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
