@@ -49,7 +49,7 @@ ALONE = 10
 
 class Planned(Measurement):
     """
-    The node with a stream of setpoints, in turns with and without a planned trajectory each second.
+    The node with a stream of setpoints, in turns with and without a trajectory each second.
 
     Parameters
     ----------

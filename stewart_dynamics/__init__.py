@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     'BagError', 'CAUSES', 'ForceCauses', 'InverseDynamics', 'Motion', 'MotionError',
-    'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'SingularityError', 'StewartError',
-    'StewartPlatform', 'check_planned_trajectory']
+    'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'SingularityError',
+    'StewartError', 'StewartPlatform', 'check_planned_trajectory']
 
 _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',

@@ -896,7 +896,8 @@ def test_a_trajectory_that_is_unfit_is_rejected_as_a_whole(renew: Start) -> None
         node.answer(MOVING)
     planner.send_bytes(raw(HOME.combined(1))[:-20])
     planner.until_rejected('rejected: malformed: ', len(UNFIT) + 1)
-    assert any('planned trajectory rejected: ' in line for line in log_lines(node.program.stderr, 'ERROR'))
+    assert any('planned trajectory rejected: ' in line
+               for line in log_lines(node.program.stderr, 'ERROR'))
     assert not planner.raw
     planner.send([HOME, HOME])
     planner.until_answered(1)
