@@ -108,10 +108,10 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'stewart_dynamics = stewart_dynamics.nodes.dynamics_node:main',
+            'stewart_dynamics = stewart_dynamics.nodes.programs:dynamics',
             'stewart_replay = stewart_dynamics.replay:main',
-            'stewart_simulator = stewart_dynamics.nodes.simulator_node:main',
-            'stewart_trajectory = stewart_dynamics.nodes.trajectory_node:main',
+            'stewart_simulator = stewart_dynamics.nodes.programs:simulator',
+            'stewart_trajectory = stewart_dynamics.nodes.programs:trajectory',
         ],
     },
 )

@@ -53,8 +53,8 @@ import yaml
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters

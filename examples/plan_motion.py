@@ -38,8 +38,8 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml

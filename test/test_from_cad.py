@@ -30,8 +30,8 @@ from referees import ROOT
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.plausibility import doubts
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
 MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)

@@ -311,7 +311,7 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
     """Fast DDS would take nothing in its place."""
     environment(**TLS)
     monkeypatch.delenv('STEWART_KEYS')
-    with pytest.raises(StewartError, match='needs the variable STEWART_KEYS, which is not set'):
+    with pytest.raises(StewartError, match='the variable STEWART_KEYS is not set'):
         check_environment([])
 
 

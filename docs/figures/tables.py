@@ -28,9 +28,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.mechanics.reference_motion import TrajectoryParameters
-from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
-from stewart_dynamics.runtime.plant import SimulatorParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
