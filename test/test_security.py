@@ -47,9 +47,9 @@ from running import (  # noqa: E402
     assert_only_log_lines, DEADLINE, DynamicsNode, executable, INPUTS, log_lines, NODE, OUTPUTS,
     Peer, PLATFORM, Program)
 
-from stewart_dynamics.runtime import plant  # noqa: E402
 from stewart_dynamics.errors import StewartError  # noqa: E402
 from stewart_dynamics.nodes.security import check_environment  # noqa: E402
+from stewart_dynamics.runtime import plant  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
