@@ -249,8 +249,8 @@ class Loop:
         platform = StewartPlatform(parameters)
         self.times = sample_times(settings)
         self._motion = motion_at(settings, self.times * 1e-9)
-        self._lengths = platform.inverse_kinematics(
-            self._motion.position, self._motion.rotation) - parameters['geometry.zero_length']
+        self._lengths = (platform.inverse_kinematics(self._motion)
+                         - parameters['geometry.zero_length'])
         if not 0.0 < bandwidth < math.inf:
             raise Failure(f'bandwidth: {bandwidth} Hz: must be more than 0')
         start = motion_at(settings, 0.0)
@@ -325,8 +325,8 @@ class Loop:
 
 def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
     """Return the mass that a leg moves alone [kg], the mean of the six."""
-    to_legs = np.linalg.inv(platform.jacobian(motion.position, motion.rotation))
-    masses = to_legs.T @ platform.mass_matrix(motion.position, motion.rotation) @ to_legs
+    to_legs = np.linalg.inv(platform.inverse_jacobian(motion))
+    masses = to_legs.T @ platform.mass_matrix(motion) @ to_legs
     return float(np.mean(np.diag(masses)))
 
 

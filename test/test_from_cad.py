@@ -29,7 +29,7 @@ from referees import ROOT
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.reference_motion import (
     motion_at, sample_times, TrajectoryParameters)
 
@@ -57,7 +57,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_the_file_on_the_page_is_the_machine_that_is_computed(names: dict[str, Any]) -> None:
     assert names['platform'].parameters == names['parameters']
-    assert doubts(names['parameters']) == ()
+    assert likely_mistakes(names['parameters']) == ()
 
 
 def test_the_node_gives_the_forces_on_the_page(
@@ -140,7 +140,7 @@ def test_what_the_node_says_of_mistakes_is_what_the_page_says(names: dict[str, A
     for mistake, changes in told.items():
         for change in changes:
             try:
-                said = '\n'.join(doubts(names['parameters'].replaced(change)))
+                said = '\n'.join(likely_mistakes(names['parameters'].replaced(change)))
             except ParameterError as exc:
                 said = str(exc)
                 assert 'does not start' in rows[mistake][0]
@@ -156,12 +156,12 @@ def test_what_the_node_cannot_see_shows_as_the_page_says(names: dict[str, Any]) 
     for change in (mirrored, by_two, {'geometry.zero_length': 0.77},
                    {'platform.inertia': p['platform.inertia'] * [1, -1, -1, 1, -1, 1]},
                    {'actuator.reflected_mass': 1.4e-5}):
-        assert doubts(p.replaced(change)) == ()
+        assert likely_mistakes(p.replaced(change)) == ()
 
     # The other three legs become longer in the mirror image.
     mirror = StewartPlatform(p.replaced(mirrored))
     turned = names['turned']
-    change = mirror.inverse_kinematics(turned.position, turned.rotation) - names['lengths']
+    change = mirror.inverse_kinematics(turned) - names['lengths']
     longer = {n for n in range(6) if names['change'][n] > 0.0}
     assert {n for n in range(6) if change[n] > 0.0} == set(range(6)) - longer
     # Forces do not depend on the zero length.

@@ -27,7 +27,7 @@ import numpy as np
 import pytest
 from referees import ROOT
 
-from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+from stewart_dynamics import ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.parameters import PARAMETERS, read_yaml
 from stewart_dynamics.parameters_yaml import read_document
 
@@ -175,7 +175,7 @@ def test_the_package_s_own_files_hold_sections_that_can_be_read(file: str) -> No
 
 def test_the_machine_of_the_package_can_be_computed() -> None:
     platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
-    lengths = platform.inverse_kinematics([0.0, 0.0, 1.0], np.eye(3))
+    lengths = platform.inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
     assert np.all(lengths > 0.0)
 
 

@@ -31,11 +31,11 @@ import pytest
 from referees import rng, ROOT
 from scipy.interpolate import CubicHermiteSpline
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
-from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.planned_trajectory import Outcome
@@ -473,7 +473,7 @@ def test_where_the_legs_fold_up_on_a_wide_way_is_found() -> None:
 def test_a_machine_on_its_stops_may_go_away_from_them() -> None:
     platform = StewartPlatform(PARAMETERS)
     parked = platform.forward_kinematics(
-        PARAMETERS['limits.length_min'], ([0.0, 0.0, 0.8], np.eye(3)))
+        PARAMETERS['limits.length_min'], Pose([0.0, 0.0, 0.8], np.eye(3)))
     for digits, answered in ((12, True), (3, False)):  # 1e-3: beyond by more than rounding
         position = [*parked.position.round(15).tolist()[:2],
                     math.floor(parked.position[2] * 10.0 ** digits) / 10.0 ** digits]
@@ -503,7 +503,7 @@ def test_where_the_legs_lead_the_platform_to_a_singularity_is_found() -> None:
     squares = cubic_between(times, rows)[1] ** 2
     apart = np.abs(squares[:, ::2].sum(axis=1) - squares[:, 1::2].sum(axis=1))
     limit = StewartPlatform(UNBOUND).inverse_kinematics(
-        [0.0, 0.0, 0.8], from_euler([0.0, 0.0, np.pi / 2.0])) ** 2
+        Pose.from_euler([0.0, 0.0, 0.8], [0.0, 0.0, np.pi / 2.0])) ** 2
     assert apart.max() > abs(limit[::2].sum() - limit[1::2].sum())
     outcome = outcome_of(messages.trajectory(STAMP, times, rows), UNBOUND)
     assert outcome.reason == planned.SINGULAR

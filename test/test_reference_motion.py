@@ -262,10 +262,10 @@ def test_singular_path_is_warned_of_in_time(platform: StewartPlatform) -> None:
     states = warnings(platform, result)
     crossing = next(t for t, state in zip(times, states, strict=True) if state.crossings)
     warned = next(t for t, state in zip(times, states, strict=True) if state.warning)
-    foretold = times[np.argmax(result.time_to_crossing < 0.5)]
+    predicted = times[np.argmax(result.time_to_crossing < 0.5)]
     clipped = times[np.argmax((np.abs(result.forces) > 6000.0).any(axis=-1))]
     assert warned < clipped < crossing
-    assert 0.5 <= crossing - foretold < 1.0
+    assert 0.5 <= crossing - predicted < 1.0
     assert 0.5 <= crossing - warned < 1.5
     assert all(state.warning for t, state in zip(times, states, strict=True)
                if warned <= t <= crossing)
