@@ -27,7 +27,7 @@ def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
     """Return a finite array whose shape ends so; else MotionError names it."""
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in 'biufO':
+        if given.dtype.kind not in 'biuf':
             raise TypeError(f'its type is {given.dtype}')
         array = given.astype(float, copy=False)
     # An object in a list may raise anything.
