@@ -491,9 +491,9 @@ def test_no_samples_give_no_results() -> None:
 
 @pytest.mark.parametrize(('wrench', 'text'), [
     (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'do not fit'),
-    ('push', 'not an array of numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
+    ('push', 'not an array of real numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
 ])
-def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
+def test_a_wrench_that_does_not_fit_is_rejected(wrench: Any, text: str) -> None:
     platform = StewartPlatform(symmetric_parameters())
     with pytest.raises(MotionError, match=text) as error:
         platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
@@ -512,7 +512,7 @@ def test_many_loads_on_one_pose_are_many_samples() -> None:
 
 
 @pytest.mark.parametrize('position', [[1e200, 0.0, 1.0], None], ids=['far', 'no length'])
-def test_a_leg_without_a_length_is_refused(position: Any) -> None:
+def test_a_leg_without_a_length_is_rejected(position: Any) -> None:
     p = symmetric_parameters()
     platform = StewartPlatform(p)
     if position is None:
