@@ -30,8 +30,8 @@ from referees import ROOT
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
 MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
@@ -43,7 +43,7 @@ MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
 def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Run the page's program, compare what it prints, and return its names."""
     folder = tmp_path_factory.mktemp('machine')
-    (folder / 'my_machine.yaml').write_text(MACHINE, encoding='utf-8')
+    (folder / 'my_hexapod.yaml').write_text(MACHINE, encoding='utf-8')
     assert len(PARTS) + 1 == PAGE.count('```python') == 6
     program: dict[str, Any] = {}
     with pytest.MonkeyPatch.context() as patch:
@@ -64,7 +64,7 @@ def test_the_node_gives_the_forces_on_the_page(
         names: dict[str, Any], domain: int, tmp_path: Path) -> None:
     pytest.importorskip('rclpy')
     from running import executable, log_lines, Program
-    file = tmp_path / 'my_machine.yaml'
+    file = tmp_path / 'my_hexapod.yaml'
     file.write_text(MACHINE, encoding='utf-8')
     node = Program([executable('stewart_dynamics'), '--ros-args', '--params-file', file,
                     '-p', 'setpoint.source:=pose'], domain, tmp_path / 'node')
@@ -86,7 +86,7 @@ def test_the_motion_on_the_page_begins_at_home_and_keeps_all_limits(
         names: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / 'my_motion.yaml'
     file.write_text(MOVEMENT, encoding='utf-8')
-    settings = TrajectoryParameters.from_yaml(file)
+    settings = ReferenceMotionParameters.from_yaml(file)
     motion = motion_at(settings, sample_times(settings) * 1e-9)
     assert motion.position[0] == pytest.approx(names['home'], abs=1e-12)
     assert np.array_equal(motion.rotation[0], np.eye(3))

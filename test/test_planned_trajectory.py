@@ -34,7 +34,8 @@ from scipy.interpolate import CubicHermiteSpline
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.runtime import planned_trajectory as planned
@@ -87,7 +88,7 @@ def motion_of(rows: Array) -> Motion:
 
 def sampled(name: str, step: int) -> tuple[list[int], Array]:
     """Return times [ns] and rows of a motion in config/."""
-    motion = TrajectoryParameters.from_yaml(ROOT / 'config' / f'trajectory_{name}.yaml')
+    motion = ReferenceMotionParameters.from_yaml(ROOT / 'config' / f'trajectory_{name}.yaml')
     times = np.arange(0, 10 * SECOND + 1, step)
     return times.tolist(), rows_of(motion_at(motion, times * 1e-9))
 
@@ -96,7 +97,7 @@ def some(points: int) -> tuple[list[int], Array]:
     """Return a smooth motion whose points are at uneven times."""
     random = rng()
     times = np.cumsum(random.integers(1_000_000, 20_000_000, points))
-    motion = TrajectoryParameters({
+    motion = ReferenceMotionParameters({
         'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
         'motion.amplitude': (0.03, 0.03, 0.04, 0.04, 0.04, 0.06),
         'motion.frequency': (0.25, 0.5, 0.25, 0.5, 0.25, 0.25)})

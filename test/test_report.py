@@ -35,8 +35,8 @@ import pytest
 
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.report import Report
@@ -99,7 +99,7 @@ class Given:
 
 def trajectory(name: str, parameters: Parameters = PARAMETERS) -> Given:
     """Return a motion of config/, as it is recorded in bags/."""
-    p = TrajectoryParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
+    p = ReferenceMotionParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
     seconds = sample_times(p) * 1e-9
     return Given(seconds, motion_at(p, seconds).rows, parameters)
 

@@ -38,7 +38,7 @@ class InverseDynamics(NamedTuple):
         Of the actuators [N], + pushes.
     unit_load_forces : (..., 6)
         Largest force of each leg under a unit load on the platform: any force F and moment M
-        with |F|^2 + |M / l|^2 = 1, l the characteristic length.
+        with F^2 + (M / l)^2 = 1, l the characteristic length.
     determinant : (...)
         det(J) := det(J_inv) [m^3].
     determinant_rate : (...)

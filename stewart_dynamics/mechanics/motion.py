@@ -33,6 +33,9 @@ class Motion(Samples):
     """
     Pose, twist and acceleration of the platform in one sample or any leading shape of samples.
 
+    Leading shapes broadcast against each other. The arrays are copied; ``motion[3]``,
+    ``motion[::10]`` and ``len(motion)`` work as for an array of samples.
+
     Parameters
     ----------
     position : (..., 3)
@@ -43,9 +46,6 @@ class Motion(Samples):
         Twist in base axes [m/s, rad/s]; zero by default.
     linear_acceleration, angular_acceleration : (..., 3), optional
         Their time derivatives, base axes [m/s^2, rad/s^2]; zero by default.
-
-    Leading shapes broadcast against each other. The arrays are copied; ``motion[3]``,
-    ``motion[::10]`` and ``len(motion)`` work as for an array of samples.
 
     Attributes
     ----------

@@ -113,15 +113,15 @@ class Pose(Samples):
     """
     Pose of the platform in the base frame, one sample or any leading shape of samples.
 
+    Leading shapes broadcast against each other. The arrays are copied; ``pose[3]``,
+    ``pose[::10]`` and ``len(pose)`` work as for an array of samples.
+
     Parameters
     ----------
     position : (..., 3)
         Origin of the platform frame in the base frame [m].
     rotation : (..., 3, 3)
         Platform axes to base axes.
-
-    Leading shapes broadcast against each other. The arrays are copied; ``pose[3]``,
-    ``pose[::10]`` and ``len(pose)`` work as for an array of samples.
 
     Attributes
     ----------
