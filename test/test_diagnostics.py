@@ -282,13 +282,13 @@ def test_a_clear_motion_is_ok() -> None:
     assert values['its leg'] in PARAMETERS['joints']
 
 
-@pytest.mark.parametrize('cause', [Cause.CONDITION, Cause.FORETOLD, Cause.CROSSED])
+@pytest.mark.parametrize('cause', [Cause.CONDITION, Cause.PREDICTED, Cause.CROSSED])
 def test_a_warning_says_its_cause(cause: Cause) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, CLEAR._replace(singularity=Singularity(
         cause=cause, time_to_crossing=0.25, crossings=4)))
     of = status(diagnostics, 'singularity', BEGIN)
-    assert (of.level, of.message) == (WARN, cause.value)
+    assert (of.level, of.message) == (WARN, cause.text)
     assert dict(of.values)['time to crossing (s)'] == '0.250'
     assert dict(of.values)['crossings'] == '4'
 
@@ -399,9 +399,9 @@ def test_a_worse_level_is_not_covered_by_a_lesser_one() -> None:
 
 def test_a_crossing_is_said_for_a_second_whatever_comes_after_it() -> None:
     diagnostics = begun()
-    for n, cause in enumerate((Cause.FORETOLD, Cause.CROSSED, Cause.CONDITION, Cause.CONDITION)):
+    for n, cause in enumerate((Cause.PREDICTED, Cause.CROSSED, Cause.CONDITION, Cause.CONDITION)):
         answered(diagnostics, BEGIN + 0.001 * n, CLEAR._replace(singularity=Singularity(cause)))
-    for after, message in ((0.9, Cause.CROSSED.value), (1.1, Cause.CONDITION.value)):
+    for after, message in ((0.9, Cause.CROSSED.text), (1.1, Cause.CONDITION.text)):
         answered(diagnostics, BEGIN + after,
                  CLEAR._replace(singularity=Singularity(Cause.CONDITION)))
         of = status(diagnostics, 'singularity', BEGIN + after)

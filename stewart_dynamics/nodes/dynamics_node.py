@@ -46,7 +46,7 @@ from visualization_msgs.msg import MarkerArray
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.nodes.markers import Markers
@@ -203,8 +203,8 @@ class DynamicsNode(LifecycleNode):
             self._external_wrench(
                 Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)
         self.get_logger().info(f'dynamics ready after {time.monotonic() - begun:.1f} s')
-        for doubt in doubts(self._settings):
-            self.get_logger().warning(doubt)
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
         self._publishers_of: dict[str, Publisher] = {}
         for topic, name in OUTPUT_TYPES.items():
             qos = QoSProfile(depth=10)
@@ -566,10 +566,10 @@ class DynamicsNode(LifecycleNode):
                    if value != self._settings.given.get(name)]
         if changes:
             self.get_logger().info('; '.join(changes))
-        before = doubts(self._settings, geometry=False)
-        for doubt in doubts(parameters, geometry=False):
-            if doubt not in before:
-                self.get_logger().warning(doubt)
+        before = likely_mistakes(self._settings, geometry=False)
+        for mistake in likely_mistakes(parameters, geometry=False):
+            if mistake not in before:
+                self.get_logger().warning(mistake)
 
 
 def main() -> int:

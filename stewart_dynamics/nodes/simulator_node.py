@@ -32,7 +32,7 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.nodes.run import declare_parameters, run
@@ -82,8 +82,8 @@ class SimulatorNode(Node):
             self.get_logger().warning(compiled.HINT)
         begun = time.monotonic()
         self._plant = Plant(self._settings)
-        for doubt in doubts(self._settings):
-            self.get_logger().warning(doubt)
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
         # What it knows of messages on ~/wrench, and the counting of what is refused.
         self._loads = Setpoints(self._settings, self._on_refusal, self.get_logger().warning)
         self._commands: Six | None = None

@@ -304,7 +304,7 @@ _UNSOLVABLE = Level(ERROR, 'J_inv cannot be solved: no forces')
 _STOPPED = Level(ERROR, 'inside stop_condition')
 _SUPPRESSED = Level(ERROR, 'inside stop_condition: forces suppressed')
 # A crossing is of one sample: the next one has another cause.
-_WARNINGS = {cause: Level(WARN, cause.value, cause is Cause.CROSSED) for cause in Cause}
+_WARNINGS = {cause: Level(WARN, cause.text, cause is Cause.CROSSED) for cause in Cause}
 
 
 def singularity_level(output: Output) -> Level:

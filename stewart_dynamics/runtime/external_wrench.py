@@ -52,8 +52,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.home_pose import homes
 from stewart_dynamics.mechanics.jit import entry_point, inlined
-from stewart_dynamics.mechanics.plausibility import homes
 from stewart_dynamics.mechanics.rows import FORCES, MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
@@ -70,7 +71,7 @@ _OUT_OF_RANGE = 3
 # the filter, time since the last one (0: there is none), motion of the last one or guess; then,
 # written, motion (behind the last one: two rows for solve), filter after, measured - model forces,
 # steps and residual of the pose, code.
-_LENGTHS = kernel.MACHINE
+_LENGTHS = CONSTANTS
 _RATES = _LENGTHS + 6
 _FORCES = _RATES + 6
 _KNOWN = _FORCES + 6
@@ -153,7 +154,7 @@ def _add_end(numbers: Array, machine: Array, motion: Array, result: Array) -> No
 @entry_point
 def _one(numbers: Array) -> None:
     """Write what one measurement gives; an array costs time to pass."""
-    machine = numbers[:kernel.MACHINE]
+    machine = numbers[:CONSTANTS]
     motion = numbers[_MOTION_AFTER:_MOTION_AFTER + MOTION]
     motion[:] = numbers[_MOTION:_MOTION + MOTION]
     code, numbers[_STEPS], numbers[_RESIDUAL] = forward_kinematics.pose(
@@ -199,7 +200,7 @@ class ExternalWrench:
         self._parameters = parameters
         self._numbers = np.zeros(_NUMBERS)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[:kernel.MACHINE] = StewartPlatform(parameters).machine
+        self._numbers[:CONSTANTS] = StewartPlatform(parameters).constants
         self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
         self._most_force, self._most_moment = (

@@ -108,10 +108,10 @@ def compile_ahead(parameters: Parameters) -> None:
     """Compile what the work on a trajectory calls: setpoints shall not wait for the first one."""
     platform, rows = StewartPlatform(parameters), np.zeros((1, MOTION))
     platform.solve(rows)
-    forward_kinematics.twists(platform.machine, np.zeros((1, 6)), rows)
+    forward_kinematics.twists(platform.constants, np.zeros((1, 6)), rows)
     codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
     forward_kinematics.poses(
-        platform.machine, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
+        platform.constants, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
 
 
 def refused(reason: str, details: str) -> Outcome:
@@ -282,7 +282,7 @@ class _Work:
         """
         poses, many = rows.copy(), len(rows)
         codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
-        machine = self._platform.machine
+        machine = self._platform.constants
         forward_kinematics.poses(
             machine, legs.at(part[:, None]), poses, codes, steps, np.empty(many))
         lost = np.flatnonzero(codes != forward_kinematics.FOUND)

@@ -40,8 +40,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Six
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.forward_dynamics import acceleration, WORK
+from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.kernel import COULOMB_RATE, leg_line
+from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -194,8 +195,8 @@ def _advance(machine: Array, legs: Array, loads: Array, state: Array, result: Ar
 
     Parameters
     ----------
-    machine : (MACHINE,)
-        The machine's numbers as ``inverse_dynamics`` has them.
+    machine : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
     legs : (36,)
         Shortest and longest length, stiffness and damping of the stops, strongest force.
     loads : (12,)
@@ -288,7 +289,7 @@ class Plant:
         self.steps = round(period / parameters['step']) * self.substeps
         """Steps in a period."""
         self._step = period / self.steps
-        self._machine = StewartPlatform(parameters).machine
+        self._machine = StewartPlatform(parameters).constants
         self._legs = _of_legs(parameters)
         self._loads = np.zeros(12)
         numbers = np.zeros(_STATE + _RESULT)

@@ -32,12 +32,14 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
 from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
     UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity import (
-    advance, CAUSE, LAST, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
+    advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
+    UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
@@ -196,15 +198,15 @@ class Outputs(NamedTuple):
 
 
 # The numbers of the settings: thresholds, whether to suppress, and four limits of six legs.
-_SUPPRESS = 3
-_LIMITS = 4
+_SUPPRESS = THRESHOLDS
+_LIMITS = _SUPPRESS + 1
 LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 _SETTINGS = _LIMITS + 6 * len(LIMITS)
 
 
 # One setpoint in numbers: machine, settings, motion, wrench, state before, restart, whether the
 # stamp is one; then, written, state after, result, forces, whether it is answered and exceeds.
-_ONE_SETTINGS = kernel.MACHINE
+_ONE_SETTINGS = CONSTANTS
 _ONE_MOTION = _ONE_SETTINGS + _SETTINGS
 _ONE_WRENCH = _ONE_MOTION + MOTION
 _ONE_STATE = _ONE_WRENCH + WRENCH
@@ -230,7 +232,7 @@ def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result:
     if not finite:
         return False, False
     if restart:
-        state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
+        forget(state)
     condition = result[CONDITION]
     advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
@@ -273,7 +275,7 @@ def _one(numbers: Array) -> None:
     state[:] = numbers[_ONE_STATE:_ONE_STATE + STATE]
     results = numbers[_ONE_RESULT:_ONE_RESULT + RESULT].reshape(1, RESULT)
     kernel.solve(
-        numbers[:kernel.MACHINE],
+        numbers[:CONSTANTS],
         numbers[_ONE_MOTION:_ONE_MOTION + MOTION].reshape(1, MOTION),
         numbers[_ONE_WRENCH:_ONE_WRENCH + WRENCH].reshape(1, WRENCH), results)
     numbers[_ONE_ANSWERED], numbers[_ONE_EXCEEDING] = _watch(
@@ -301,7 +303,7 @@ class Step:
         self._platform = StewartPlatform(parameters)
         self._numbers = np.zeros(_ONE)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[:_ONE_SETTINGS] = self._platform.machine
+        self._numbers[:_ONE_SETTINGS] = self._platform.constants
         self._settings = self._numbers[_ONE_SETTINGS:_ONE_MOTION]
         self._settings[:_SUPPRESS] = thresholds(parameters)
         self._settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
