@@ -37,6 +37,13 @@ install_requires = [
 extras_require = {
     'cluster': ['distributed>=2024.1'],
     'differentiate': ['scipy>=1.10'],
+    'docs': [
+        'docutils>=0.20',
+        'furo>=2024.1',
+        'myst-parser>=2',
+        'numpydoc>=1.6',
+        'sphinx>=7.2',
+    ],
     'parquet': ['pyarrow>=14'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
