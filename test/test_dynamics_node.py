@@ -790,7 +790,7 @@ def test_parameters_are_described_with_text_and_unit(node: DynamicsNode) -> None
     mass, force, action, warn_time = node.call(
         'describe_parameters', DescribeParameters.Request(names=names)).descriptors
     assert mass.name == 'platform.mass'
-    assert mass.description == 'mass of the platform with all that it carries [kg]'
+    assert mass.description == 'mass of the platform with its payload [kg]'
     assert mass.additional_constraints == 'more than 0; set also while active'
     assert force.description.endswith('[N]')
     assert action.additional_constraints == (
@@ -954,7 +954,7 @@ BROKEN = {
     'not YAML': ('platform:\n', 'platform: [\n', 'not YAML: '),
     'name given twice': ('mass: 150.0', 'mass: 150.0\n      mass: 160.0', 'not YAML: '),
     'no value': ('mass: 150.0', 'mass:', 'platform.mass: '),
-    'no section for it': ('/**:', 'another_node:', 'geometry.base_joints: missing'),
+    'no section for it': ('/**:', 'another_node:', 'is for another_node, not for '),
 }
 
 

@@ -463,7 +463,7 @@ def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
     simulator.until(future.done, 'it answers')
     assert not future.result().result.successful
     assert future.result().result.reason == (
-        'platform.mass: only read when the node starts: start it anew')
+        'platform.mass: only read when the node starts: restart it')
 
 
 def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
