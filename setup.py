@@ -79,6 +79,7 @@ extras_require = {
         'playwright',
         'pyarrow',
         'pytest',
+        'pytest-xdist',
         'ruff',
         'scipy',
         'setuptools>=70.1,<80',  # wheels without the package wheel; colcon needs less than 80

@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import rotation as rotations
-from stewart_dynamics.mechanics.arguments import (
-    as_array, common_shape, optional_array, wrong_type)
+from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
 from stewart_dynamics.mechanics.pose import as_rotation, matrix_of_quaternion, Pose, Samples
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
