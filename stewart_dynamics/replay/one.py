@@ -38,7 +38,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import BagError, StewartError
-from stewart_dynamics.mechanics.force_breakdown import ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.differentiate import Differentiator
@@ -189,7 +189,7 @@ class _Run:
         self._causes = None
         if options.report:
             self.report = Report(parameters, measured=options.measured is not None)
-            self._causes = ForceCauses(parameters)
+            self._causes = ForceBreakdownRows(parameters)
         self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters))
         stack.callback(self._bag.abandon)
         table = ParquetTable if options.parquet else CsvTable
