@@ -25,10 +25,10 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from stewart_dynamics.nodes import simulator_messages
 from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.runtime import input_topics, output_messages
-from stewart_dynamics.runtime import planned_trajectory as planned
-from stewart_dynamics.runtime import plant
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
@@ -71,7 +71,9 @@ def test_topics_are_those_of_the_code() -> None:
             planned.INPUT: planned.INPUT_TYPE,
             planned.OUTPUT: planned.OUTPUT_TYPE}
     for pages, topics in ((('README.md', 'docs/node.md'), node),
-                          (('docs/simulator.md',), {**plant.INPUT_TYPES, **plant.OUTPUT_TYPES})):
+                          (('docs/simulator.md',), {
+                              **simulator_messages.INPUT_TYPES,
+                              **simulator_messages.OUTPUT_TYPES})):
         for page in pages:
             for topic, kind in topics.items():
                 assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in TEXTS[page]
