@@ -27,10 +27,10 @@ from simulated import simulated, UNLIMITED
 from trajectories import (
     Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.rotation import from_euler, to_quaternion
+from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
 from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory, PlannedTrajectory

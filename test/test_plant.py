@@ -27,7 +27,7 @@ from referees import (
     smooth_motion)
 from simulated import FRICTIONLESS, MACHINE, MASSLESS, random_simulated, simulated, UNLIMITED
 
-from stewart_dynamics import Motion, ParameterError, StewartPlatform
+from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.plant_dynamics import STATE_TWIST
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.parameter_files import read_yaml
