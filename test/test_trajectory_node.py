@@ -36,8 +36,8 @@ from running import (
     ROOT, SEPARATE)
 
 from stewart_dynamics import ParameterError
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.nodes.trajectory_node import TrajectoryNode
 

@@ -34,10 +34,12 @@ from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.messages import cdr
-from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
-from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant, SimulatorParameters
+from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
+from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant
 from stewart_dynamics.runtime.repeated_events import Series
 from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE, Refusal, Setpoints
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,

@@ -137,7 +137,7 @@ class Recording:
         found = sorted((file for file in path.iterdir() if file.name.endswith(STORAGES)
                         and self._is_inside(file)), key=_by_number)
         try:
-            document = read_document(path / 'metadata.yaml')
+            document = read_document(path / 'metadata.yaml', 1_000_000)
             names = document['rosbag2_bagfile_information']['relative_file_paths']
             listed = [path / name for name in names]
         except (ParameterError, KeyError, TypeError) as exc:
