@@ -55,7 +55,8 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
@@ -241,26 +242,28 @@ class Inside:
 
     def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
                  said: Callable[[], str], done: Future | None = None) -> None:
-        from rclpy.experimental.events_executor import EventsExecutor
-
         self._said, self._stderr, self._done = said, '', done
+        self._stack = ExitStack()
         with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
             rclpy.init(args=sys.argv, domain_id=domain)
-            self._stack = ExitStack()
-            self._stack.callback(gc.unfreeze)
-            self._stack.callback(rclpy.try_shutdown)
             try:
-                self._node = kind()
+                node = kind()
             except BaseException:
-                self._stack.close()
+                rclpy.shutdown()
                 raise
-        self._stack.callback(self._node.destroy_node)
-        executor = EventsExecutor()
-        executor.add_node(self._node)
-        self._thread = Thread(target=executor.spin)
-        self._stack.callback(self._thread.join)
-        self._stack.callback(executor.shutdown)
+        self._executor = EventsExecutor()
+        self._executor.add_node(node)
+        self._thread = Thread(target=self._spin)
+        for end in (gc.unfreeze, node.destroy_node, self._executor.shutdown, self._thread.join,
+                    rclpy.try_shutdown):
+            self._stack.callback(end)
         self._thread.start()
+
+    def _spin(self) -> None:
+        # Bounded waits, and an end by ROS's own: as the executables have it.
+        with suppress(ExternalShutdownException):
+            while rclpy.ok():
+                self._executor.spin_until_future_complete(Future(), 10.0)
 
     @property
     def stderr(self) -> str:
