@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 import csv
+from dataclasses import replace
 import json
 import math
 import os
@@ -637,13 +638,27 @@ def test_an_output_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out')
 
 
-def test_a_bag_of_ros_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_of_ros_1_gives_the_same(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = motion(30)
+    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
     store = get_typestore(Stores.ROS1_NOETIC)
     with Writer1(tmp_path / 'old.bag') as writer:
-        for topic in TOPICS:
-            writer.add_connection(f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store)
-    assert 'ROS 1' in refused(capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output',
-                              tmp_path / 'out')
+        connections = {topic: writer.add_connection(
+            f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store) for topic in TOPICS}
+        for n, (topic, when, data) in enumerate(of):
+            read = STORE.deserialize_cdr(data, INPUT_TYPES[topic])
+            header = store.types['std_msgs/msg/Header'](n, read.header.stamp, 'base')
+            writer.write(connections[topic], when, store.serialize_ros1(
+                replace(read, header=header), INPUT_TYPES[topic]))
+    assert run(tmp_path / 'old.bag', tmp_path / 'out') == DONE
+    old, new = outputs_of(tmp_path / 'out' / 'old'), outputs_of(tmp_path / 'out' / 'bag')
+    assert len(new.rows) == 30
+    assert old.rows == new.rows
+    capsys.readouterr()
+    assert 'has no topic /none' in refused(
+        capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output', tmp_path / 'again',
+        '--pose', '/none')
 
 
 @pytest.mark.parametrize('arguments', [

@@ -36,7 +36,7 @@ import yaml  # type: ignore[import-untyped]
 from stewart_dynamics.arrays import Bytes, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.messages.cdr import at_any_byte
-from stewart_dynamics.replay.mcap_file import MAGIC
+from stewart_dynamics.replay.mcap_recording import MAGIC
 from stewart_dynamics.runtime.step import OUTPUT_TYPES, Outputs, Step
 
 _LIBRARY = 'stewart_dynamics'
