@@ -52,7 +52,9 @@ from visualization_msgs.msg import MarkerArray
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.layout import Layout
+from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist
 
 PARAMETERS = Path(__file__).resolve().parents[1] / 'config' / 'platform.yaml'
 QOS = QoSProfile(depth=2000)
@@ -80,18 +82,16 @@ def messages(source: str) -> list[tuple[bytes, ...]]:
         empty = MultiDOFJointTrajectory(
             joint_names=['platform'], points=[MultiDOFJointTrajectoryPoint(
                 transforms=[Transform()], velocities=[Twist()], accelerations=[Twist()])])
-        written = [_layout(cdr.combined, empty).write(None, *numbers)]
+        written = [_layout(combined, empty).write(None, *numbers)]
     else:
-        written = [_layout(cdr.pose, PoseStamped()).write(None, numbers[0]),
-                   _layout(cdr.twist, TwistStamped()).write(None, numbers[1]),
-                   _layout(cdr.twist, AccelStamped()).write(None, numbers[2])]
+        written = [_layout(pose, PoseStamped()).write(None, numbers[0]),
+                   _layout(twist, TwistStamped()).write(None, numbers[1]),
+                   _layout(twist, AccelStamped()).write(None, numbers[2])]
     return [tuple(each.tobytes() for each in together) for together in zip(*written, strict=True)]
 
 
-def _layout(reader: Any, message: Any) -> cdr.Layout:
-    layout = cdr.Layout.of(reader, bytes(serialize_message(message)))
-    assert layout is not None
-    return layout
+def _layout(reader: Any, message: Any) -> Layout:
+    return layout_of(reader, bytes(serialize_message(message)))
 
 
 def publish(path: Path, turns: Sequence[str]) -> None:
@@ -278,7 +278,7 @@ def legs(parameters: Parameters, first: int) -> list[bytes]:
     motion = motion_at(TrajectoryParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
     result = StewartPlatform(parameters).inverse_dynamics(motion)
     stamps = first + PERIOD * np.arange(REPEATED)
-    layout = cdr.JointState(parameters['joints']).layout(True)
+    layout = JointStateWriter(parameters['joints']).layout(True)
     return [each.tobytes() for each in layout.write(
         stamps, result.lengths - parameters['geometry.zero_length'], result.rates,
         result.forces)]

@@ -92,7 +92,8 @@ from pathlib import Path
 import sys
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.setpoints import Setpoints, SOURCES
+from stewart_dynamics.runtime.input_topics import SOURCES
+from stewart_dynamics.runtime.setpoints import Setpoints
 
 many = 0
 setpoints = Setpoints(Parameters.from_yaml({str(PARAMETERS)!r}), print, print)

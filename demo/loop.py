@@ -56,7 +56,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.reference_motion import (
     motion_at, sample_times, TrajectoryParameters)
 from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.setpoint import pose
 from stewart_dynamics.parameters import Parameters
 
 matplotlib.use('Agg')
@@ -166,7 +166,7 @@ class Recorder(Node):
         """Return how far this is from a motion (N,) and its leg positions (N, 6) by its times."""
         states = {_stamp(data): np.array(deserialize_message(data, JointState).position)
                   for data in self.states}
-        poses = {stamp: numbers for stamp, _, numbers in map(cdr.pose, self.poses)}
+        poses = {stamp: numbers for stamp, _, numbers in map(pose, self.poses)}
         stamps = (BEGIN + times).tolist()
         missing = sum(stamp not in states or stamp not in poses for stamp in stamps)
         if missing:

@@ -55,7 +55,7 @@ from stewart_dynamics.replay.mcap_recording import LARGEST_CHUNK
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, NODE, Options, PARTLY_READ, replay as replay_one)
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.setpoints import ACCEL, INPUT_TYPES, POSE, TWIST
+from stewart_dynamics.runtime.input_topics import ACCEL, INPUT_TYPES, POSE, TWIST
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)

@@ -55,10 +55,11 @@ from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ, replay, Replayed)
-from stewart_dynamics.runtime.setpoints import (
-    ACCEL, COMBINED, INPUT_TYPES, MALFORMED, NOT_FINITE, NOT_JOINED, POSE, TOO_OLD, TWICE, TWIST,
-    WRENCH)
-from stewart_dynamics.runtime.step import OUTPUT_TYPES
+from stewart_dynamics.runtime.input_topics import (
+    ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
+from stewart_dynamics.runtime.rejections import (
+    MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE)
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -59,6 +59,11 @@ class Limits:
     """
     The limits of the legs of a hexapod.
 
+    Parameters
+    ----------
+    parameters : Parameters
+        Those that are not given are never exceeded.
+
     Attributes
     ----------
     bounds : dict of str to (6,)
@@ -77,24 +82,32 @@ class Limits:
             if name not in self.bounds else self.bounds[name] * (
                 1.0 - TOLERANCE if name == LENGTH_MIN else 1.0 + TOLERANCE) for name in LIMITS])
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
+        self._of_samples = [
+            (name, self.bounds[name].tolist(), self.thresholds[n].tolist())
+            for n, name in enumerate(LIMITS) if name in self.bounds]
 
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
-        threshold = self.thresholds[LIMITS.index(limit)]
-        exceeding: Flags = (values < threshold if limit == LENGTH_MIN
-                            else np.abs(values) > threshold)
+        exceeding: Flags = _exceeds(limit, values, self.thresholds[LIMITS.index(limit)])
         return exceeding
 
     def exceeded(self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Exceedance, ...]:
         """Return all limits that one sample exceeds; forces may be unknown."""
         found = []
-        for limit, bounds in self.bounds.items():
+        for limit, bounds, thresholds in self._of_samples:
             values = (rates if limit == VELOCITY_MAX else forces if limit == FORCE_MAX
                       else lengths)
-            if values is not None:
-                found += [Exceedance(limit, leg, values[leg], float(bounds[leg]))
-                          for leg in np.flatnonzero(self.exceeds(limit, np.array(values)))]
+            if values is None:
+                continue
+            for leg, value in enumerate(values):
+                if _exceeds(limit, value, thresholds[leg]):
+                    found.append(Exceedance(limit, leg, value, bounds[leg]))
         return tuple(found)
+
+
+def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
+    """Return whether a number, or where an array, passes the threshold of a limit."""
+    return value < threshold if limit == LENGTH_MIN else abs(value) > threshold
 
 
 @inlined

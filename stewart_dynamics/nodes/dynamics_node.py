@@ -48,20 +48,22 @@ from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.diagnostics import diagnostics
 from stewart_dynamics.nodes.markers import Markers
 from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
 from stewart_dynamics.parameters import is_of_ros, Parameters
 from stewart_dynamics.runtime import planned_trajectory as planned
-from stewart_dynamics.runtime import setpoints as inputs
 from stewart_dynamics.runtime.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
 from stewart_dynamics.runtime.external_wrench_diagnostics import WrenchDiagnostics
+from stewart_dynamics.runtime.input_topics import INPUT_TYPES, SOURCES, WRENCH
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.planned_trajectory_diagnostics import PlannedDiagnostics
+from stewart_dynamics.runtime.rejections import DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection
 from stewart_dynamics.runtime.repeated_events import Series
-from stewart_dynamics.runtime.setpoints import Refusal, Setpoints
-from stewart_dynamics.runtime.step import Output, OUTPUT_TYPES, Setpoint, Step
+from stewart_dynamics.runtime.setpoints import Setpoints
+from stewart_dynamics.runtime.step import Output, Setpoint, Step
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,
@@ -145,9 +147,9 @@ class DynamicsNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to answer, as if nothing had come before."""
         now = time.monotonic()
-        self._setpoints = Setpoints(self._settings, self._on_refusal, self._on_notice)
+        self._setpoints = Setpoints(self._settings, self._on_rejection, self._on_notice)
         self._measured_legs = MeasuredLegs(
-            self._settings, self._external_wrench, self._on_refusal, self._on_notice)
+            self._settings, self._external_wrench, self._on_rejection, self._on_notice)
         self._wrench_diagnostics = WrenchDiagnostics(self._settings)
         self._planned_diagnostics = PlannedDiagnostics()
         self._diagnostics = Diagnostics(self._settings, self._setpoints.topics, now, [
@@ -192,6 +194,7 @@ class DynamicsNode(LifecycleNode):
 
     def _configure(self) -> None:
         self._step = Step(self._settings)
+        self._messages = OutputMessages(self._settings)
         self._external_wrench = ExternalWrench(self._settings)
         begun = time.monotonic()
         # The first call compiles; it shall not wait for the first setpoint.
@@ -219,13 +222,13 @@ class DynamicsNode(LifecycleNode):
             self._markers = Markers(self._settings)
             self._markers_publisher = self._publisher(
                 MarkerArray, '~/markers', QoSProfile(depth=1))
-        topics = inputs.SOURCES[self._settings['setpoint.source']]
+        topics = SOURCES[self._settings['setpoint.source']]
         self._exclusive = self._settings['setpoint.exclusive']
         self._answer_task = until_shutdown(self, self._answer)
         self._inputs = {
-            topic: self._subscribe(_TYPES[inputs.INPUT_TYPES[topic]], topic,
+            topic: self._subscribe(_TYPES[INPUT_TYPES[topic]], topic,
                                    partial(self._on_setpoint, topic)) for topic in topics}
-        self._subscribe(WrenchStamped, inputs.WRENCH, self._on_wrench)
+        self._subscribe(WrenchStamped, WRENCH, self._on_wrench)
         self._subscribe(JointState, MEASURED_LEGS, self._on_measured_legs)
         self._subscribe(MultiDOFJointTrajectory, planned.INPUT, self._on_trajectory, _PLANS)
         self._topic_names = {topic: subscription.topic_name
@@ -312,7 +315,7 @@ class DynamicsNode(LifecycleNode):
             writers = self.count_publishers(self._topic_names[topic])
             self._diagnostics.writers[topic] = writers
             if writers > 1:
-                self._setpoints.refuse(topic, inputs.NOT_EXCLUSIVE, f'{writers} writers')
+                self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
                 return
         setpoint = self._setpoints.take(topic, data, self._ros_time)
         if setpoint is None:
@@ -338,7 +341,7 @@ class DynamicsNode(LifecycleNode):
         if estimate is None:
             return
         if estimate.wrench is not None:
-            self._wrench_publisher.publish(self._measured_legs.step.message(estimate))
+            self._wrench_publisher.publish(self._messages.of_estimate(estimate))
         if self._wrench_diagnostics.estimated(estimate, self._target, now):
             self._report()
 
@@ -367,11 +370,11 @@ class DynamicsNode(LifecycleNode):
             output = self._step(setpoint, before)
             if output is None:
                 self._restarting = setpoint.restart
-                self._setpoints.refuse(
-                    'setpoint', inputs.OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
+                self._setpoints.reject(
+                    'setpoint', OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
                 continue
             self._restarting = False
-            for topic, message in self._step.messages(output):
+            for topic, message in self._messages.of_output(output):
                 self._publishers_of[topic].publish(message)
             self._last, self._target = output, setpoint.motion
             self._undrawn = setpoint, output
@@ -398,7 +401,7 @@ class DynamicsNode(LifecycleNode):
         """Let nothing wait but the newest setpoint, and count the others."""
         newest, came = self._waiting.pop()
         for passed, _ in self._waiting:
-            self._setpoints.refuse('setpoint', inputs.PASSED_OVER, f'stamp {passed.stamp} ns')
+            self._setpoints.reject('setpoint', DROPPED, f'stamp {passed.stamp} ns')
         restart = newest.restart or any(passed.restart for passed, _ in self._waiting)
         self._waiting.clear()
         self._waiting.append((newest._replace(restart=restart), came))
@@ -470,11 +473,10 @@ class DynamicsNode(LifecycleNode):
 
     # -- words ----------------------------------------------------------------------------
 
-    def _on_refusal(self, refusal: Refusal, details: str) -> None:
-        of = self._wrench_diagnostics if refusal.topic == MEASURED_LEGS else self._diagnostics
-        of.refused(refusal, details, time.monotonic())
-        how = '' if refusal.reason.startswith('passed over') else 'refused: '
-        self._say(refusal, f'{refusal.topic} {how}{refusal.reason}: {details}')
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
+        of = self._wrench_diagnostics if rejection.topic == MEASURED_LEGS else self._diagnostics
+        of.refused(rejection, details, time.monotonic())
+        self._say(rejection, rejection.words(details))
 
     def _on_notice(self, text: str) -> None:
         # Two writers whose clocks differ restart with every setpoint.
@@ -510,7 +512,7 @@ class DynamicsNode(LifecycleNode):
         name = full_name.lstrip('/')
         statuses = self._diagnostics.report(now)
         self._log_changes(statuses[1:])
-        self._diagnostics_publisher.publish(cdr.diagnostics(
+        self._diagnostics_publisher.publish(diagnostics(
             self._ros_time(), [(each.level, (f'{name}: {each.name}', each.message, name),
                                 each.values) for each in statuses]))
 

@@ -207,7 +207,7 @@ class Markers:
         lines = [f'det(J) {output.determinant:.4g} m^3, condition number {output.condition:.4g}']
         if message:
             lines.insert(0, message)
-        legs = sorted({excess.leg for excess in output.excesses})
+        legs = sorted({exceedance.leg for exceedance in output.exceedances})
         if legs:
             lines.append('beyond their limits: ' + ', '.join(self._names[leg] for leg in legs))
         if output.forces is not None:

@@ -33,11 +33,13 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import doubts
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.cdr import finite, MalformedError
+from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
 from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant, SimulatorParameters
+from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.runtime.repeated_events import Series
-from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE, Refusal, Setpoints
+from stewart_dynamics.runtime.wrench_input import WrenchInput
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,
@@ -82,8 +84,8 @@ class SimulatorNode(Node):
         self._plant = Plant(self._settings)
         for doubt in doubts(self._settings):
             self.get_logger().warning(doubt)
-        # What it knows of messages on ~/wrench, and the counting of what is refused.
-        self._loads = Setpoints(self._settings, self._on_refusal, self.get_logger().warning)
+        self._rejections = Rejections(self._on_rejection)
+        self._loads = WrenchInput(self._settings, self._rejections)
         self._commands: Six | None = None
         self._stamp = _BEGIN
         self._index = 0
@@ -92,7 +94,7 @@ class SimulatorNode(Node):
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
                          for topic, kind in OUTPUT_TYPES.items()}
         for topic, take in (('commands', self._on_commands),
-                            ('wrench', self._loads.take_wrench)):
+                            ('wrench', self._loads.take)):
             self.create_subscription(_TYPES[INPUT_TYPES[topic]], f'~/{topic}',
                                      until_shutdown(self, take), qos, raw=True)
         self.get_logger().info(
@@ -118,15 +120,15 @@ class SimulatorNode(Node):
 
     def _on_commands(self, data: bytes) -> None:
         try:
-            values = cdr.float64_values(data)
-        except cdr.MalformedError as exc:
-            self._loads.refuse('commands', MALFORMED, str(exc))
+            values = float64_values(data)
+        except MalformedError as exc:
+            self._rejections.reject('commands', MALFORMED, str(exc))
             return
         if len(values) != 6:
-            self._loads.refuse('commands', NOT_SIX, f'{len(values)} of them')
+            self._rejections.reject('commands', NOT_SIX, f'{len(values)} of them')
             return
-        if not cdr.finite(values):
-            self._loads.refuse('commands', NOT_FINITE, str(values))
+        if not finite(values):
+            self._rejections.reject('commands', NOT_FINITE, str(values))
             return
         first, second, third, fourth, fifth, sixth = values
         self._commands = first, second, third, fourth, fifth, sixth
@@ -181,7 +183,7 @@ class SimulatorNode(Node):
             self._publish_clock()
 
     def _publish_clock(self) -> None:
-        self._clock_output.publish(cdr.clock(self._stamp + self._time_of(self._index)))
+        self._clock_output.publish(clock(self._stamp + self._time_of(self._index)))
 
     # -- words ----------------------------------------------------------------------------
 
@@ -192,8 +194,8 @@ class SimulatorNode(Node):
         self._say('saturated', f'commands: {joint}: {command:.6g} N is beyond limits.force_max, '
                   f'clipped to {force:.6g} N')
 
-    def _on_refusal(self, refusal: Refusal, details: str) -> None:
-        self._say(refusal, f'{refusal.topic} refused: {refusal.reason}: {details}')
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
+        self._say(rejection, rejection.words(details))
 
     def _say(self, kind: Hashable, text: str) -> None:
         if (line := self._series.add(kind, text, time.monotonic())) is not None:

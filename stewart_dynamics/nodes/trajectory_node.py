@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.reference_motion import (
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
-from stewart_dynamics.runtime import setpoints as inputs
+from stewart_dynamics.runtime import input_topics as inputs
 
 # Samples are computed so many at once: one by one they cost more than to publish.
 _BLOCK = 256

@@ -31,8 +31,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.step import Batch, LIMITS, Outputs
+from stewart_dynamics.runtime.step import Batch, Outputs
 
 # So many crossings and warnings are told one by one; all of them are counted.
 TOLD = 100

@@ -27,10 +27,11 @@ from operator import attrgetter
 from statistics import median
 from typing import NamedTuple, Protocol
 
+from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity import Cause
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.setpoints import NOT_JOINED, PASSED_OVER, Refusal
-from stewart_dynamics.runtime.step import Excess, Output
+from stewart_dynamics.runtime.rejections import DROPPED, NOT_JOINED, Rejection
+from stewart_dynamics.runtime.step import Output
 
 OK, WARN, ERROR, STALE = range(4)
 
@@ -139,7 +140,7 @@ class Diagnostics:
         self._others = others
         self._heard = dict.fromkeys(topics, now)
         self._silent = dict.fromkeys(topics, True)
-        self._refusals: Counter[Refusal] = Counter()
+        self._refusals: Counter[Rejection] = Counter()
         self._answered = 0
         self._answered_at = now
         self._output: Output | None = None
@@ -153,12 +154,12 @@ class Diagnostics:
         self._heard[topic] = now
         self._silent[topic] = False
 
-    def refused(self, refusal: Refusal, details: str, now: float) -> None:
+    def refused(self, refusal: Rejection, details: str, now: float) -> None:
         """Note a refusal."""
         self._refusals[refusal] += 1
         state = Level(WARN, f'{refusal.topic}: {refusal.reason} ({details})')
         self._refused.see(state, now)
-        if refusal.reason == PASSED_OVER:
+        if refusal.reason == DROPPED:
             self._timing.see(state, now)
 
     def answered(self, output: Output, came: float, now: float) -> bool:
@@ -199,8 +200,8 @@ class Diagnostics:
         return self._second_before.processing + self._second.processing
 
     def _limits_of(self, output: Output) -> Level:
-        if output.excesses:
-            return Level(ERROR, ', '.join(map(self._words, output.excesses)))
+        if output.exceedances:
+            return Level(ERROR, ', '.join(map(self._words, output.exceedances)))
         return _FINE
 
     def _setpoint_level(self, now: float) -> Level:
@@ -238,7 +239,7 @@ class Diagnostics:
                     else f'{now - at:.3f}') for topic, at in self._heard.items()]
         values += [(f'{topic}: writers', str(n)) for topic, n in self.writers.items()]
         values += [(f'{topic}: readers', str(n)) for topic, n in self.readers.items()]
-        values += [(f'refused, {topic}: {reason}', str(n))
+        values += [(f'rejected, {topic}: {reason}', str(n))
                    for (topic, reason), n in sorted(self._refusals.items())]
         return Status('setpoints', level, message or 'answered', tuple(values))
 
@@ -282,7 +283,7 @@ class Diagnostics:
         if times := self._processing:
             values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
                       ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
-        for key, reason in (('passed over', PASSED_OVER), ('incomplete', NOT_JOINED)):
+        for key, reason in (('dropped', DROPPED), ('incomplete', NOT_JOINED)):
             values.append((key, str(sum(n for refusal, n in self._refusals.items()
                                         if refusal.reason == reason))))
         return Status('timing', level, (message or (
@@ -295,7 +296,7 @@ class Diagnostics:
             return ''
         return f' (of the last setpoint, {age:.1f} s ago)'
 
-    def _words(self, excess: Excess) -> str:
+    def _words(self, excess: Exceedance) -> str:
         how = ', clipped' if excess.limit == 'limits.force_max' else ''
         return excess.words(self.parameters['joints']) + how
 

@@ -23,7 +23,7 @@ import math
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics import ERROR, Held, Level, OK, STALE, Status, WARN
 from stewart_dynamics.runtime.external_wrench import Estimate, Overload
-from stewart_dynamics.runtime.setpoints import Refusal
+from stewart_dynamics.runtime.rejections import Rejection
 
 _NAME = 'external wrench'
 _QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
@@ -51,7 +51,7 @@ class WrenchDiagnostics:
         self._estimated_at = -math.inf
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._refusals: Counter[Refusal] = Counter()
+        self._refusals: Counter[Rejection] = Counter()
         self._held = Held()
         self._level = OK  # in the last report
 
@@ -61,7 +61,7 @@ class WrenchDiagnostics:
         if self._begun == -math.inf:
             self._begun = now
 
-    def refused(self, refusal: Refusal, details: str, now: float) -> None:
+    def refused(self, refusal: Rejection, details: str, now: float) -> None:
         """Note a refusal."""
         self._refusals[refusal] += 1
         self._held.see(Level(WARN, f'{refusal.topic}: {refusal.reason} ({details})'), now)
@@ -96,7 +96,7 @@ class WrenchDiagnostics:
             values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
         if self._estimate is not None:
             values += self._numbers(self._estimate)
-        values += [(f'refused, {topic}: {reason}', str(n))
+        values += [(f'rejected, {topic}: {reason}', str(n))
                    for (topic, reason), n in sorted(self._refusals.items())]
         return Status(_NAME, level, message or 'no overload', tuple(values)),
 

@@ -35,17 +35,18 @@ from stewart_dynamics.arrays import Array, Flags, Integers, Six
 from stewart_dynamics.mechanics import forward_kinematics
 from stewart_dynamics.mechanics.interpolation import Cubics, Interpolation
 from stewart_dynamics.mechanics.jit import COMPILED
+from stewart_dynamics.mechanics.limits import Exceedance, LIMITS
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.setpoints import (
-    frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, QUATERNION_TOLERANCE,
-    unit_details, WRONG_FRAME)
-from stewart_dynamics.runtime.step import Excess, LIMITS
+from stewart_dynamics.runtime.rejections import (
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, WRONG_FRAME)
+from stewart_dynamics.runtime.samples import unit_quaternions
 
 INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
@@ -138,7 +139,7 @@ def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome
         yield from work.read()
         yield from work.solve()
         yield work.outcome()
-    except cdr.MalformedError as exc:
+    except MalformedError as exc:
         yield refused(MALFORMED, str(exc))
     except _Refused as exc:
         yield exc.outcome
@@ -157,17 +158,17 @@ class _Work:
     """The work on one trajectory."""
 
     def __init__(self, parameters: Parameters, wrench: Six, data: bytes) -> None:
-        self._message = cdr.PlatformTrajectory(data)
+        self._message = PlatformTrajectory(data)
         frame, base_frame = self._message.frame, parameters['base_frame'].encode()
         if frame not in (b'', base_frame):
             raise _Refused(WRONG_FRAME, f'{WRONG_FRAME}: {frame_details(frame, base_frame)}')
         many = self._message.size
         if not 1 <= many <= MOST_POINTS:
-            raise cdr.MalformedError(f'{many} points: must be 1 to {MOST_POINTS}')
+            raise MalformedError(f'{many} points: must be 1 to {MOST_POINTS}')
         self._parameters = parameters
         self._platform = StewartPlatform(parameters)
         self._wrench = np.array([wrench])
-        self._answer = cdr.LegTrajectory(
+        self._answer = LegTrajectory(
             self._message.stamp, parameters['joints'], many, parameters['trajectory.effort'])
         self._checks = _Checks(parameters)
         self._legs_checks = _Checks(parameters)
@@ -187,16 +188,12 @@ class _Work:
                 n = int(np.argmin(finite))
                 raise _Refused(NOT_FINITE, f'{NOT_FINITE}: points[{first + n}]: '
                                f'{tuple(numbers[n].tolist())}')
-            # The same arithmetic as for setpoints, so that the bits are the same.
-            x, y, z, w = numbers[:, 3:7].T
-            with np.errstate(over='ignore'):
-                length = np.sqrt(x * x + y * y + z * z + w * w)
-            if not (unit := np.abs(length - 1.0) <= QUATERNION_TOLERANCE).all():
+            quaternions, lengths, unit = unit_quaternions(numbers[:, 3:7])
+            if not unit.all():
                 n = int(np.argmin(unit))
                 raise _Refused(NOT_UNIT, f'{NOT_UNIT}: points[{first + n}]: '
-                               f'{unit_details(float(length[n]))}')
-            quaternions = x / length, y / length, z / length, w / length
-            self._quaternions[first:end] = np.column_stack(quaternions)
+                               f'{length_details(float(lengths[n]))}')
+            self._quaternions[first:end] = quaternions.T
             self._motions[first:end] = np.column_stack([
                 numbers[:, :3], *from_quaternion(*quaternions), numbers[:, 7:]])
             yield
@@ -204,7 +201,7 @@ class _Work:
     def _read_times(self, first: int, end: int, points: NDArray[np.void]) -> None:
         if (late := points['nanosec'] >= 1_000_000_000).any():
             n = int(np.argmax(late))
-            raise cdr.MalformedError(
+            raise MalformedError(
                 f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
                 'under 1000000000')
         times = self._times[first:end]
@@ -522,7 +519,7 @@ class _Checks:
         if not broken.any():
             return
         n, leg = np.unravel_index(np.argmin(np.where(broken, times, np.inf)), broken.shape)
-        excess = Excess(limit, int(leg), float(values[n, leg]), float(bounds[leg]))
+        excess = Exceedance(limit, int(leg), float(values[n, leg]), float(bounds[leg]))
         self.troubles.append(_Trouble(
             float(times[n, leg]), excess.leg, LIMIT, f' {excess.words(self._joints)}'))
 

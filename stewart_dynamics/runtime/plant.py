@@ -47,7 +47,8 @@ from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, scale, Vector3
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters import inertia_matrix, Parameter, PARAMETERS, Parameters
 
 # Under the node's name; those that it publishes in their order.
@@ -349,8 +350,8 @@ class Plant:
             parameters['noise.length'], parameters['noise.rate'], parameters['noise.force']], 6)
         self._noise = np.random.default_rng(np.float64(parameters['noise.seed']).view(np.uint64))
         frame = parameters['base_frame']
-        self._joint_state = cdr.JointState(parameters['joints'])
-        self._pose, self._six = cdr.Numbers(frame, 7), cdr.Numbers(frame, 6)
+        self._joint_state = JointStateWriter(parameters['joints'])
+        self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
 
     def advance(self, commands: Six, wrench: Six) -> State:
         """
