@@ -80,7 +80,7 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['*.html']},
+    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),
