@@ -1,12 +1,12 @@
-# `make demo` and `make test` need nothing set up before: the environment is made in .venv, with
-# ROS 2 from PyPI, or with the machine's own where one is sourced. Nothing outside this folder is
-# changed; `make clean` leaves nothing behind inside it.
+# `make demo` and `make test` need no preparation: they create the environment in .venv, with ROS 2
+# from PyPI, or with the installed ROS 2 where it is sourced. Nothing outside this folder is changed;
+# `make clean` removes everything that make has created inside it.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop docs \
-  environment lint test
+  docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -56,6 +56,7 @@ lint: $(INSTALLED)
 	.venv/bin/python -m ruff check --quiet .
 	.venv/bin/python -m flake8
 	.venv/bin/python -m mypy
+	.venv/bin/lint-imports --no-logo --cache-dir $(CACHE)/import_linter
 
 demo: $(INSTALLED)
 	@.venv/bin/python demo/demo.py
@@ -82,8 +83,17 @@ bench-replay: $(INSTALLED)
 bags: $(INSTALLED)
 	.venv/bin/python bags/record.py
 
+# The pictures and the generated tables in README.md and docs/.
 docs: $(INSTALLED)
-	.venv/bin/python docs/generate.py
+	.venv/bin/python docs/figures/misprints.py
+	.venv/bin/python docs/figures/draw.py
+	.venv/bin/python docs/figures/tables.py
+
+# The pages as a site: docs/_build/html/index.html.
+docs-site: $(INSTALLED)
+	.venv/bin/python -m sphinx --fresh-env --write-all --fail-on-warning --keep-going --quiet \
+	  docs docs/_build/html
+	@echo 'file://$(CURDIR)/docs/_build/html/index.html'
 
 environment: $(INSTALLED)
 
@@ -110,5 +120,5 @@ $(INSTALLED): $(DEPENDENCIES) setup.py setup.cfg pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf .cache .venv build install log *.egg-info
+	rm -rf .cache .venv build docs/_build install log *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

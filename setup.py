@@ -37,6 +37,13 @@ install_requires = [
 extras_require = {
     'cluster': ['distributed>=2024.1'],
     'differentiate': ['scipy>=1.10'],
+    'docs': [
+        'docutils>=0.20',
+        'furo>=2024.1',
+        'myst-parser>=2',
+        'numpydoc>=1.6',
+        'sphinx>=7.2',
+    ],
     'parquet': ['pyarrow>=14'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
@@ -56,6 +63,7 @@ extras_require = {
         'flake8-import-order',
         'flake8-quotes',
         'hypothesis',
+        'import-linter',
         'matplotlib',
         'mcap',
         'mcap-ros2-support',
@@ -100,10 +108,10 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'stewart_dynamics = stewart_dynamics.nodes.dynamics_node:main',
+            'stewart_dynamics = stewart_dynamics.nodes.programs:dynamics',
             'stewart_replay = stewart_dynamics.replay:main',
-            'stewart_simulator = stewart_dynamics.nodes.simulator_node:main',
-            'stewart_trajectory = stewart_dynamics.nodes.trajectory_node:main',
+            'stewart_simulator = stewart_dynamics.nodes.programs:simulator',
+            'stewart_trajectory = stewart_dynamics.nodes.programs:trajectory',
         ],
     },
 )

@@ -39,7 +39,8 @@ from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics.mechanics.reference_motion import sample_times, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 
 HERE = Path(__file__).resolve().parent
 NODE = 'stewart_dynamics'

@@ -50,7 +50,8 @@ from trajectory_msgs.msg import (
 from visualization_msgs.msg import MarkerArray
 
 from stewart_dynamics import Parameters, StewartPlatform
-from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.layout import Layout

@@ -44,7 +44,8 @@ import numpy as np
 from replay import table
 
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.nodes.markers import Markers
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import ExternalWrench

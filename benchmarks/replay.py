@@ -46,7 +46,8 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'

@@ -50,8 +50,9 @@ from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.standard import float64_array
-from stewart_dynamics.parameters import read_yaml
-from stewart_dynamics.runtime.plant import _advance, Plant, SimulatorParameters
+from stewart_dynamics.parameter_files import read_yaml
+from stewart_dynamics.runtime.plant import _advance, Plant
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 sys.path.append(str(HERE.parent / 'test'))
 from referees import energies, rng, smooth_motion  # noqa: E402, I100, I202

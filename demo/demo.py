@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Play the paper's bag into the real node in real time, and print what the legs had to do.
+Play the paper's bag into the real node in real time, and print the loads on the legs.
 
-``make demo`` runs it. The bag's messages go over ROS 2 topics as they were recorded, in another
-process than the node's.
+``make demo`` runs it. The bag's messages are published on ROS 2 topics as recorded, by another
+process than the node.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ QOS = QoSProfile(depth=1000)
 
 
 class Demo(Node):
-    """Publishes a bag's setpoints when they are due, and keeps what the node answers."""
+    """Publishes a bag's setpoints when they are due, and keeps the node's answers."""
 
     def __init__(self, bag: Path) -> None:
         super().__init__('demo')
@@ -77,11 +77,11 @@ class Demo(Node):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
 
     def connected(self) -> bool:
-        """Return whether the node hears us and we hear it."""
+        """Return whether all topics are connected in both directions."""
         return (all(p.get_subscription_count() for p in self.outputs.values())
                 and all(self.count_publishers(f'{NODE}/{topic}') for topic in (
                     'leg_states', 'jacobian_determinant', 'singularity_warning'))
-                # it reports once a second from when it is active
+                # published once a second while the node is active
                 and bool(self.diagnostics))
 
     def _on_warning(self, message: Bool) -> None:
@@ -110,7 +110,7 @@ def _wait(executor: Any, what: str, seconds: float, done: Any, process: Any) -> 
 
 
 def play(demo: Demo, executor: Any, process: Any) -> None:
-    """Publish the bag's messages as far apart in time as they were recorded."""
+    """Publish the bag's messages at the intervals of their recording."""
     first = demo.messages[0][0]
     begun = time.monotonic_ns()
     last = (demo.messages[-1][0] - first) * 1e-9
@@ -129,7 +129,7 @@ def play(demo: Demo, executor: Any, process: Any) -> None:
 
 
 def report(demo: Demo, parameters: Parameters) -> str:
-    """Return the table of what the node answered."""
+    """Return the table of the node's answers."""
     many = len(demo.states)
     stamps = np.array([_nanoseconds(state.header.stamp) for state in demo.states])
     forces = np.array([state.effort or [np.nan] * 6 for state in demo.states])
@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument('--bag', type=Path, default=ROOT / 'bags' / 'singular')
     parser.add_argument('--params', type=Path, default=ROOT / 'config' / 'platform.yaml')
     options = parser.parse_args()
-    # Apart from whatever else runs on this machine or its network.
+    # Isolated from other ROS programs on this computer and its network.
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(os.getpid() % 100 + 1))
     parameters = Parameters.from_yaml(options.params)
@@ -173,13 +173,13 @@ def main() -> None:
             demo = Demo(options.bag)
             executor = SingleThreadedExecutor()
             executor.add_node(demo)
-            print(f'the node {NODE} computes for {options.params.name}; it compiles first, which '
-                  'takes up to a minute the first time')
-            _wait(executor, 'the node has not come up', 60.0, demo.connected, process)
+            print(f'starting {NODE} with {options.params.name}; the first start compiles, which '
+                  'takes up to a minute')
+            _wait(executor, 'the node is not active', 60.0, demo.connected, process)
             play(demo, executor, process)
             print()
             print(report(demo, parameters))
-            print(f'\nthe report of this bag, with figures and the machine in motion:\n  {replay}')
+            print(f'\nreport of this bag, with plots and the hexapod in motion:\n  {replay}')
         except (KeyboardInterrupt, ExternalShutdownException):
             raise SystemExit(130) from None
         finally:

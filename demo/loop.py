@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-Run a controller in the loop with a simulated machine, and print how well the legs follow.
+Run a controller in the loop with a simulated hexapod, and print the tracking errors.
 
-``make demo-loop`` runs it: trajectory, node, simulator and examples/leg_controller.py, each in a
-process of its own, over ROS 2 topics; four times, without and with the node's forces as
-feed-forward, on a machine that is as the node believes and on one that carries more. The
-simulator owns time and waits for each command, so that no figure depends on this computer's load.
+``make demo-loop`` runs it: reference motion, node, simulator and examples/leg_controller.py, each
+in its own process, over ROS 2 topics; four times: without and with the node's forces as
+feed-forward, with the payload of the parameters and with more. The simulator owns time and waits
+for each command, so that no figure depends on the load of the computer.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ import yaml
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
 from stewart_dynamics.parameters import Parameters
@@ -70,11 +70,11 @@ QOS = QoSProfile(depth=1000)
 BEGIN = 1_000_000_000  # of simulated time [ns]
 RATE = 1000.0  # of setpoints, states and commands [Hz]
 HEAVIER = 1.3
-# Nothing takes so long on a computer at rest, though two programs compile first [s].
+# Longer than any wait on an idle computer, including the compilation of two programs [s].
 PATIENCE = 60.0
-LOOK = 0.1  # how often programs and progress are looked after [s]
+LOOK = 0.1  # interval between checks of programs and progress [s]
 
-# What is started, in this order; the last when the others hear each other: it sets all in motion.
+# Started in this order; the last one, which starts the motion, when the others are connected.
 PROGRAMS: dict[str, list[str | Path]] = {
     'stewart_simulator': [Path(sys.executable).with_name('stewart_simulator')],
     'stewart_dynamics': [Path(sys.executable).with_name('stewart_dynamics')],
@@ -86,11 +86,11 @@ UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position'
 
 
 class Failure(Exception):
-    """What ends the demo; its text is one line."""
+    """Ends the demo; its text is one line."""
 
 
 class Errors(NamedTuple):
-    """How far what was measured is from what was desired for the same time, N times."""
+    """Measured minus desired state at the same times, N samples."""
 
     seconds: Array
     """Since the start of the motion (N,)."""
@@ -108,11 +108,11 @@ class Errors(NamedTuple):
 
 
 class Run(NamedTuple):
-    """One of the four, and what it gave."""
+    """One of the four runs and its errors."""
 
     feed_forward: bool
     payload: float
-    """The simulator's, of that which the node believes in."""
+    """Mass of the simulated platform, relative to the node's parameters."""
     errors: Errors
 
     @property
@@ -127,7 +127,7 @@ class Run(NamedTuple):
 
 
 class Recorder(Node):
-    """Keeps what is measured, as it comes."""
+    """Records the measured states."""
 
     def __init__(self) -> None:
         super().__init__('recorder')
@@ -149,37 +149,37 @@ class Recorder(Node):
 
     def ready(self) -> bool:
         """
-        Return whether the simulator is heard and the controller hears the node.
+        Return whether the simulator is received and the controller is subscribed to the node.
 
-        The node answers each setpoint once, so it must know the controller before the first. All
-        else is said again, or waited for, until it is heard.
+        The node answers each setpoint once, so the controller must be connected before the first.
+        Everything else is repeated, or waited for, until it is received.
         """
         return self._readers > 0 and bool(self.states) and bool(self.poses)
 
     @property
     def time(self) -> int:
-        """How far simulated time has come since it began [ns]."""
+        """Simulated time since its start [ns]."""
         last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
         return max(last - BEGIN, 0)
 
-    def errors(self, times: NDArray[np.int64], lengths: Array, wanted: Motion) -> Errors:
-        """Return how far this is from a motion (N,) and its leg positions (N, 6) by its times."""
+    def errors(self, times: NDArray[np.int64], lengths: Array, desired: Motion) -> Errors:
+        """Return the errors from a motion (N,) and its leg positions (N, 6) at its times."""
         states = {_stamp(data): np.array(deserialize_message(data, JointState).position)
                   for data in self.states}
         poses = {stamp: numbers for stamp, _, numbers in map(pose, self.poses)}
         stamps = (BEGIN + times).tolist()
         missing = sum(stamp not in states or stamp not in poses for stamp in stamps)
         if missing:
-            raise Failure(f'{missing} of {len(stamps)} states have not come')
+            raise Failure(f'{missing} of {len(stamps)} states are missing')
         true = np.array([poses[stamp] for stamp in stamps])
         rotation = np.moveaxis(np.reshape(from_quaternion(*true[:, 3:].T), (3, 3, -1)), -1, 0)
-        turned = wanted.rotation.swapaxes(1, 2) @ rotation
-        # By the sine: no angle below 1e-8 is seen in the cosine.
+        turned = desired.rotation.swapaxes(1, 2) @ rotation
+        # By the sine: the cosine does not resolve angles below 1e-8.
         sine = 0.5 * np.linalg.norm(turned[:, [2, 0, 1], [1, 2, 0]]
                                     - turned[:, [1, 2, 0], [2, 0, 1]], axis=1)
         return Errors(
             times * 1e-9, 1e6 * (np.array([states[stamp] for stamp in stamps]) - lengths),
-            1e6 * np.linalg.norm(true[:, :3] - wanted.position, axis=1),
+            1e6 * np.linalg.norm(true[:, :3] - desired.position, axis=1),
             1e6 * np.arcsin(np.minimum(sine, 1.0)))
 
 
@@ -190,28 +190,28 @@ def _stamp(message: bytes) -> int:
 
 
 class Program:
-    """One of the four in a process of its own."""
+    """One of the four programs, in its own process."""
 
     def __init__(self, name: str, arguments: Sequence[str | Path], folder: Path) -> None:
         self.name = name
-        self._said = folder / f'{name}.txt'
-        with self._said.open('wb') as said:
-            self._process = subprocess.Popen([*PROGRAMS[name], *arguments], stdout=said,
-                                             stderr=said, stdin=subprocess.DEVNULL)
+        self._output = folder / f'{name}.txt'
+        with self._output.open('wb') as output:
+            self._process = subprocess.Popen([*PROGRAMS[name], *arguments], stdout=output,
+                                             stderr=output, stdin=subprocess.DEVNULL)
 
     @property
     def last_line(self) -> str:
-        """What it has said last."""
-        return (self._said.read_text(errors='replace').splitlines() or ['nothing was said'])[-1]
+        """The last line that it has printed."""
+        return (self._output.read_text(errors='replace').splitlines() or ['no output'])[-1]
 
     def check(self) -> None:
-        """Raise Failure if it has ended; the trajectory may, when it has published all."""
+        """Raise Failure if it has ended, unless the reference motion is complete."""
         code = self._process.poll()
         if code or (code == 0 and self.name != 'stewart_trajectory'):
             raise Failure(f'{self.name} ended with exit code {code}: {self.last_line}')
 
     def stop(self) -> None:
-        """Tell it to end, if it still runs."""
+        """Terminate it, if it still runs."""
         self._process.terminate()
 
     def wait(self) -> None:
@@ -225,24 +225,27 @@ class Program:
 
 class Loop:
     """
-    What all runs have in common: machine, motion and gains.
+    What all runs have in common: hexapod, motion and gains.
 
     Parameters
     ----------
-    machine, motion : Path
-        Parameter files of the node and of the trajectory.
+    hexapod, motion : Path
+        Parameter files of the node and of the reference motion.
     seconds : float
-        How much of the motion.
+        Duration of the motion [s].
     bandwidth : float
         Natural frequency [Hz] of a leg under PD control, with a damping ratio of 1, and with the
-        mass that it moves at the start while the other five hold still.
+        mass that it moves at the start while the other five are held.
 
-    Raises Failure for a motion that does not begin at rest, and no bandwidth.
+    Raises
+    ------
+    Failure
+        The motion does not begin at rest, or the bandwidth is not positive.
 
     """
 
-    def __init__(self, machine: Path, motion: Path, seconds: float, bandwidth: float) -> None:
-        parameters = Parameters.from_yaml(machine)
+    def __init__(self, hexapod: Path, motion: Path, seconds: float, bandwidth: float) -> None:
+        parameters = Parameters.from_yaml(hexapod)
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
                       'motion.duration': seconds, 'base_frame': parameters['base_frame']}
         settings = TrajectoryParameters.from_yaml(motion).replaced(trajectory, str(motion))
@@ -260,10 +263,10 @@ class Loop:
         omega = 2.0 * math.pi * bandwidth
         self.gains = {'proportional_gain': self.leg_mass * omega ** 2,
                       'derivative_gain': 2.0 * self.leg_mass * omega}
-        self._machine = parameters['platform.mass'], parameters['platform.inertia']
+        self._payload = parameters['platform.mass'], parameters['platform.inertia']
         self._files = {
-            'stewart_simulator': [machine, ROOT / 'config' / 'simulator.yaml'],
-            'stewart_dynamics': [machine], 'stewart_trajectory': [motion]}
+            'stewart_simulator': [hexapod, ROOT / 'config' / 'simulator.yaml'],
+            'stewart_dynamics': [hexapod], 'stewart_trajectory': [motion]}
         self._given: dict[str, dict[str, Any]] = {
             'stewart_simulator': {'use_sim_time': True, 'rate': RATE, 'initial_pose': [
                 *start.position.tolist(), *_angles(start.rotation)]},
@@ -272,8 +275,8 @@ class Loop:
             'stewart_trajectory': {'use_sim_time': True, **trajectory}}
 
     def run(self, feed_forward: bool, payload: float, tell: Callable[[int], object]) -> Run:
-        """Run the four programs, telling how far time is [ns], and return the errors."""
-        mass, inertia = self._machine
+        """Run the four programs, report the simulated time [ns], and return the errors."""
+        mass, inertia = self._payload
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
         given['leg_controller']['ros__parameters']['feed_forward'] = feed_forward
         given['stewart_simulator']['ros__parameters'].update({
@@ -297,7 +300,7 @@ class Loop:
                     since = now
                     tell(reached)
                 if now - since > PATIENCE:
-                    raise Failure(f'stands still at {reached * 1e-9:.3f} s; ' + '; '.join(
+                    raise Failure(f'no progress at {reached * 1e-9:.3f} s; ' + '; '.join(
                         f'{each.name}: {each.last_line}' for each in programs))
 
         with tempfile.TemporaryDirectory() as folder:
@@ -324,7 +327,7 @@ class Loop:
 
 
 def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
-    """Return the mass that a leg moves alone [kg], the mean of the six."""
+    """Return the mass that one leg moves alone [kg], the mean of the six."""
     to_legs = np.linalg.inv(platform.jacobian(motion.position, motion.rotation))
     masses = to_legs.T @ platform.mass_matrix(motion.position, motion.rotation) @ to_legs
     return float(np.mean(np.diag(masses)))
@@ -335,17 +338,18 @@ def _angles(r: Array) -> list[float]:
     return [math.atan2(r[2, 1], r[2, 2]), -math.asin(r[2, 0]), math.atan2(r[1, 0], r[0, 0])]
 
 
-def machine(payload: float) -> str:
-    """Return in words what the simulator's machine is to the node."""
+def payload_name(payload: float) -> str:
+    """Return the name of the simulated payload."""
     more = 100.0 * (payload - 1.0)
-    return f'payload {more:+.0f} %' if more else 'as the node believes'
+    return f'payload {more:+.0f} %' if more else 'as in the parameters'
 
 
 def table(runs: Sequence[Run]) -> str:
     """Return the table of all runs: without and with feed-forward, side by side."""
     pairs = list(zip(runs[::2], runs[1::2], strict=True))
-    lines = ['tracking error        ' + ''.join(f'{machine(pd.payload):^36}' for pd, _ in pairs),
-             'RMS (peak)            ' + f'{"PD alone":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
+    lines = ['tracking error        '
+             + ''.join(f'{payload_name(pd.payload):^36}' for pd, _ in pairs),
+             'RMS (peak)            ' + f'{"PD only":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
     for name, unit in UNITS.items():
         line = f'{name:12}{unit:>5}     '
         for pd, forward in pairs:
@@ -365,8 +369,8 @@ def draw(path: Path, runs: Sequence[Run]) -> None:
         for run, color in zip(pair, ('#d55e00', '#0072b2'), strict=True):
             errors = np.sqrt(np.mean(np.square(run.errors.legs), axis=1))
             axes.plot(run.errors.seconds, errors, color=color, linewidth=1.2,
-                      label='PD and the forces of the node' if run.feed_forward else 'PD alone')
-        axes.set(title=machine(pair[0].payload), xlabel='time  [s]', yscale='log',
+                      label='PD and the forces of the node' if run.feed_forward else 'PD only')
+        axes.set(title=payload_name(pair[0].payload), xlabel='time  [s]', yscale='log',
                  xlim=(0.0, run.errors.seconds[-1]))
     panels[0].set_ylabel('error of the leg lengths, RMS of six  [µm]')
     panels[0].legend(frameon=False)
@@ -385,15 +389,16 @@ def main() -> None:
     """Run the loop four times, print the table, draw the plot."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--params', type=Path, default=ROOT / 'config' / 'platform.yaml',
-                        help='the machine')
+                        help='parameter file of the hexapod')
     parser.add_argument('--motion', type=Path, default=ROOT / 'config' / 'trajectory_loop.yaml',
-                        help='the motion, which must begin at rest')
-    parser.add_argument('--seconds', type=float, default=10.0, help='how much of it')
-    parser.add_argument('--bandwidth', type=float, default=8.0, help='of a leg under PD [Hz]')
+                        help='parameter file of the motion, which must begin at rest')
+    parser.add_argument('--seconds', type=float, default=10.0, help='duration of the motion [s]')
+    parser.add_argument('--bandwidth', type=float, default=8.0,
+                        help='natural frequency of a leg under PD control [Hz]')
     parser.add_argument('--output', type=Path, default=ROOT / 'looped',
-                        help='folder that gets loop.json and loop.png')
+                        help='folder for loop.json and loop.png')
     options = parser.parse_args()
-    # Apart from whatever else runs on this computer or its network.
+    # Isolated from other ROS programs on this computer and its network.
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(os.getpid() % 100 + 1))
     runs: list[Run] = []
@@ -401,7 +406,7 @@ def main() -> None:
         loop = Loop(options.params, options.motion, options.seconds, options.bandwidth)
         options.output.mkdir(parents=True, exist_ok=True)
         rclpy.init()
-        print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1 with the {loop.leg_mass:.0f} kg '
+        print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1, with the {loop.leg_mass:.0f} kg '
               f'that it moves alone: {loop.gains["proportional_gain"]:.3g} N/m, '
               f'{loop.gains["derivative_gain"]:.3g} N s/m')
         begun = time.monotonic()
@@ -410,7 +415,7 @@ def main() -> None:
             for payload in (1.0, HEAVIER):
                 for feed_forward in (False, True):
                     progress.set_description_str(
-                        f'{"PD + forces" if feed_forward else "PD alone"}, {machine(payload)}')
+                        f'{"PD + forces" if feed_forward else "PD only"}, {payload_name(payload)}')
                     before = len(runs) * options.seconds
                     runs.append(loop.run(feed_forward, payload, lambda reached, before=before: (
                         progress.update(before + min(reached * 1e-9, options.seconds)

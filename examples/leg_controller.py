@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-An example: PD control of the legs, with the node's forces as feed-forward. Copy what you need.
+Example: PD control of the legs with the node's forces as feed-forward. Copy what you need.
 
-It is no part of the package, which computes forces and controls nothing. For each leg
+It is not a part of the package, which computes forces and controls nothing. For each leg
 
     force = k_p (q_d - q) + k_d (v_d - v) + effort_d
 
-with length q and rate v as measured, and q_d, v_d, effort_d as stewart_dynamics publishes them.
+with measured length q and rate v, and q_d, v_d, effort_d as published by stewart_dynamics.
 """
 
 import math
@@ -41,15 +41,15 @@ class LegController(Node):
     """
     Answers each measured state of the legs with six forces.
 
-    In real time the latest desired state is the one to reach, unless it is older than the
-    timeout. With use_sim_time the simulation waits for each command: the desired state of the
-    very same stamp is awaited, and each stamp is answered once.
+    In real time the controller follows the latest desired state, unless it is older than the
+    timeout. With use_sim_time the simulation waits for each command: the controller waits for
+    the desired state of the same stamp, and answers each stamp once.
     """
 
     def __init__(self) -> None:
         super().__init__('leg_controller')
-        # 8 Hz and a damping ratio of 1 on the 160 kg that a leg of config/platform.yaml moves
-        # at home while the other five hold still.
+        # 8 Hz and a damping ratio of 1 with 160 kg, the mass that one leg of
+        # config/platform.yaml moves at home while the other five are held.
         self.k_p = self.positive('proportional_gain', 4.0e5, 'force per length [N/m]')
         self.k_d = self.positive('derivative_gain', 1.6e4, 'force per rate [N s/m]')
         self.timeout = self.positive('timeout', 0.05, 'oldest desired state to follow [s]')
@@ -64,12 +64,12 @@ class LegController(Node):
             JointState, 'stewart_dynamics/leg_states', self.on_desired, 1)
 
     def constant(self, name: str, default: object, text: str) -> object:
-        """Return the value of a parameter that does not change while the controller runs."""
+        """Declare a read-only parameter and return its value."""
         return self.declare_parameter(
             name, default, ParameterDescriptor(description=text, read_only=True)).value
 
     def positive(self, name: str, default: float, text: str) -> float:
-        """Return the value of one that is a positive number."""
+        """Declare a read-only parameter that is finite and not negative; return its value."""
         value = self.constant(name, default, text)
         if not 0.0 <= value < math.inf:
             raise ValueError(f'{name}: {value}: must be finite and at least 0')
@@ -85,7 +85,7 @@ class LegController(Node):
             self.command()
 
     def command(self) -> None:
-        """Publish the forces for what is measured and desired now, if there are any."""
+        """Publish the forces for the measured and the desired state, if both are there."""
         measured, desired = self.measured, self.desired
         if measured is None or desired is None:
             return
@@ -96,20 +96,20 @@ class LegController(Node):
                 return
             self.answered = stamp
         elif time.monotonic() - self.desired_at > self.timeout:
-            return self.refuse(f'no desired state for {self.timeout} s')
+            return self.no_command(f'no desired state for {self.timeout} s')
         if measured.name != desired.name:
-            return self.refuse(f'{measured.name} measured, {desired.name} desired')
+            return self.no_command(f'{measured.name} measured, {desired.name} desired')
         force = (self.k_p * np.subtract(desired.position, measured.position)
                  + self.k_d * np.subtract(desired.velocity, measured.velocity))
         if self.feed_forward:
             if len(desired.effort) != len(force):
-                return self.refuse('no desired effort: the forces are suppressed or unsolvable')
+                return self.no_command('no desired effort: forces suppressed or not computable')
             force += desired.effort
         if not np.isfinite(force).all():
-            return self.refuse(f'the forces are {force}')
+            return self.no_command(f'the forces are {force}')
         self.commands.publish(Float64MultiArray(data=force.tolist()))
 
-    def refuse(self, why: str) -> None:
+    def no_command(self, why: str) -> None:
         self.get_logger().error(f'no command: {why}', throttle_duration_sec=1.0)
 
 
@@ -125,7 +125,7 @@ def main() -> None:
     except (InvalidParameterTypeException, ValueError) as exc:
         sys.exit(f'leg_controller: {exc}')
     except Exception:
-        if rclpy.ok():  # else a signal has ended ROS in the middle of something
+        if rclpy.ok():  # otherwise a signal has shut down ROS during the call
             raise
     finally:
         executor.shutdown()

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-An example: ask stewart_dynamics for the legs' way through a planned motion. Copy what you need.
+Example: get the leg trajectory of a planned motion from stewart_dynamics. Copy what you need.
 
-The motion goes from pose to pose, at rest at both ends. It is published as a whole on
-stewart_dynamics/platform_trajectory; the answer comes on stewart_dynamics/leg_trajectory, as a
-joint_trajectory_controller takes it. A refused motion has no answer: /diagnostics say why.
+The motion leads from pose to pose, at rest at both ends. It is published as a whole on
+stewart_dynamics/platform_trajectory; the answer on stewart_dynamics/leg_trajectory is what a
+joint_trajectory_controller takes. A rejected motion has no answer: /diagnostics states the reason.
 Exit code: 0 answered, 1 not.
 """
 
@@ -38,8 +38,8 @@ from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml
@@ -51,7 +51,7 @@ def vector(three: np.ndarray) -> Vector3:
 
 
 def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajectory:
-    """Return a motion from pose to pose, X Y Z alpha beta gamma [m, rad], in so many seconds."""
+    """Return a motion from pose to pose, X Y Z alpha beta gamma [m, rad], of a duration [s]."""
     parameters = TrajectoryParameters({
         'motion.type': 'quintic', 'motion.initial': start, 'motion.final': end,
         'motion.duration': duration, 'rate': 100.0})
@@ -59,12 +59,12 @@ def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajecto
     motion = motion_at(parameters, times * 1e-9)
     message = MultiDOFJointTrajectory(joint_names=['platform'])
     message.header.frame_id = 'base'
-    # Its stamp stays zero: the controller begins at once.
+    # A stamp of zero: the controller starts at once.
     for n, (x, y, z, w) in enumerate(to_quaternion(motion.rotation).tolist()):
         message.points.append(MultiDOFJointTrajectoryPoint(
             transforms=[Transform(translation=vector(motion.position[n]),
                                   rotation=Quaternion(x=x, y=y, z=z, w=w))],
-            # Of the platform's origin, in the base's axes.
+            # Of the platform's origin, in base axes.
             velocities=[Twist(linear=vector(motion.linear_velocity[n]),
                               angular=vector(motion.angular_velocity[n]))],
             accelerations=[Twist(linear=vector(motion.linear_acceleration[n]),
@@ -74,11 +74,11 @@ def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajecto
 
 
 class Planner(Node):
-    """Sends motions, and keeps what comes of them."""
+    """Publishes trajectories and keeps the answers."""
 
     def __init__(self) -> None:
         super().__init__('planner')
-        self.answers, self.heard, self.refused, self.why = [], False, 0, ''
+        self.answers, self.connected, self.rejected, self.reason = [], False, 0, ''
         self.motions = self.create_publisher(
             MultiDOFJointTrajectory, 'stewart_dynamics/platform_trajectory', 1)
         self.create_subscription(
@@ -87,14 +87,14 @@ class Planner(Node):
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            self.heard |= status.name.startswith('stewart_dynamics: ')
+            self.connected |= status.name.startswith('stewart_dynamics: ')
             if status.name == 'stewart_dynamics: trajectory':
                 values = {pair.key: pair.value for pair in status.values}
-                self.refused, self.why = int(values['refused']), status.message
+                self.rejected, self.reason = int(values['refused']), status.message
 
     def ready(self) -> bool:
-        """Return whether the node hears us and we hear it: it answers once."""
-        return (self.heard and self.motions.get_subscription_count() > 0
+        """Return whether both directions are connected: the node answers only once."""
+        return (self.connected and self.motions.get_subscription_count() > 0
                 and self.count_publishers('stewart_dynamics/leg_trajectory') > 0)
 
     def until(self, done: Callable[[], bool], timeout: float) -> bool:
@@ -105,15 +105,15 @@ class Planner(Node):
 
 
 def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> JointTrajectory:
-    """Return the answer to a motion; end with one line where there is none."""
+    """Return the answer to a trajectory; exit with one line if there is none."""
     if not planner.until(planner.ready, timeout):
-        sys.exit(f'stewart_dynamics has not come up within {timeout:g} s')
-    before = planner.refused
+        sys.exit(f'stewart_dynamics was not found within {timeout:g} s')
+    before = planner.rejected
     planner.motions.publish(motion)
-    if not planner.until(lambda: planner.answers or planner.refused > before, timeout):
+    if not planner.until(lambda: planner.answers or planner.rejected > before, timeout):
         sys.exit(f'no answer within {timeout:g} s')
     if not planner.answers:
-        sys.exit(planner.why)
+        sys.exit(planner.reason)
     return planner.answers[0]
 
 
@@ -123,7 +123,8 @@ def main() -> None:
     parser.add_argument('--from', dest='start', default=HOME, help='[m, rad]', **pose)
     parser.add_argument('--to', default=[0.1, -0.05, 1.2, 0.0, 0.1, 0.3], help='[m, rad]', **pose)
     parser.add_argument('--duration', type=float, default=2.0, help='[s]')
-    parser.add_argument('--timeout', type=float, default=10.0, help='of the node [s]')
+    parser.add_argument('--timeout', type=float, default=10.0,
+                        help='for the node to appear, and to answer [s]')
     rclpy.init()
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:

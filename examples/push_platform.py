@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-An example: push the simulated platform, and print what stewart_dynamics finds of it.
+Example: apply a load to the simulated platform and print the external wrench that is estimated.
 
-The push goes to stewart_simulator/wrench; the node, its ~/measured_legs connected to
-stewart_simulator/leg_states, publishes stewart_dynamics/external_wrench. Run it while the machine
-is under control: brakes that hold are a load, too.
+The load is published on stewart_simulator/wrench; the node, its ~/measured_legs connected to
+stewart_simulator/leg_states, publishes stewart_dynamics/external_wrench. Run it while a controller
+moves the hexapod: brakes that hold appear as a load, too.
 """
 
 import argparse
@@ -31,7 +31,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 
-SETTLE = 1_000_000_000  # the push lasts so long by the stamps of the answers [ns]
+SETTLE = 1_000_000_000  # duration of the load by the stamps of the answers [ns]
 
 
 def vector(three: list) -> Vector3:
@@ -40,7 +40,7 @@ def vector(three: list) -> Vector3:
 
 
 class Pusher(Node):
-    """Publishes loads, and keeps what the node finds."""
+    """Publishes loads and keeps the estimated external wrench."""
 
     def __init__(self) -> None:
         super().__init__('pusher')
@@ -53,7 +53,7 @@ class Pusher(Node):
         self.found = found
 
     def wait(self, timeout: float) -> WrenchStamped:
-        """Return the next wrench that the node finds."""
+        """Return the next external wrench that the node publishes."""
         self.found, end = None, time.monotonic() + timeout
         while self.found is None or not self.loads.get_subscription_count():
             if time.monotonic() > end:
@@ -62,7 +62,7 @@ class Pusher(Node):
         return self.found
 
     def push(self, force: list, moment: list, timeout: float) -> WrenchStamped:
-        """Push at the platform's origin [N, N m], base axes; return what is found at the end."""
+        """Apply a load at the platform's origin [N, N m], base axes; return the last estimate."""
         found = self.wait(timeout)
         load = WrenchStamped(wrench=Wrench(force=vector(force), torque=vector(moment)))
         load.header.frame_id = 'base'
@@ -84,7 +84,8 @@ def main() -> None:
     three = {'nargs': 3, 'type': float, 'metavar': ('X', 'Y', 'Z')}
     parser.add_argument('--force', default=[300.0, 0.0, -100.0], help='[N]', **three)
     parser.add_argument('--moment', default=[0.0, 0.0, 50.0], help='[N m]', **three)
-    parser.add_argument('--timeout', type=float, default=10.0, help='of an answer [s]')
+    parser.add_argument('--timeout', type=float, default=10.0,
+                        help='for the next external wrench [s]')
     rclpy.init()
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     pusher = Pusher()

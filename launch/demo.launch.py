@@ -14,7 +14,7 @@
 
 
 """
-The machine in the loop, in real time: a motion, the node, the simulator and a controller.
+Start reference motion, node, simulator and an example controller, in real time.
 
     ros2 launch stewart_dynamics demo.launch.py feed_forward:=false payload_factor:=1.3
 """
@@ -33,7 +33,7 @@ from stewart_dynamics.parameters import Parameters
 
 
 def simulator(context: LaunchContext) -> list[Node]:
-    """Return the simulator, its payload another one than the node believes in."""
+    """Return the simulator, its payload scaled by payload_factor."""
     file = LaunchConfiguration('params_file').perform(context)
     factor = float(LaunchConfiguration('payload_factor').perform(context))
     parameters = Parameters.from_yaml(file)
@@ -49,24 +49,25 @@ def simulator(context: LaunchContext) -> list[Node]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the four and their arguments."""
+    """Return the four nodes and the arguments."""
     share = FindPackageShare('stewart_dynamics')
     return LaunchDescription([
         DeclareLaunchArgument(
             'trajectory_file',
             default_value=PathJoinSubstitution([share, 'config', 'trajectory_loop.yaml']),
-            description='YAML file with the parameters of the motion'),
+            description='YAML file with the parameters of the reference motion'),
         DeclareLaunchArgument(
             'simulator_file',
             default_value=PathJoinSubstitution([share, 'config', 'simulator.yaml']),
-            description='YAML file with the parameters of the simulation: the motion must begin '
-                        'in its initial_pose'),
+            description='YAML file with the parameters of the simulation; the motion must begin '
+                        'at its initial_pose'),
         DeclareLaunchArgument(
             'payload_factor', default_value='1.0',
-            description='mass and inertia of the simulated platform, of those in params_file'),
+            description='mass and inertia of the simulated platform, relative to those in '
+                        'params_file'),
         DeclareLaunchArgument(
             'controller', default_value='true', choices=['true', 'false'],
-            description='run the example controller; false: run your own on '
+            description='run the example controller; false: run your own, which publishes on '
                         'stewart_simulator/commands'),
         DeclareLaunchArgument(
             'feed_forward', default_value='true', choices=['true', 'false'],
@@ -74,10 +75,10 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'params_file',
             default_value=PathJoinSubstitution([share, 'config', 'platform.yaml']),
-            description='YAML file with the parameters of the machine'),
+            description='YAML file with the parameters of the hexapod'),
         DeclareLaunchArgument(
-            'namespace', default_value='', description='namespace of all of them'),
-        # What the simulator measures is the node's, which says what touches the platform.
+            'namespace', default_value='', description='namespace of all nodes'),
+        # With the measured legs of the simulator the node estimates the external wrench.
         Node(
             package='stewart_dynamics',
             executable='stewart_dynamics',
@@ -87,7 +88,7 @@ def generate_launch_description() -> LaunchDescription:
             remappings=[('~/measured_legs', 'stewart_simulator/leg_states')],
             output='screen'),
         OpaqueFunction(function=simulator),
-        # No executable of the package, but a file to copy.
+        # An example to copy, not an executable of the package.
         Node(
             executable=sys.executable,
             arguments=[PathJoinSubstitution([share, 'examples', 'leg_controller.py'])],

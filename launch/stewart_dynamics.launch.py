@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The node, with its parameters from a file; it brings itself to active."""
+"""Start the node with its parameters from a file; it becomes active by itself."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -29,7 +29,7 @@ def generate_launch_description() -> LaunchDescription:
             'params_file',
             default_value=PathJoinSubstitution(
                 [FindPackageShare('stewart_dynamics'), 'config', 'platform.yaml']),
-            description='YAML file with the parameters of the machine'),
+            description='YAML file with the parameters of the hexapod'),
         DeclareLaunchArgument(
             'namespace', default_value='', description='namespace of the node and its topics'),
         Node(

@@ -13,38 +13,38 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-# Makes a certificate authority and, for the node and each process that it talks with, a folder
+# Creates a certificate authority and, for the node and each process that it connects to, a folder
 # with key, certificate, Fast DDS profile and environment: see README.md.
 
 set -euo pipefail
 umask 077
 
-refuse() {
+fail() {
   echo "make_keys.sh: $1" >&2
   exit 2
 }
 
-(($# >= 2)) || refuse 'usage: make_keys.sh FOLDER NAME=ADDRESS:PORT ..., one for each process that the node dials'
+(($# >= 2)) || fail 'usage: make_keys.sh FOLDER NAME=ADDRESS:PORT ..., one for each process that the node connects to'
 folder=$1
 shift
-[[ ! -e $folder ]] || refuse "$folder: exists; keys are never overwritten"
+[[ ! -e $folder ]] || fail "$folder: exists; keys are never overwritten"
 octet='(25[0-5]|2[0-4][0-9]|1[0-9][0-9]|[1-9]?[0-9])'
 names=' ca node '
 for peer in "$@"; do
   [[ $peer =~ ^([a-z][a-z0-9_]*)=($octet\.$octet\.$octet\.$octet):([1-9][0-9]{0,4})$ ]] ||
-    refuse "$peer: must be NAME=ADDRESS:PORT, NAME of a-z 0-9 _, ADDRESS as 192.168.1.10"
-  ((BASH_REMATCH[7] < 65536)) || refuse "$peer: the port must be at most 65535"
-  [[ $names != *" ${BASH_REMATCH[1]} "* ]] || refuse "${BASH_REMATCH[1]}: given twice, or ca or node, which are made anyway"
+    fail "$peer: must be NAME=ADDRESS:PORT, NAME of a-z 0-9 _, ADDRESS as 192.168.1.10"
+  ((BASH_REMATCH[7] < 65536)) || fail "$peer: the port must be at most 65535"
+  [[ $names != *" ${BASH_REMATCH[1]} "* ]] || fail "${BASH_REMATCH[1]}: given twice, or ca or node, which are created in any case"
   names+="${BASH_REMATCH[1]} "
 done
-command -v openssl > /dev/null || refuse 'openssl: not installed'
+command -v openssl > /dev/null || fail 'openssl: not installed'
 
-# All of it or nothing takes the name.
+# The folder gets its name only when it is complete.
 mkdir -p "$(dirname "$folder")"
 making=$(mktemp -d "$folder.XXXXXX")
 trap 'rm -rf "$making"' EXIT
 
-# The machine's own settings of OpenSSL have no say in the keys.
+# Independent of the OpenSSL configuration of this computer.
 export OPENSSL_CONF=$making/openssl.cnf
 cat > "$OPENSSL_CONF" << 'END'
 [req]
@@ -54,7 +54,7 @@ distinguished_name = name
 basicConstraints = critical, CA:true, pathlen:0
 keyUsage = critical, keyCertSign
 subjectKeyIdentifier = hash
-[dials]
+[connects]
 basicConstraints = critical, CA:false
 keyUsage = critical, digitalSignature
 extendedKeyUsage = critical, clientAuth
@@ -65,7 +65,7 @@ extendedKeyUsage = critical, serverAuth
 END
 
 run() {
-  openssl "$@" 2> "$making/said" || refuse "openssl $1: $(tail -n 1 "$making/said")"
+  openssl "$@" 2> "$making/said" || fail "openssl $1: $(tail -n 1 "$making/said")"
 }
 
 # key NAME: a folder with a new private key in it.
@@ -144,13 +144,13 @@ key ca
 run req -new -x509 -key "$making/ca/key.pem" -subj '/CN=stewart_dynamics' -days 3650 -sha256 \
   -config "$OPENSSL_CONF" -extensions authority -out "$making/ca/cert.pem"
 
-dialled=''
+peers=''
 for peer in "$@"; do
   name=${peer%%=*}
   address=${peer#*=}
   port=${address#*:}
   address=${address%:*}
-  dialled+="
+  peers+="
             <locator>
               <tcpv4>
                 <address>$address</address>
@@ -166,8 +166,9 @@ for peer in "$@"; do
           <address>$address</address>
         </interfaceWhiteList>" ''
   environment "$name" 'export OPENSSL_CONF="$STEWART_KEYS/openssl.cnf"'
-  # Fast DDS verifies whom it dials, but never who dials it: OpenSSL is told to. In TLS 1.3 who is
-  # turned away would learn it late and dial again at once, which takes the others' time.
+  # Fast DDS verifies the process that it connects to, but not one that connects to it: OpenSSL does
+  # so here. In TLS 1.3 a rejected process would notice it late and connect again at once, which
+  # delays the others.
   cat > "$making/$name/openssl.cnf" << 'END'
 openssl_conf = all
 [all]
@@ -182,9 +183,9 @@ END
 done
 
 key node
-certify node dials
+certify node connects
 profile node '' "        <builtin>
-          <initialPeersList>$dialled
+          <initialPeersList>$peers
           </initialPeersList>
         </builtin>"
 environment node

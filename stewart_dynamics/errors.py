@@ -12,28 +12,55 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What goes wrong by the user's hand; every text says what, where, which value, which rule."""
+"""The errors that a user meets; their texts say what, where, which value and which rule."""
+
+from __future__ import annotations
+
+from typing import Any
+
+_LONGEST = 80
 
 
 def one_line(exc: object) -> str:
-    """Return what an error says in one line, or its kind where it says nothing."""
+    """Return what an error says in one line, or its type where it says nothing."""
     return ' '.join(f'{exc}'.split()) or type(exc).__name__
+
+
+def shown(value: Any) -> str:
+    """Return a value as an error shows it: in one short line."""
+    value = list(value) if isinstance(value, tuple) else value
+    try:
+        # No more of a long list than is shown.
+        text = repr(value[:40] if isinstance(value, list | str | bytes) else value)
+    except ValueError:  # an integer of more digits than Python writes
+        text = f'an integer of {value.bit_length()} bits'
+    return _cut(' '.join(text.split()))
+
+
+def shown_name(name: Any) -> str:
+    """Return a name as an error shows it, whatever was given as one."""
+    text = str(name)
+    return _cut(text if text.isprintable() else repr(text))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) < _LONGEST else f'{text:.{_LONGEST - 3}}...'
 
 
 class StewartError(Exception):
     """The root of all errors that this package raises for its user to read."""
 
 
-class ParameterError(StewartError):
-    """A parameter, or the file it comes from, breaks a rule."""
+class ParameterError(StewartError, ValueError):
+    """A parameter, or the file that it comes from, breaks a rule."""
 
 
-class MotionError(StewartError):
-    """A motion's arrays do not fit each other, or hold what is no pose, twist or acceleration."""
+class MotionError(StewartError, ValueError):
+    """Arrays of a pose or motion whose shapes do not fit, or values that are not valid."""
 
 
-class PoseError(StewartError):
-    """Leg lengths that belong to no pose near the one guessed."""
+class PoseError(StewartError, ValueError):
+    """Leg lengths of which no pose near the guess was found."""
 
 
 class SingularityError(StewartError):

@@ -12,13 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-YAML files as ROS reads them, and nothing in them that could harm its reader or ours.
+YAML files as ROS reads them: a plain scalar is what it is for rcl, ROS's own reader.
 
-ROS's own reader (rcl) is built on libyaml, as this one is, so both see the same names and
-texts. What a text means is rcl's rule, not that of YAML: ``on`` is true, ``1e3`` a double,
-``010`` the integer eight, ``2020-01-01`` a text.
+PyYAML's safe loader follows YAML 1.1, rcl does not: for rcl ``1e3`` is a double, ``y`` a bool,
+``1_000``, ``1:30`` and ``2020-01-01`` are texts.
 """
 
 from __future__ import annotations
@@ -31,86 +29,72 @@ from typing import Any
 
 import yaml  # type: ignore[import-untyped]
 
-from stewart_dynamics.errors import one_line, ParameterError
+from stewart_dynamics.errors import one_line, ParameterError, shown, shown_name
 
-_LARGEST = 1_000_000  # [bytes]; a second's work
+# A hexapod's file has 4 kB, that of a whole robot seldom more than 50. rcl takes 2 s at worst for
+# a file of this size, but a minute for a list of 500 kB, of any node.
+LARGEST = 100_000  # [bytes]
 _DEEPEST = 20
+
+
+class _Blank(str):
+    """A text of length 0."""
+
+
+BLANK = _Blank()
+"""What stands behind a name with nothing behind it; rcl rejects it."""
+
+_SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 _TRUE = frozenset('Y y yes Yes YES true True TRUE on On ON'.split())
 _FALSE = frozenset('N n no No NO false False FALSE off Off OFF'.split())
-_NONE = frozenset(('', '~', 'null', 'Null', 'NULL'))
-
-# What strtoll with base 0 and strtod take.
-_INTEGER = re.compile(r'\s*[+-]?(0[xX][0-9a-fA-F]+|[0-9]+)', re.ASCII)
-_OCTAL = re.compile(r'\s*[+-]?0[0-7]+', re.ASCII)
-_DECIMAL = re.compile(r'\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?', re.ASCII)
-_HEXADECIMAL = re.compile(
-    r'\s*[+-]?0[xX]([0-9a-fA-F]+(\.[0-9a-fA-F]*)?|\.[0-9a-fA-F]+)([pP][+-]?[0-9]+)?', re.ASCII)
-_NOT_FINITE = re.compile(
-    r'\s*(?P<sign>[+-]?)(?P<what>inf|infinity|nan(\([0-9A-Za-z_]*\))?)', re.ASCII | re.IGNORECASE)
-_DOTTED = re.compile(r'\.(nan|NaN|NAN)|(?P<sign>[+-]?)\.(inf|Inf|INF)')
+NULL = ('~', 'null', 'Null', 'NULL')
+"""Texts for rcl, no value for us."""
+_NUMBER = re.compile(
+    r'[+-]?((?P<octal>0[0-7]{1,20})|(?P<decimal>0|[1-9][0-9]{0,18})'
+    r'|(?P<hexadecimal>0x[0-9a-f]{1,15})|(?P<special>\.?inf|infinity|\.?nan)'
+    r'|([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[+-]?[0-9]+)?)',
+    re.ASCII | re.IGNORECASE)
+_BASES = {'octal': 8, 'decimal': 10, 'hexadecimal': 16}
 _SMALLEST = 2.0 ** -1022
 
-_NO_SPACE = re.compile(r'\s*(- )?(?P<name>[A-Za-z_/*][\w./*]*):(?P<value>[^\s:][^:]*)')
+_TEXT = 'tag:yaml.org,2002:str'
+_LIST = 'tag:yaml.org,2002:seq'
+_TUPLE = 'tag:yaml.org,2002:python/tuple'  # as launch_ros writes a list
+_GROUP = 'tag:yaml.org,2002:map'
+_PLAIN = 'plain'  # a scalar without quotes
+_NO_SPACE = re.compile(r'\s*(- )?(?P<name>[A-Za-z_/*][\w./*]*):[^\s:][^:]*')
 
-# libyaml compares each with all before it: a megabyte of them takes it seconds.
-_TAG_DIRECTIVE = re.compile(rb'^%TAG|[\r\x85\xa8\xa9\xbf]%TAG', re.MULTILINE)
 
-_STRING_TAG = 'tag:yaml.org,2002:str'
-
-
-def value_of(text: str) -> Any:
+def scalar(text: str) -> Any:
     """
-    Return what ROS takes a text without quotes for: bool, int, float or str; None for nothing.
+    Return what ROS reads a text without quotes as: bool, int, float or str.
 
-    ROS takes ``~`` and ``null`` for texts: here they are nothing, as YAML has it.
+    None for ``null`` and ``~``, which are texts for rcl: no value is given.
     """
-    if text in _NONE:
+    if text in NULL:
         return None
     if text in _TRUE or text in _FALSE:
         return text in _TRUE
-    # Longer ones do not fit into 64 bits. (No number of leading zeros is of use to anybody.)
-    if len(text) < 80 and _INTEGER.fullmatch(text):
-        base = 8 if _OCTAL.fullmatch(text) else 16 if 'x' in text.lower() else 10
-        if base != 10 or not re.match(r'\s*[+-]?0[0-9]', text):  # 08 is no octal: a double
-            integer = int(text, base)
-            if -2 ** 63 <= integer < 2 ** 63:
-                return integer
-    number = _double(text)
-    return text if number is None else number
+    found = _NUMBER.fullmatch(text)
+    if not found:
+        return text
+    for kind, base in _BASES.items():
+        if found[kind]:
+            return int(text, base)
+    number = float(text.replace('.', '') if found['special'] else text)
+    # rcl takes what is out of range for a text.
+    in_range = found['special'] or number == 0.0 or _SMALLEST <= abs(number) < math.inf
+    return number if in_range else text
 
 
-def _double(text: str) -> float | None:
-    """Return the double that a text is for ROS, None where it takes it for a text."""
-    if dotted := _DOTTED.fullmatch(text):
-        return math.nan if dotted['sign'] is None else float(f'{dotted["sign"]}inf')
-    if special := _NOT_FINITE.fullmatch(text):
-        what = special['what'][:3].lower()
-        return float(f'{special["sign"]}{what}')
-    try:
-        if _DECIMAL.fullmatch(text):
-            number = float(text)
-        elif _HEXADECIMAL.fullmatch(text):
-            number = float.fromhex(text.strip())
-        else:
-            return None
-    except OverflowError:
-        return None
-    # Out of range, strtod reports an error, and rcl falls back to a text.
-    mantissa = re.split('[pP]' if 'x' in text.lower() else '[eE]', text.lower().replace(
-        '0x', ''))[0]
-    is_zero = not re.search('[1-9a-f]', mantissa)
-    in_range = is_zero or _SMALLEST <= abs(number) < math.inf
-    return number if in_range else None
-
-
-def read_document(path: str | Path, largest: int = _LARGEST) -> dict[str, Any]:
+def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
     """
-    Return what a YAML file of so many bytes at most holds, a mapping by names.
+    Return what a YAML file of at most ``largest`` bytes holds, a mapping by names.
 
-    Lists are lists, mappings dicts, and all else as ``value_of`` says. Raises ParameterError,
-    in one line, for what is no such file, nests too deep, or has what ROS's reader does not
-    take as YAML means it: aliases, tags, names given twice, a second document.
+    Raises ParameterError, in one line, for what is not such a file, for what rcl does not accept
+    or reads otherwise than YAML has it (aliases, tags, a second document), for a name given
+    twice, and for nesting deeper than 20.
     """
     document = _read(_bytes_of(path, largest), str(path))
     if not isinstance(document, dict):
@@ -119,122 +103,80 @@ def read_document(path: str | Path, largest: int = _LARGEST) -> dict[str, Any]:
 
 
 def read_value(text: str, source: str) -> Any:
-    """Return what ROS takes the text of one value for, as on a command line."""
+    """Return what ROS reads the text of one value as, as on a command line."""
     return _read(text.encode('utf-8', 'surrogateescape'), source)
 
 
+class _Loader(_SafeLoader):  # type: ignore[misc]
+    """The safe loader, which leaves it to us what a scalar without quotes is."""
+
+    yaml_implicit_resolvers = {None: [(_PLAIN, re.compile('(?!$)', re.DOTALL))]}
+
+
 def _read(data: bytes, source: str) -> Any:
-    if tag := _TAG_DIRECTIVE.search(data):
-        line = data.count(b'\n', 0, tag.start()) + 1
-        raise ParameterError(f'{source}: not YAML: line {line}: a directive, %TAG: tags are not '
-                             'taken')
     try:
-        return _Builder(source).build(data)
+        depth = 0
+        for event in yaml.parse(data, Loader=_SafeLoader):  # libyaml's loader recurses unbounded
+            if isinstance(event, yaml.AliasEvent):
+                raise _wrong(event, 'a YAML alias (*): write the value out')
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > _DEEPEST:
+                raise _wrong(event, f'nests deeper than {_DEEPEST}')
+        node = yaml.compose(data, Loader=_Loader)
+        return None if node is None else _value(node)
     except yaml.YAMLError as exc:
         raise ParameterError(f'{source}: not YAML: {_in_words(exc, data)}') from exc
 
 
+def _value(node: Any) -> Any:
+    """Return the value of a node of the document."""
+    if isinstance(node, yaml.ScalarNode) and node.tag == _TEXT:
+        return node.value if node.value or node.style else BLANK
+    if isinstance(node, yaml.ScalarNode) and node.tag == _PLAIN:
+        return scalar(node.value)
+    if isinstance(node, yaml.SequenceNode) and node.tag in (_LIST, _TUPLE):
+        return [_value(each) for each in node.value]
+    if not isinstance(node, yaml.MappingNode) or node.tag != _GROUP:
+        raise _wrong(node, f'a tag, {shown(node.tag)}: ROS ignores it, write the value without')
+    found: dict[str, Any] = {}
+    for key, value in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            raise _wrong(key, 'a list or a group in place of a name')
+        if key.value in found:
+            raise _wrong(key, f'duplicate key {shown(key.value)}')
+        found[key.value] = _value(value)
+    return found
+
+
+def _wrong(where: Any, what: str) -> Exception:
+    error: Exception = yaml.MarkedYAMLError(problem=what, problem_mark=where.start_mark)
+    return error
+
+
 def _bytes_of(path: str | Path, largest: int) -> bytes:
-    """Return a file's bytes; what is no file of UTF-8 text is not waited for."""
+    """Return the bytes of a file of UTF-8 text, and never wait for a pipe."""
     try:
         mode = Path(path).stat().st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            raise ParameterError(f'{path}: cannot be read: not a regular file')
+            raise OSError(0, 'not a regular file')
         with open(path, 'rb') as file:
             data = file.read(largest + 1)
-        if len(data) > largest:
-            raise ParameterError(f'{path}: larger than {largest} bytes')
-        data.decode('utf-8')
+        data[:largest].decode('utf-8')
     except OSError as exc:
         raise ParameterError(f'{path}: cannot be read: {exc.strerror}') from exc
     except UnicodeDecodeError as exc:
-        raise ParameterError(f'{path}: cannot be read: not UTF-8 text') from exc
-    except ValueError as exc:
-        raise ParameterError(f'{str(path)!r}: cannot be read: {exc}') from exc
+        if exc.end < largest:
+            raise ParameterError(f'{path}: cannot be read: not UTF-8 text') from exc
+    except (TypeError, ValueError) as exc:
+        raise ParameterError(f'{shown(str(path))}: cannot be read: {exc}') from exc
+    if len(data) > largest:
+        raise ParameterError(f'{path}: larger than {largest} bytes')
     return data
 
 
-class _Builder:
-    """Makes a document of libyaml's events, and refuses the first that it must not hold."""
-
-    def __init__(self, source: str) -> None:
-        self._source = source
-        self._root: Any = None
-        self._open: list[Any] = []
-        self._keys: list[str | None] = []  # of each open mapping, its key that waits for a value
-
-    def build(self, data: bytes) -> Any:
-        documents = 0
-        for event in yaml.parse(data, Loader=yaml.CSafeLoader):
-            if isinstance(event, yaml.DocumentStartEvent):
-                documents += 1
-                if documents > 1:
-                    raise self._refused(event, 'a second document (---): one is all that ROS '
-                                        'reads as it is meant')
-            elif isinstance(event, yaml.AliasEvent):
-                raise ParameterError(f'{self._source}: line {_line(event)}: has a YAML alias (*): '
-                                     'write the value out')
-            elif isinstance(event, yaml.ScalarEvent):
-                self._add(event, self._scalar(event))
-            elif isinstance(event, yaml.SequenceStartEvent | yaml.MappingStartEvent):
-                self._begin(event)
-            elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
-                self._open.pop()
-                self._keys.pop()
-        return self._root
-
-    def _begin(self, event: Any) -> None:
-        if event.tag is not None:
-            raise self._refused(event, f'a tag, {_cut(event.tag)}: ROS ignores it, write the '
-                                'value without')
-        if self._is_key():
-            raise self._refused(event, 'a list or a group for a name')
-        if len(self._open) == _DEEPEST:
-            raise self._refused(event, f'nests deeper than {_DEEPEST}')
-        container: Any = [] if isinstance(event, yaml.SequenceStartEvent) else {}
-        self._add(event, container)
-        self._open.append(container)
-        self._keys.append(None)
-
-    def _is_key(self) -> bool:
-        return bool(self._open) and isinstance(self._open[-1], dict) and self._keys[-1] is None
-
-    def _scalar(self, event: Any) -> Any:
-        if event.tag not in (None, _STRING_TAG):
-            raise self._refused(event, f'a tag, {_cut(event.tag)}: ROS ignores it, write the '
-                                'value without')
-        if '\0' in event.value:
-            raise self._refused(event, 'a text with a zero byte: ROS would end it there')
-        is_text = event.tag == _STRING_TAG or event.style in ('"', "'") or self._is_key()
-        return event.value if is_text else value_of(event.value)
-
-    def _add(self, event: Any, value: Any) -> None:
-        if not self._open:
-            self._root = value
-        elif isinstance(self._open[-1], list):
-            self._open[-1].append(value)
-        elif (key := self._keys[-1]) is None:
-            if value in self._open[-1]:
-                raise self._refused(event, f'duplicate key {_cut(value)}')
-            self._keys[-1] = value
-        else:
-            self._open[-1][key] = value
-            self._keys[-1] = None
-
-    def _refused(self, event: Any, what: str) -> ParameterError:
-        return ParameterError(f'{self._source}: not YAML: line {_line(event)}: {what}')
-
-
-def _line(event: Any) -> int:
-    return int(event.start_mark.line) + 1
-
-
-def _cut(text: str) -> str:
-    return f'{text!r}' if len(text) < 60 else f'{text[:60]!r}...'
-
-
 def _in_words(exc: Any, data: bytes) -> str:
-    """Return where a text is no YAML, why, and what is probably meant."""
+    """Return where a text is not YAML, why, and what is probably meant."""
     mark = getattr(exc, 'problem_mark', None)
     if mark is None:  # a character that no text may have, and its place in bytes
         line = data.count(b'\n', 0, getattr(exc, 'position', 0)) + 1
@@ -250,7 +192,10 @@ def _in_words(exc: Any, data: bytes) -> str:
         if missing := no_space(text):
             hint = f'; line {number + 1}: {missing}'
             break
-    return f'line {mark.line + 1}, column {mark.column + 1}: {one_line(exc.problem)}{hint}'
+    problem = one_line(exc.problem)
+    if problem.startswith('but '):
+        problem = f'{one_line(exc.context)}, {problem}'
+    return f'line {mark.line + 1}, column {mark.column + 1}: {problem}{hint}'
 
 
 def no_space(text: str) -> str:
@@ -258,4 +203,4 @@ def no_space(text: str) -> str:
     found = _NO_SPACE.match(text)
     if not found:
         return ''
-    return f'a space is missing after the colon of {_cut(found["name"])[1:-1]}'
+    return f'a space is missing after the colon of {shown_name(found["name"])}'

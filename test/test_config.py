@@ -252,7 +252,7 @@ def test_there_is_a_controller_of_each_kind() -> None:
                      (trajectory, ['effort']), (trajectory, ['position', 'effort'])]
 
 
-def test_the_example_gains_damp_every_mode_of_the_machine() -> None:
+def test_the_example_gains_damp_every_mode_of_the_hexapod() -> None:
     """
     With p, i and d on each leg, m s^3 + d s^2 + p s + i = 0 for each mode of mass m.
 

@@ -27,8 +27,8 @@ import pytest
 from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT
 from trajectory_msgs.msg import JointTrajectory
 
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 
 EXAMPLES = ROOT / 'examples'
 

@@ -31,10 +31,11 @@ from referees import (
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.parameters import read_yaml
+from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.external_wrench import (
     Estimate, ExternalWrench, Measurement, Overload)
-from stewart_dynamics.runtime.plant import Plant, SimulatorParameters
+from stewart_dynamics.runtime.plant import Plant
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 Array = NDArray[np.float64]
 

@@ -17,12 +17,10 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable, Iterator
 import math
 import os
 from pathlib import Path
-import re
 import signal
 import sys
 from typing import Any
@@ -924,57 +922,3 @@ def test_a_trajectory_in_work_is_given_up_with_the_node(begin: Start) -> None:
         return 'answered: 2 points' in node.status('trajectory').message
 
     node.until(answered, 'the next trajectory is answered')
-
-
-# The page
-
-def _rows() -> list[list[str]]:
-    """Return the cells of the page's tables."""
-    page = (ROOT / 'docs/faults.md').read_text(encoding='utf-8')
-    return [[cell.strip() for cell in line.strip('|').split(' | ')]
-            for line in page.splitlines() if line.startswith('| ')
-            and not line.startswith(('| --- |', '| fault |'))]
-
-
-def _of_module(name: str) -> tuple[dict[str, ast.FunctionDef], list[ast.stmt]]:
-    """Return a module's tests and the constants beside them."""
-    source = Path(__file__).with_name(f'{name}.py').read_text(encoding='utf-8')
-    body = ast.parse(source).body
-    return ({item.name: item for item in body if isinstance(item, ast.FunctionDef)
-             and item.name.startswith('test_')},
-            [item for item in body if isinstance(item, ast.Assign)])
-
-
-MODULES = tuple(_of_module(name) for name in (
-    'test_faults', 'test_node', 'test_simulator', 'test_external_wrench_node'))
-OF_THE_PAGE = ('test_every_fault_on_the_page_has_a_test_and_every_test_a_fault',
-               'test_what_the_page_says_that_it_says_its_test_asks_for')
-
-
-def test_every_fault_on_the_page_has_a_test_and_every_test_a_fault() -> None:
-    rows = _rows()
-    assert rows
-    named: set[str] = set()
-    for row in rows:
-        assert len(row) == 5, row
-        assert all(row), row
-        tests = re.findall(r'`(\w+)`', row[4])
-        assert tests, row
-        named.update(tests)
-    tests = [test for module, _ in MODULES for test in module]
-    assert len(set(tests)) == len(tests)
-    assert named <= set(tests)
-    assert set(MODULES[0][0]) - named == set(OF_THE_PAGE)
-
-
-@pytest.mark.parametrize('row', _rows(), ids=lambda row: row[0])
-def test_what_the_page_says_that_it_says_its_test_asks_for(row: list[str]) -> None:
-    texts = []
-    for test in re.findall(r'`(\w+)`', row[4]):
-        tests, constants = next(module for module in MODULES if test in module[0])
-        for part in (tests[test], *constants):
-            texts += [each.value for each in ast.walk(part)
-                      if isinstance(each, ast.Constant) and isinstance(each.value, str)]
-    for words in re.findall('`([^`]+)`', row[2]):
-        for part in filter(None, map(str.strip, words.split('...'))):
-            assert any(part in text for text in texts), part

@@ -30,8 +30,8 @@ from referees import ROOT
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.plausibility import doubts
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
 MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
@@ -43,7 +43,7 @@ MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
 def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Run the page's program, compare what it prints, and return its names."""
     folder = tmp_path_factory.mktemp('machine')
-    (folder / 'my_machine.yaml').write_text(MACHINE, encoding='utf-8')
+    (folder / 'my_hexapod.yaml').write_text(MACHINE, encoding='utf-8')
     assert len(PARTS) + 1 == PAGE.count('```python') == 6
     program: dict[str, Any] = {}
     with pytest.MonkeyPatch.context() as patch:
@@ -64,7 +64,7 @@ def test_the_node_gives_the_forces_on_the_page(
         names: dict[str, Any], domain: int, tmp_path: Path) -> None:
     pytest.importorskip('rclpy')
     from running import executable, log_lines, Program
-    file = tmp_path / 'my_machine.yaml'
+    file = tmp_path / 'my_hexapod.yaml'
     file.write_text(MACHINE, encoding='utf-8')
     node = Program([executable('stewart_dynamics'), '--ros-args', '--params-file', file,
                     '-p', 'setpoint.source:=pose'], domain, tmp_path / 'node')
@@ -161,7 +161,7 @@ def test_what_the_node_cannot_see_shows_as_the_page_says(names: dict[str, Any]) 
     # The other three legs become longer in the mirror image.
     mirror = StewartPlatform(p.replaced(mirrored))
     turned = names['turned']
-    change = mirror.inverse_kinematics(turned.position, turned.rotation) - names['lengths']
+    change = mirror.inverse_kinematics(turned) - names['lengths']
     longer = {n for n in range(6) if names['change'][n] > 0.0}
     assert {n for n in range(6) if change[n] > 0.0} == set(range(6)) - longer
     # Forces do not depend on the zero length.

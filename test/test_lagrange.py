@@ -204,7 +204,8 @@ def test_skew_is_the_cross_product() -> None:
 @pytest.fixture(scope='module')
 def misprints() -> Any:
     """Return the script that writes the table."""
-    spec = importlib.util.spec_from_file_location('misprints', ROOT / 'docs' / 'misprints.py')
+    path = ROOT / 'docs' / 'figures' / 'misprints.py'
+    spec = importlib.util.spec_from_file_location('misprints', path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -214,7 +215,7 @@ def misprints() -> Any:
 
 def test_the_paper_with_every_line_mended_gives_the_forces_of_the_package(
         misprints: Any) -> None:
-    p = misprints.machine()
+    p = misprints.hexapod()
     states = misprints.random_states(p)
     package = StewartPlatform(p).inverse_dynamics(Motion.from_euler(*states)).forces
     assert each_relative(misprints.leg_forces(p, states), package) < 1e-12
@@ -222,11 +223,11 @@ def test_the_paper_with_every_line_mended_gives_the_forces_of_the_package(
 
 def test_the_table_of_misprints_is_what_its_script_writes_now(misprints: Any) -> None:
     assert (ROOT / 'docs' / 'misprints.md').read_text(encoding='utf-8') == misprints.table(), (
-        'run: python docs/misprints.py')
+        'run: python docs/figures/misprints.py')
 
 
 def test_every_misprint_with_a_reading_of_its_own_changes_the_forces(misprints: Any) -> None:
-    p = misprints.machine()
+    p = misprints.hexapod()
     states = misprints.random_states(p)
     assert len(misprints.KEYS) == 6
     for key in misprints.KEYS:

@@ -40,12 +40,14 @@ SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', N
 
 # Modules whose rosdep key is not their own name; '' where rosdep has no key.
 KEYS = {
-    'dask': '', 'distributed': '', 'hypothesis': 'python3-hypothesis', 'lz4': '',
+    'dask': '', 'distributed': '', 'docutils': 'python3-docutils',
+    'hypothesis': 'python3-hypothesis', 'lz4': '',
     'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
     'pytest': 'python3-pytest', 'rosbags': 'python3-rosbags-pip',
-    'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools', 'tqdm': 'python3-tqdm',
+    'scipy': 'python3-scipy', 'setuptools': 'python3-setuptools',
+    'sphinx': 'python3-sphinx', 'tqdm': 'python3-tqdm',
     'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.

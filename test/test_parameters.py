@@ -26,10 +26,15 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from referees import ROOT
+import yaml
 
-from stewart_dynamics import ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.parameters import PARAMETERS, read_yaml
+from stewart_dynamics import (
+    MotionError, ParameterError, Parameters, PoseError, StewartError, StewartPlatform)
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.parameter_files import flat, other_nodes, read_yaml
+from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.parameters_yaml import read_document
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 GOOD = """\
 /**:
@@ -55,12 +60,12 @@ GOOD = """\
 
 def written(path: Path, text: str) -> Path:
     """Return the path of a parameter file with this text."""
-    file = path / 'machine.yaml'
+    file = path / 'hexapod.yaml'
     file.write_text(text, encoding='utf-8')
     return file
 
 
-def refused(path: Path, text: str) -> str:
+def rejection(path: Path, text: str) -> str:
     """Return what is said of a parameter file with this text."""
     with pytest.raises(ParameterError) as caught:
         Parameters.from_yaml(written(path, text))
@@ -173,7 +178,7 @@ def test_the_package_s_own_files_hold_sections_that_can_be_read(file: str) -> No
     assert all('ros__parameters' in content for content in document.values())
 
 
-def test_the_machine_of_the_package_can_be_computed() -> None:
+def test_the_hexapod_of_the_package_can_be_computed() -> None:
     platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
     lengths = platform.inverse_kinematics([0.0, 0.0, 1.0], np.eye(3))
     assert np.all(lengths > 0.0)
@@ -203,7 +208,7 @@ BAD = {
     'number for a string': ('joints: [a,', 'joints: [1,', ['joints', '1', 'must be a string']),
     'a joint that no message can name': (
         'joints: [a,', 'joints: ["a\\e",', ['joints', 'printable']),
-    'a zero byte': ('joints: [a,', 'joints: ["a\\0",', ['line 3', 'zero byte']),
+    'a zero byte': ('joints: [a,', 'joints: ["a\\0",', ['joints', 'printable']),
     'number for a bool': ('visualization_rate: 25.0', 'autostart: 1', [
         'autostart', '1', 'must be a bool']),
     'array for a single value': ('mass: 150.0', 'mass: [150.0, 1.0]', [
@@ -217,7 +222,7 @@ BAD = {
     'wrong length of joints': ('1.0, -0.4, 0.0]', '1.0, -0.4]', [
         'geometry.base_joints', 'must have 18 entries, has 17']),
     'empty array': ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]', [
-        'legs.piston.mass: []: ROS takes no empty list: leave the name out']),
+        'legs.piston.mass: []: ROS accepts no empty list: leave the name out']),
     'group for a value': ('mass: 150.0', 'mass: {kg: 150.0}', [
         'platform.mass.kg', 'unknown parameter', 'do you mean platform.mass?']),
     'value for a group': ('limits: {length_min: 0.8, length_max: 1.4}', 'limits: 0.8', [
@@ -292,20 +297,20 @@ BAD = {
             'platform.center_of_mass', 'one after the other, [x1, y1, z1, x2']),
     'digits in groups': ('mass: 150.0', 'mass: 1_500.0', [
         "'1_500.0'", 'write its digits without anything between them']),
-    'null': ('mass: 150.0', 'mass: null', ['platform.mass', 'has no value']),
+    'null': ('mass: 150.0', 'mass: null', ['platform.mass: missing, it has no default']),
     'a truth for a text': ('visualization_rate: 25.0', 'base_frame: on', [
         'base_frame', 'True', 'must be a string: put it in quotes']),
     'an integer with zeros before it': ('mass: 150.0', 'mass: 0150', [
         'platform.mass: 104: is an integer']),
     'a tag': ('mass: 150.0', 'mass: !!float 150', [
-        'line 10', "a tag, 'tag:yaml.org,2002:float'"]),
+        'line 10, column 13', "a tag, 'tag:yaml.org,2002:float'"]),
     'a tag of Python': ('mass: 150.0', 'mass: !!python/object:os.system {}', ['a tag']),
     'a tag of binary': ('mass: 150.0', 'mass: !!binary MTUw', ['a tag']),
     'a tag of a set': ('mass: 150.0', 'mass: !!set {a}', ['a tag']),
-    'a tag of ours': ('/**:', '%TAG ! tag:a,2000:\n---\n/**:', ['line 1', '%TAG']),
+    'a tag of ours': ('mass: 150.0', 'mass: !plain 150.0', ['line 10', "a tag, '!plain'"]),
     'a merge of mappings': ('mass: 150.0', '<<: *m', ['alias']),
     'a list for a name': ('mass: 150.0', '? [a]\n      : 150.0', [
-        'not YAML: line 10: a list or a group for a name']),
+        'not YAML: line 10, column 9: a list or a group in place of a name']),
     'given twice in two spellings': ('visualization_rate: 25.0', 'platform.mass: 25.0', [
         'platform.mass: given twice under /**']),
     'a list in a list of another node': ('/**:', 'a: {ros__parameters: {b: [[1]]}}\n/**:', [
@@ -314,11 +319,12 @@ BAD = {
         "'two\\nlines\\x1b[31m': unknown"]),
     'duplicate keys': ('      mass: 150.0\n', '      mass: 150.0\n      mass: 160.0\n', [
         'not YAML', 'duplicate key', 'mass', 'line']),
-    'an alias, which ROS refuses': (
+    'an alias, which ROS rejects': (
         'mass: 150.0', 'mass: *m', ['alias', 'write the value out']),
     'a name without a value': ('mass: 150.0', 'mass:', ['platform.mass', 'has no value']),
     'a date': ('mass: 150.0', 'mass: 2020-02-20', ['platform.mass', "'2020-02-20'"]),
-    'two documents': ('/**:', 'a: 1\n---\n/**:', ['not YAML', 'line 2', 'second document']),
+    'two documents': ('/**:', 'a: 1\n---\n/**:', [
+        'not YAML: line 2, column 1: expected a single document in the stream, but found ano']),
     'no section of ours': ('/**:', 'other_node:', [
         'holds other_node', "no parameters under '/**:' or 'stewart_dynamics:'"]),
     'no ros__parameters': ('ros__parameters:', 'parameters:', [
@@ -330,8 +336,8 @@ BAD = {
 def test_a_bad_file_is_told_file_parameter_value_and_rule(tmp_path: Path, case: str) -> None:
     old, new, words = BAD[case]
     assert GOOD.count(old) == 1
-    message = refused(tmp_path, GOOD.replace(old, new))
-    assert message.startswith(f'{tmp_path / "machine.yaml"}: ')
+    message = rejection(tmp_path, GOOD.replace(old, new))
+    assert message.startswith(f'{tmp_path / "hexapod.yaml"}: ')
     for word in words:
         assert word in message
     assert message.isprintable()
@@ -350,8 +356,8 @@ def test_a_bad_file_is_told_file_parameter_value_and_rule(tmp_path: Path, case: 
 ])
 def test_a_file_with_another_root_is_told_what_it_must_be(
         tmp_path: Path, text: str, words: list[str]) -> None:
-    message = refused(tmp_path, text)
-    assert message.startswith(f'{tmp_path / "machine.yaml"}: ')
+    message = rejection(tmp_path, text)
+    assert message.startswith(f'{tmp_path / "hexapod.yaml"}: ')
     for word in words:
         assert word in message
 
@@ -379,16 +385,16 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     ids=['byte order mark', 'CRLF', 'version', 'anchor'])
 def test_what_ros_reads_past_changes_nothing(tmp_path: Path, change: Any) -> None:
     given = Parameters.from_yaml(written(tmp_path, GOOD))
-    path = tmp_path / 'machine.yaml'
+    path = tmp_path / 'hexapod.yaml'
     path.write_bytes(change(GOOD).encode())
     assert Parameters.from_yaml(path) == given
 
 
 def test_a_file_that_is_not_text_is_told_so(tmp_path: Path) -> None:
-    file = tmp_path / 'machine.yaml'
+    file = tmp_path / 'hexapod.yaml'
     for data in (b'\xff\xfe\x00a', GOOD.encode('utf-16'), b'a: \xc3'):
         file.write_bytes(data)
-        with pytest.raises(ParameterError, match=r'machine\.yaml: cannot be read: not UTF-8 text'):
+        with pytest.raises(ParameterError, match=r'hexapod\.yaml: cannot be read: not UTF-8 text'):
             Parameters.from_yaml(file)
 
 
@@ -404,15 +410,15 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
 
 @pytest.mark.parametrize('text, said', [
     ('x: &a {b: *a}', 'alias'),
-    ('a: ' + '{a: ' * 30, 'line 3: nests deeper than 20'),
+    ('a: ' + '{a: ' * 30, 'line 3, column 76: nests deeper than 20'),
     ('a: ' + '[' * 3000, 'nests deeper'), ('- ' * 3000, 'nests deeper'),
     ('a: !!bool foo', 'a tag'), (f'a: {"9" * 90000}x', 'unknown parameter'),
     (f'{"a" * 1000}: 1.0', 'unknown parameter'),
     (f'platform.mass: {"9" * 90000}', 'out of range|must be a double'),
     ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
-def test_yaml_that_a_reader_may_choke_on_is_refused_in_one_short_line(
+def test_yaml_that_a_reader_may_choke_on_is_rejected_in_one_short_line(
         tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / 'machine.yaml'
+    path = tmp_path / 'hexapod.yaml'
     path.write_text(f'/**:\n  ros__parameters:\n    {text}\n')
     with pytest.raises(ParameterError, match=said) as caught:
         Parameters.check_file(path)
@@ -449,7 +455,7 @@ values = st.recursive(plain, lambda inner: st.one_of(
 @given(st.dictionaries(st.one_of(st.sampled_from(NAMES), st.text(max_size=8)), values,
                        max_size=4))
 @np.errstate(all='ignore')
-def test_any_values_are_taken_or_refused_with_a_parameter_error(changes: Any) -> None:
+def test_any_values_are_taken_or_rejected_with_a_parameter_error(changes: Any) -> None:
     try:
         parameters = Parameters({**GIVEN, **changes})
     except ParameterError:
@@ -460,7 +466,7 @@ def test_any_values_are_taken_or_refused_with_a_parameter_error(changes: Any) ->
 
 
 def check_any(file: Path) -> None:
-    """Assert that a file gives parameters that obey their rules, or one line of refusal."""
+    """Assert that a file gives parameters that obey their rules, or one line of rejection."""
     for read in (Parameters.from_yaml, Parameters.check_file):
         try:
             parameters = read(file)
@@ -496,7 +502,7 @@ scalars = st.sampled_from([
     st.tuples(cuts, st.text(alphabet=SPECIAL, max_size=6)).map(
         lambda cut: GOOD[:cut[0][0]] + cut[1] + GOOD[sum(cut[0]):])))
 @np.errstate(all='ignore')
-def test_any_text_is_taken_or_refused_in_one_line(tmp_path: Path, text: str) -> None:
+def test_any_text_is_taken_or_rejected_in_one_line(tmp_path: Path, text: str) -> None:
     file = tmp_path / 'any.yaml'
     file.write_text(text, encoding='utf-8', errors='surrogatepass')
     check_any(file)
@@ -508,7 +514,7 @@ def test_any_text_is_taken_or_refused_in_one_line(tmp_path: Path, text: str) -> 
     st.binary(max_size=60), st.tuples(cuts, st.binary(max_size=4)).map(
         lambda cut: GOOD.encode()[:cut[0][0]] + cut[1] + GOOD.encode()[sum(cut[0]):])))
 @np.errstate(all='ignore')
-def test_any_bytes_are_taken_or_refused_in_one_line(tmp_path: Path, data: bytes) -> None:
+def test_any_bytes_are_taken_or_rejected_in_one_line(tmp_path: Path, data: bytes) -> None:
     file = tmp_path / 'any.yaml'
     file.write_bytes(data)
     check_any(file)
@@ -522,7 +528,7 @@ def test_any_bytes_are_taken_or_refused_in_one_line(tmp_path: Path, data: bytes)
         st.floats().map(repr), max_size=18).map(lambda many: f'[{", ".join(many)}]')),
     max_size=5))
 @np.errstate(all='ignore')
-def test_any_values_in_a_file_are_taken_or_refused_in_one_line(
+def test_any_values_in_a_file_are_taken_or_rejected_in_one_line(
         tmp_path: Path, changes: dict[str, str]) -> None:
     file = tmp_path / 'any.yaml'
     lines = [f'    ? {name!r}\n    : {value}\n' for name, value in changes.items()]
@@ -537,7 +543,7 @@ def test_any_values_in_a_file_are_taken_or_refused_in_one_line(
     'use_sim_time: false',
     'qos_overrides: {/a/setpoint/pose: {subscription: {reliability: best_effort}}}'])
 def test_what_ros_declares_itself_is_left_to_it(tmp_path: Path, name: str) -> None:
-    path = tmp_path / 'machine.yaml'
+    path = tmp_path / 'hexapod.yaml'
     path.write_text(f'/**:\n  ros__parameters:\n    platform.mass: 3.0\n    {name}\n')
     assert read_yaml(path, 'stewart_dynamics') == {'platform.mass': 3.0}
     Parameters.check_file(path)
@@ -547,7 +553,7 @@ def test_what_ros_declares_itself_is_left_to_it(tmp_path: Path, name: str) -> No
     ('platform.mass', '150', 'platform.mass: 150: is an integer, must be a double: write 150.0'),
     ('platform.mass', '0,5', "platform.mass: '0,5': must be a double; a decimal comma?"),
     ('platform.mas', '1.0', 'platform.mas: unknown parameter; do you mean platform.mass?'),
-    ('gravity', '[]', 'gravity: []: ROS takes no empty list'),
+    ('gravity', '[]', 'gravity: []: ROS accepts no empty list'),
     ('gravity', '[[0.0, 0.0, 1.0]]', 'gravity: [[0.0, 0.0, 1.0]]: has a list'),
     ('gravity', '', 'gravity: has no value'), ('gravity', '~', 'gravity: has no value'),
     ('gravity', '{x: 1.0}', 'gravity: 1.0 m/s^2: must be an array of 3'),
@@ -563,9 +569,9 @@ def test_a_bad_value_of_a_command_line_is_told(name: str, text: str, said: str) 
 
 
 @pytest.mark.parametrize('value, rule', [
-    ('5', 'must be a bool'), ("'true'", 'must be a bool'), ('[]', 'ROS takes no empty list'),
-    ('~', 'has no value')])
-def test_what_ros_would_go_on_without_is_refused(tmp_path: Path, value: str, rule: str) -> None:
+    ('5', 'must be a bool'), ("'true'", 'must be a bool'), ('[]', 'ROS accepts no empty list'),
+    ('~', 'None: must be a bool'), ('', 'has no value')])
+def test_what_ros_would_go_on_without_is_rejected(tmp_path: Path, value: str, rule: str) -> None:
     path = written(tmp_path, f'/**: {{ros__parameters: {{use_sim_time: {value}}}}}\n')
     with pytest.raises(ParameterError, match=f'use_sim_time: .*{rule}'):
         Parameters.check_file(path)
@@ -580,7 +586,7 @@ def test_what_ros_would_go_on_without_is_refused(tmp_path: Path, value: str, rul
     ('/**' * 10000 + '/x', '/a/b', False)])
 def test_sections_are_matched_as_ros_matches_them(
         tmp_path: Path, section: str, node: str, meant: bool) -> None:
-    path = tmp_path / 'machine.yaml'
+    path = tmp_path / 'hexapod.yaml'
     path.write_text(f"? '{section}'\n: {{ros__parameters: {{platform: {{mass: 7.0}}}}}}\n")
     if meant:
         assert read_yaml(path, node or Parameters.node) == {'platform.mass': 7.0}
@@ -589,8 +595,8 @@ def test_sections_are_matched_as_ros_matches_them(
             read_yaml(path, node or Parameters.node)
 
 
-def test_a_file_of_a_hundred_megabytes_is_refused_unread(tmp_path: Path) -> None:
-    path = tmp_path / 'machine.yaml'
+def test_a_file_of_a_hundred_megabytes_is_rejected_unread(tmp_path: Path) -> None:
+    path = tmp_path / 'hexapod.yaml'
     with path.open('wb') as file:
         file.truncate(100_000_000)
     with pytest.raises(ParameterError, match='larger than 100000 bytes'):
@@ -620,6 +626,104 @@ def test_parameters_are_taken_from_numpy_and_from_parameters() -> None:
     joints = list(parameters['geometry.base_joints'].ravel())
     assert parameters.replaced({'geometry.base_joints': joints}) == parameters
     assert parameters != 1
+
+
+def test_an_integer_is_a_double_from_python_alone(tmp_path: Path) -> None:
+    parameters = Parameters(GIVEN).replaced({
+        'platform.mass': 70, 'gravity': [0, 0, -10], 'limits.force_max': np.full(6, 5)})
+    assert repr(parameters['platform.mass']) == '70.0'
+    assert parameters['gravity'].dtype == float
+    assert parameters.given['gravity'] == (0.0, 0.0, -10.0)
+    assert parameters['limits.force_max'].tolist() == [5.0] * 6
+    for wrong in (True, 10 ** 400, 1j, '70'):
+        with pytest.raises(ParameterError, match='must be a double'):
+            parameters.replaced({'platform.mass': wrong})
+    for read in (lambda: parameters.replaced({'platform.mass': 70}, exact_types=True),
+                 lambda: Parameters({**GIVEN, 'platform.mass': 70}, exact_types=True)):
+        with pytest.raises(ParameterError, match='70: is an integer, .*: write 70.0'):
+            read()
+
+
+@pytest.mark.parametrize('wrong', [None, [1.0], 'no.yaml', 3, {1: 2.0}, {None: 1}])
+def test_a_wrong_object_in_place_of_parameters_is_named(wrong: Any) -> None:
+    for use in (Parameters, Parameters(GIVEN).replaced):
+        with pytest.raises(ParameterError, match='must be a mapping|unknown parameter'):
+            use(wrong)
+    with pytest.raises(ParameterError, match='cannot be read'):
+        Parameters.from_yaml(wrong)
+
+
+def test_an_error_about_an_argument_is_a_value_error() -> None:
+    for kind in (ParameterError, MotionError, PoseError):
+        assert issubclass(kind, StewartError)
+        assert issubclass(kind, ValueError)
+    with pytest.raises(ValueError, match='platform.mass: -1.0 kg: must be more than 0'):
+        Parameters({**GIVEN, 'platform.mass': -1})
+
+
+# What is written
+
+@pytest.mark.parametrize('file', ['platform.yaml', 'simulator.yaml', 'trajectory_sine.yaml'])
+def test_a_whole_file_is_written_that_reads_back_equal(tmp_path: Path, file: str) -> None:
+    kind: Any = {'p': Parameters, 's': SimulatorParameters, 't': TrajectoryParameters}[file[0]]
+    config = ROOT / 'config'
+    hexapod = read_yaml(config / 'platform.yaml', kind.node) if file[0] == 's' else {}
+    parameters = kind({**hexapod, **read_yaml(config / file, kind.node)})
+    parameters.to_yaml(tmp_path / 'written.yaml')
+    kind.check_file(tmp_path / 'written.yaml')
+    assert kind.from_yaml(tmp_path / 'written.yaml') == parameters
+    # YAML 1.1, as `ros2 param load` reads it, has the same numbers and texts.
+    document = yaml.safe_load((tmp_path / 'written.yaml').read_text(encoding='utf-8'))
+    read = kind(dict(flat(document['/**']['ros__parameters'], '', 'yaml')), exact_types=True)
+    assert read == parameters
+
+
+def test_a_written_file_is_easy_to_read(tmp_path: Path) -> None:
+    parameters = Parameters.from_yaml(written(tmp_path, GOOD)).replaced({
+        'platform.mass': 1e-5, 'base_frame': "on 'deck'", 'platform_frame': 'y',
+        'legs.cylinder.inertia': 1e17})
+    parameters.to_yaml(tmp_path / 'out.yaml')
+    text = (tmp_path / 'out.yaml').read_text(encoding='utf-8')
+    assert text.startswith('/**:\n  ros__parameters:\n')
+    for lines in ("    base_frame: 'on ''deck'''\n    platform_frame: 'y'\n",
+                  '    joints: [a, b, c, d, e, f]\n',
+                  '    geometry:\n      base_joints: [  # m\n        1.0, 0.3, 0.0,\n',
+                  '        1.0, -0.4, 0.0]\n      platform_joints: [  # m\n',
+                  '      mass: 1.0e-05  # kg\n', '        inertia: 1.0e+17  # kg m^2\n',
+                  '    gravity: [0.0, 0.0, -9.80665]  # m/s^2\n', '    autostart: true\n'):
+        assert lines in text
+    assert Parameters.from_yaml(tmp_path / 'out.yaml') == parameters
+    assert 'force_max' not in text  # not given, and none by default
+    with pytest.raises(ParameterError, match='cannot be written: Is a directory'):
+        parameters.to_yaml(tmp_path)
+    with pytest.raises(ParameterError, match='cannot be written: 1e-310: ROS reads no number so'):
+        parameters.replaced({'platform.mass': 1e-310}).to_yaml(tmp_path / 'small.yaml')
+
+
+TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str.isprintable)
+
+
+@settings(derandomize=True, max_examples=100, deadline=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.one_of(TEXTS, st.sampled_from([
+    'null', '~', 'yes', 'n', '1e3', '0x1F', '- a', 'a: b', '#', "'", '"', ' a ', '!!str', '*a',
+    'nan', '1_000', '2020-01-01', '010', '=', '<<', '%', '@', '`', '|', '>'])), min_size=6,
+    max_size=6, unique=True), st.floats(1e-300, 1e300), st.lists(
+    st.floats(-1e300, 1e300, allow_subnormal=False), min_size=3, max_size=3))
+def test_whatever_is_written_reads_back_equal(
+        tmp_path: Path, joints: list[str], mass: float, center: list[float]) -> None:
+    parameters = Parameters({**GIVEN, 'joints': joints, 'base_frame': joints[0],
+                             'platform.mass': mass, 'platform.center_of_mass': center})
+    parameters.to_yaml(tmp_path / 'out.yaml')
+    assert Parameters.from_yaml(tmp_path / 'out.yaml') == parameters
+
+
+def test_a_file_for_another_node_is_named(tmp_path: Path) -> None:
+    message = rejection(tmp_path, GOOD.replace('/**:', 'stewart_dynamic:'))
+    assert 'holds stewart_dynamic, but no parameters under' in message
+    file = written(tmp_path, 'a: {b: {ros__parameters: {x: 1.0}}}\nc: {ros__parameters: {}}\n')
+    assert other_nodes(file, '/stewart_dynamics') == 'a/b, c'
+    assert other_nodes(file, '/a/b') == ''
 
 
 def test_what_was_given_cannot_be_changed_behind_its_back() -> None:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The reader of YAML files: what ROS's own reader gives, or a refusal in words."""
+"""The reader of YAML files: what ROS's own reader gives, or a rejection in one line."""
 
 from __future__ import annotations
 
@@ -24,34 +24,34 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 
 from stewart_dynamics import ParameterError
-from stewart_dynamics.parameters_yaml import no_space, read_document
+from stewart_dynamics.parameters_yaml import no_space, read_document, read_value
 
 # Each as it stands in a file, and what both readers make of it.
 VALUES = {
     # doubles
     '1e3': 1000.0, '1.e3': 1000.0, '1E5': 1e5, '5.': 5.0, '.5': 0.5, '+.5': 0.5, '-.5e-3': -5e-4,
-    '-0.0': -0.0, '0e-999': 0.0, '08': 8.0, '9223372036854775808': 2.0 ** 63,
-    '100000000000000000000': 1e20, '0x1p3': 8.0, '0x1.8p1': 3.0, '0x.8': 0.5, '0x0p99999': 0.0,
-    '0xffffffffffffffff': 2.0 ** 64, '2.2250738585072014e-308': 2.0 ** -1022,
+    '-0.0': -0.0, '0e-999': 0.0, '08': 8.0, '100000000000000000000': 1e20, '1.0 # one': 1.0,
+    '2.2250738585072014e-308': 2.0 ** -1022, '&a 1.0': 1.0,
     'inf': float('inf'), '-Infinity': -float('inf'), '.inf': float('inf'), '+.INF': float('inf'),
-    '-.Inf': -float('inf'), '|-\n      5.0': 5.0, '&a 1.0': 1.0, '1.0 # one': 1.0,
+    '-.Inf': -float('inf'),
     # integers, which no parameter of ours is
     '0': 0, '-0': 0, '+5': 5, '010': 8, '0150': 104, '0x10': 16, '-0X1f': -31,
     '9223372036854775807': 2 ** 63 - 1, '-9223372036854775808': -2 ** 63,
     # truths
     'yes': True, 'y': True, 'On': True, 'TRUE': True, 'no': False, 'N': False, 'off': False,
-    '>-\n      on': True,
     # and all else is a text
     '1_000': '1_000', '0b101': '0b101', '0o17': '0o17', '1,5': '1,5', '1:30': '1:30',
-    '2020-01-01': '2020-01-01', '1e400': '1e400', '1e-310': '1e-310', '0x1p99999': '0x1p99999',
+    '2020-01-01': '2020-01-01', '1e400': '1e400', '1e-310': '1e-310',
     '1e': '1e', '0x': '0x', '1.5f': '1.5f', '.e3': '.e3', '.': '.', 'tRUE': 'tRUE', '=': '=',
     '<<': '<<', '\u0661': '\u0661', "'1.0'": '1.0', '"on"': 'on', "''": '', '!!str 1.0': '1.0',
-    '|\n      5.0': '5.0\n', '1.0\n      2.0': '1.0 2.0', '"1\\x302"': '102',
-    # lists
+    '|\n      5.0': '5.0\n', '1.0\n      2.0': '1.0 2.0', '"null"': 'null',
+    # lists; the last as launch_ros writes one
     '[1.0, .inf, 3e0]': [1.0, float('inf'), 3.0], '[yes, off]': [True, False],
     '[1, 0x2]': [1, 2], '[a, "1"]': ['a', '1'],
+    '!!python/tuple\n      - 1.0\n      - 2.0': [1.0, 2.0],
 }
 
 
@@ -104,14 +104,14 @@ def test_ros_itself_reads_the_same(tmp_path: Path, domain: int) -> None:
         assert value == repr(expected), text
 
 
-@pytest.mark.parametrize('text', ['', '~', 'null', 'Null', 'NULL'])
-def test_what_is_nothing_in_yaml_is_nothing(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize('text', ['~', 'null', 'Null', 'NULL'])
+def test_null_is_no_value(tmp_path: Path, text: str) -> None:
     assert read_document(file_of(tmp_path, f'a: {text}\n')) == {'a': None}
 
 
-def test_not_a_number_is_one_for_ros_in_all_its_spellings(tmp_path: Path) -> None:
-    document = read_document(file_of(tmp_path, 'a: [.nan, .NaN, nan, NAN, -nan, nan(0)]\n'))
-    assert all(isinstance(each, float) and each != each for each in document['a'])
+def test_not_a_number_is_one_for_ros_in_all_its_spellings() -> None:
+    found = read_value('[.nan, .NaN, nan, NAN, -nan]', 'x')
+    assert all(isinstance(each, float) and each != each for each in found)
 
 
 def test_a_document_of_any_form_is_read(tmp_path: Path) -> None:
@@ -120,15 +120,29 @@ def test_a_document_of_any_form_is_read(tmp_path: Path) -> None:
         'a': [{'b': 1, 'c': [['x'], {'y': 2.0}]}, ['d']], '1': {}, '2.0': []}
 
 
+def test_what_launch_writes_is_read(tmp_path: Path) -> None:
+    # launch_ros: yaml.dump, with tuples for the lists in ``parameters=[{...}]``.
+    given = {'/**': {'ros__parameters': {
+        'limits.force_max': (1000.0, 1e-5, -0.0), 'joints': ('a', 'true', '1e3', '2.0'),
+        'platform.mass': 1e20, 'base_frame': "it's: [a] base", 'autostart': True}}}
+    text = yaml.dump(given, default_flow_style=False)
+    assert '!!python/tuple' in text
+    read = read_document(file_of(tmp_path, text))['/**']['ros__parameters']
+    # For YAML 1.1 '1e3' is a text and stands there without quotes, for ROS it is a double.
+    assert read == {**given['/**']['ros__parameters'], 'limits.force_max': [1000.0, 1e-5, 0.0],
+                    'joints': ['a', 'true', 1000.0, '2.0']}
+
+
 @pytest.mark.parametrize('text', [
-    '[' * 900_000, '{' * 900_000, '- ' * 450_000, '? ' * 450_000, 'a: ' * 300_000,
-    '[\n' * 450_000, '%TAG !a! b\n' * 80_000, '---\n' * 225_000,
-    ''.join(f'%TAG !{n}! b\n' for n in range(60_000)),
-    '\u2028'.join(f'%TAG !{n}! b' for n in range(60_000)), '\r%TAG ! b' * 80_000,
-    'a: &a [1]\nb: ' + '&b [*a, *a, *a]', 'a: !<' + '%20' * 200_000 + '> b', '!' * 900_000,
-    'x: {<<: {a: 1}, <<: {a: 1}}', 'a: 1\na: 1'],
+    '[' * 90_000, '{' * 90_000, '- ' * 45_000, '? ' * 45_000, 'a: ' * 30_000,
+    '[\n' * 45_000, '%TAG !a! b\n' * 8_000, '---\n' * 22_500,
+    ''.join(f'%TAG !{n}! b\n' for n in range(6_000)),
+    '\u2028'.join(f'%TAG !{n}! b' for n in range(6_000)), '\r%TAG ! b' * 8_000,
+    'a: &a [1]\nb: ' + '&b [*a, *a, *a]', 'a: !<' + '%20' * 20_000 + '> b', '!' * 90_000,
+    'x: {<<: {a: 1}, <<: {a: 1}}', 'a: 1\na: 1', 'a: !<plain> {b: 1}', 'a: !!str [b]',
+    'a: !!python/tuple b', 'a: !!map [b]'],
     ids=lambda text: repr(text[:10]))
-def test_what_could_take_long_is_refused_when_it_begins(tmp_path: Path, text: str) -> None:
+def test_what_could_take_long_is_rejected_when_it_begins(tmp_path: Path, text: str) -> None:
     with pytest.raises(ParameterError) as caught:
         read_document(file_of(tmp_path, text))
     message = str(caught.value)
@@ -137,10 +151,9 @@ def test_what_could_take_long_is_refused_when_it_begins(tmp_path: Path, text: st
 
 
 @pytest.mark.parametrize('text', [
-    '1' * 900_000 + 'x', '0x' + '1' * 900_000 + 'x', '.' + '1' * 900_000 + 'x',
-    ' ' * 900_000 + 'x',
-    '1e' + '1' * 900_000 + 'x', 'nan(' + 'a' * 900_000, '+' * 900_000])
-def test_what_is_nearly_a_number_is_soon_told(tmp_path: Path, text: str) -> None:
+    '1' * 90_000 + 'x', '0x' + '1' * 90_000 + 'x', '.' + '1' * 90_000 + 'x', ' ' * 90_000 + 'x',
+    '1e' + '1' * 90_000 + 'x', 'nan(' + 'a' * 90_000, '+' * 90_000, '1' * 90_000])
+def test_what_is_nearly_a_number_is_a_text(tmp_path: Path, text: str) -> None:
     assert read_document(file_of(tmp_path, f'a: {text}\n')) == {'a': text.strip()}
 
 

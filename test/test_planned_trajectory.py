@@ -34,7 +34,8 @@ from scipy.interpolate import CubicHermiteSpline
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.reference_motion import motion_at, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.runtime import planned_trajectory as planned

@@ -29,9 +29,10 @@ from referees import (
 
 from stewart_dynamics import Motion, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.parameters import Parameters, read_yaml
-from stewart_dynamics.runtime.plant import (
-    _largest, OUTPUT_TYPES, Plant, SimulatorParameters, State)
+from stewart_dynamics.parameter_files import read_yaml
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.plant import _largest, OUTPUT_TYPES, Plant, State
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 Array = NDArray[np.float64]
 Six = tuple[float, float, float, float, float, float]

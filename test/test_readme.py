@@ -12,92 +12,163 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The README: its tables are those of the code, its example runs, its links lead somewhere."""
+"""The README: its tables are those of the code, its example runs, its links and files exist."""
 
 from __future__ import annotations
 
 import importlib
 from pathlib import Path
 import re
+from types import ModuleType
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
 
 from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.runtime import planned_trajectory as planned
-from stewart_dynamics.runtime import plant, setpoints, step
+from stewart_dynamics.runtime import planned_trajectory, plant, setpoints, step
 
 ROOT = Path(__file__).resolve().parent.parent
-README = (ROOT / 'README.md').read_text(encoding='utf-8')
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
+TEXTS = {page.relative_to(ROOT).as_posix(): page.read_text(encoding='utf-8') for page in PAGES}
+README = TEXTS['README.md']
 
 
-def test_tables_of_parameters_are_those_of_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(ROOT / 'docs'))
-    generate = importlib.import_module('generate')
-    assert generate.readme(README) == README, 'run: make docs'
+@pytest.fixture
+def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return the script that writes the generated tables."""
+    monkeypatch.syspath_prepend(str(ROOT / 'docs' / 'figures'))
+    return importlib.import_module('tables')
+
+
+def test_generated_tables_are_current(tables: ModuleType) -> None:
+    pages = tables.pages()
+    assert {path.relative_to(ROOT).as_posix() for path in pages} == {
+        'README.md', 'docs/parameters.md', 'docs/simulator.md'}
+    for path, own in pages.items():
+        text = path.read_text(encoding='utf-8')
+        assert tables.generated(text, own) == text, 'run: python docs/figures/tables.py'
+
+
+def test_every_parameter_is_on_the_page_of_parameters() -> None:
     for name in PARAMETERS:
-        assert README.count(f'| `{name}` |') >= 1
+        assert f'| `{name}` |' in TEXTS['docs/parameters.md']
+
+
+def test_a_table_without_its_comments_is_an_error(tables: ModuleType) -> None:
+    for text in ('', '<!-- loop -->\n', '<!-- end of loop -->'):
+        with pytest.raises(SystemExit, match='comment missing'):
+            tables.generated(text, {'loop': 'table'})
+    with pytest.raises(SystemExit, match='no table has row'):
+        tables.measured('no such row', 'ns')
 
 
 def test_topics_are_those_of_the_code() -> None:
-    for topic, kind in (*setpoints.INPUT_TYPES.items(), *step.OUTPUT_TYPES.items(),
-                        ('markers', 'visualization_msgs/msg/MarkerArray'),
-                        (planned.INPUT, planned.INPUT_TYPE), (planned.OUTPUT, planned.OUTPUT_TYPE),
-                        *plant.INPUT_TYPES.items(), *plant.OUTPUT_TYPES.items()):
-        assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in README
+    node = {**setpoints.INPUT_TYPES, **step.OUTPUT_TYPES,
+            'markers': 'visualization_msgs/msg/MarkerArray',
+            planned_trajectory.INPUT: planned_trajectory.INPUT_TYPE,
+            planned_trajectory.OUTPUT: planned_trajectory.OUTPUT_TYPE}
+    for pages, topics in ((('README.md', 'docs/node.md'), node),
+                          (('docs/simulator.md',), {**plant.INPUT_TYPES, **plant.OUTPUT_TYPES})):
+        for page in pages:
+            for topic, kind in topics.items():
+                assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in TEXTS[page]
 
 
-def test_the_examples_run(
+def test_the_example_of_the_readme_runs(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    blocks = re.findall(r'```python\n(.*?)```', README, flags=re.DOTALL)
-    assert len(blocks) == 2
+    code, = re.findall(r'```python\n(.*?)```', README, flags=re.DOTALL)
     monkeypatch.chdir(ROOT)
-    exec(compile(''.join(blocks), 'README.md', 'exec'), {})
+    exec(compile(code, 'README.md', 'exec'), {})
+    lengths, *forces, error = capsys.readouterr().out.strip().split('\n')
+    assert len(lengths.strip('[] ').split()) == 6
+    *six, condition = ' '.join(forces).replace('[', '').replace(']', '').split()
+    assert len(six) == 6
+    assert 1.0 < float(condition) < 20.0
+    assert float(error) < 1e-12
+
+
+def test_the_examples_of_the_library_run(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    blocks = re.findall(r'```python\n(.*?)```', TEXTS['docs/library.md'], flags=re.DOTALL)
+    assert len(blocks) == 3
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    exec(compile(''.join(blocks), 'library.md', 'exec'), names)
     printed = capsys.readouterr().out.split('\n')
     assert len(printed[0].strip('[] ').split()) == 6
     assert 1.0 < float(printed[1]) < 20.0
     assert float(printed[2]) < 1e-12
     assert float(printed[3].strip('[] ').split()[2]) == pytest.approx(1.1, abs=1e-3)
     assert float(printed[4].strip('[] ').split()[2]) == pytest.approx(-0.1 * np.pi, abs=1e-3)
+    assert printed[-2] == '(6, 6)'
+    assert [np.shape(names[name]) for name in ('mass', 'gravity', 'coriolis')] == [
+        (6, 6), (6,), (1000, 6, 6)]
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_to_files(page: Path) -> None:
-    links = re.findall(r'\]\(([^)#]+)', page.read_text(encoding='utf-8'))
-    for link in links:
-        if '://' not in link:
-            assert (page.parent / link).exists(), f'{page.name}: {link}'
+def links(page: str) -> list[tuple[str, str]]:
+    """Return the files and the anchors that a page links to in this repository."""
+    text = re.sub(r'```.*?```', '', TEXTS[page], flags=re.DOTALL)
+    return [(file, anchor) for file, anchor in re.findall(r'\]\(([^)#]*)(?:#([^)]+))?\)', text)
+            if '://' not in file]
+
+
+def included(page: Path) -> Path:
+    """Return the page whose text a page of the site consists of."""
+    found = re.match(r'```\{include\} (\S+)', page.read_text(encoding='utf-8'))
+    return page.parent / found.group(1) if found else page
 
 
 def anchors(page: Path) -> set[str]:
     """Return the anchors that GitHub gives the headings of a page."""
-    text = re.sub(r'^(?:```.*?^```|    .*?$)', '', page.read_text(encoding='utf-8'),
+    text = re.sub(r'^(?:```.*?^```|    .*?$)', '', included(page).read_text(encoding='utf-8'),
                   flags=re.DOTALL | re.MULTILINE)
     headings = re.findall(r'^#+ (.*)$', text, flags=re.MULTILINE)
     return {re.sub(r'[^\w\- ]', '', heading).lower().replace(' ', '-') for heading in headings}
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_to_headings(page: Path) -> None:
-    for link, anchor in re.findall(r'\]\(([^)#:]*)#([^)]+)\)', page.read_text(encoding='utf-8')):
-        assert anchor in anchors(page.parent / link if link else page), f'{link}#{anchor}'
+@pytest.mark.parametrize('page', TEXTS)
+def test_links_lead_to_files_and_headings(page: str) -> None:
+    for file, anchor in links(page):
+        target = (ROOT / page).parent / file if file else ROOT / page
+        assert target.exists(), file
+        if anchor:
+            assert anchor in anchors(target), f'{file}#{anchor}'
 
 
-@pytest.mark.parametrize('page', [ROOT / 'README.md', ROOT / 'docs/from_cad_to_controller.md'],
-                         ids=lambda page: page.name)
-def test_files_in_commands_are_there(page: Path) -> None:
-    text = page.read_text(encoding='utf-8')
-    named = re.findall(r'(?<![\w./-])(?:bags|config|demo|docs|examples)/[\w./]+', text)
+def test_links_to_nothing_would_be_found(tmp_path: Path) -> None:
+    page = tmp_path / 'page.md'
+    page.write_text('# Two words, *one* `code`\n\n    # no heading\n', encoding='utf-8')
+    assert anchors(page) == {'two-words-one-code'}
+    assert len(links('README.md')) > 20
+
+
+def test_the_readme_leads_to_every_page() -> None:
+    linked = {((ROOT / 'README.md').parent / file).resolve() for file, _ in links('README.md')}
+    pages = {included(page).resolve() for page in ROOT.glob('docs/*.md') if page.stem != 'index'}
+    assert pages <= linked
+
+
+def test_the_readme_is_short() -> None:
+    assert README.count('\n') <= 220
+
+
+@pytest.mark.parametrize('page', [
+    'README.md', 'docs/from_cad_to_controller.md', 'docs/simulator.md',
+    'docs/planned_trajectories.md', 'docs/replay.md', 'docs/development.md', 'docs/node.md'])
+def test_files_in_commands_exist(page: str) -> None:
+    folders = '|'.join(('bags', 'config', 'demo', 'docs', 'examples', 'mechanics', 'messages',
+                        'nodes', 'replay', 'runtime', 'security'))
+    named = re.findall(rf'(?<![\w./-])(?:{folders})/[\w./]*\w', TEXTS[page])
     assert named
     for path in named:
-        assert (ROOT / path.rstrip('.')).exists(), path
+        made = path.startswith(('docs/_build', 'docs/<'))
+        assert made or (ROOT / path).exists() or (ROOT / 'stewart_dynamics' / path).exists(), path
 
 
-def test_no_figure_is_left_to_be_filled_in() -> None:
-    for page in PAGES:
-        assert not re.search(r'@[A-Z]+@|TODO|FIXME|XXX', page.read_text(encoding='utf-8')), page
+@pytest.mark.parametrize('page', TEXTS)
+def test_no_figure_is_left_to_be_filled_in(page: str) -> None:
+    assert not re.search(r'@[A-Z]+@|TODO|FIXME|XXX', TEXTS[page])
 
 
 def test_version_is_the_same_everywhere() -> None:

@@ -23,8 +23,8 @@ import pytest
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics import rotation as rotations
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_time, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_time, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.singularity import Cause, Singularity
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 

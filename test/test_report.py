@@ -35,8 +35,8 @@ import pytest
 
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.residuals import Comparison

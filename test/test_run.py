@@ -20,23 +20,30 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import gc
 import math
+from pathlib import Path
 import sys
 from typing import Any
 
 import pytest
-from rcl_interfaces.msg import ParameterDescriptor, ParameterType
-from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from referees import ROOT
+from rosgraph_msgs.msg import Clock
 
 from stewart_dynamics import ParameterError, Parameters
-from stewart_dynamics.mechanics.reference_motion import TRAJECTORY_PARAMETERS, TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import (
+    TRAJECTORY_PARAMETERS, TrajectoryParameters)
+from stewart_dynamics.nodes.rclpy_workarounds import reject_impossible_times
 from stewart_dynamics.nodes.run import declare_parameters
-from stewart_dynamics.parameters import PARAMETERS, ParameterSet
+from stewart_dynamics.parameter_set import ParameterSet
+from stewart_dynamics.parameters import PARAMETERS
 
 SECONDS = 30.0
 
@@ -92,7 +99,9 @@ def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
     gc.collect()
 
 
-SERVICES = {'describe_parameters': DescribeParameters, 'set_parameters': SetParameters}
+SERVICES = {'describe_parameters': DescribeParameters, 'get_parameters': GetParameters,
+            'set_parameters': SetParameters,
+            'set_parameters_atomically': SetParametersAtomically}
 
 
 def described(ask: Ask, *names: str) -> list[ParameterDescriptor]:
@@ -154,14 +163,14 @@ def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
     assert friction.type == ParameterType.PARAMETER_DOUBLE
 
 
-def test_a_value_beyond_the_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
-    # It has none here: rclpy's would refuse these two, in its words.
+def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
+    # It has none here: rclpy's would reject these two, in its words.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     assert set_to(ask, 'platform.mass', -1.0) == (True, '')
     assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
 
 
-def test_a_value_that_ros_drops_without_a_word_is_refused(declared: Any) -> None:
+def test_a_value_that_ros_drops_without_a_word_is_rejected(declared: Any) -> None:
     # rclpy would go on with the file's 150.0.
     with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
         declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
@@ -184,13 +193,120 @@ def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
         assert each.description.startswith(parameter.text)
         assert each.additional_constraints.endswith('set only when the node starts')
     (rate,) = described(ask, 'rate')
-    assert rate.description == 'setpoints in a second [Hz]'
+    assert rate.description == 'rate of the setpoints [Hz]'
     assert bounds(rate) == [(1e-3, 1e4, 0.0)]
     assert rate.additional_constraints == (
         'at least 0.001, at most 10000; set only when the node starts')
     assert set_to(ask, 'rate', 50.0) == (
-        False, 'rate: only read when the node starts: start it anew')
+        False, 'rate: only read when the node starts: restart it')
     successful, reason = set_to(ask, 'rates', 50.0)
     assert not successful
     assert reason == 'parameters: rates: unknown parameter; do you mean rate?'
     assert set_to(ask, 'use_sim_time', True) == (True, '')
+
+
+def set_messages(ask: Ask, *messages: ParameterMessage) -> tuple[bool, str]:
+    """Return whether a node takes messages together, by either service, and why not."""
+    several = ask('set_parameters', SetParameters.Request(parameters=messages)).results
+    assert len(several) == len(messages)
+    once = ask('set_parameters_atomically',
+               SetParametersAtomically.Request(parameters=messages)).result
+    assert all(each == once for each in several)
+    return once.successful, once.reason
+
+
+NODES = pytest.mark.parametrize('kind, parameters, file, name, value', [
+    (LifecycleNode, Parameters, 'platform.yaml', 'platform.mass', 150.0),
+    (Node, TrajectoryParameters, 'trajectory_sine.yaml', 'rate', 100.0)],
+    ids=['lifecycle', 'plain'])
+
+
+@NODES
+def test_a_parameter_type_that_does_not_exist_is_rejected(
+        declared: Any, kind: Any, parameters: Any, file: str, name: str, value: float) -> None:
+    ask = declared(kind, parameters, file)
+    for number in (10, 77, 255):
+        assert set_messages(ask, ParameterMessage(
+            name=name, value=ParameterValue(type=number))) == (
+                False, f'{name}: parameter type {number} does not exist')
+
+
+@NODES
+def test_a_value_equal_to_the_present_one_is_no_change(
+        declared: Any, kind: Any, parameters: Any, file: str, name: str, value: float) -> None:
+    ask = declared(kind, parameters, file)
+    same = [RosParameter(name, value=value).to_parameter_msg(),
+            RosParameter('use_sim_time', value=False).to_parameter_msg(),
+            # Read-only, and of ROS's own.
+            RosParameter('start_type_description_service', value=True).to_parameter_msg(),
+            # As `ros2 param load` sends them.
+            RosParameter(name, value=f'{value:.5e}').to_parameter_msg()]
+    assert set_messages(ask, *same) == (True, '')
+    other = RosParameter('start_type_description_service', value=False).to_parameter_msg()
+    successful, reason = set_messages(ask, *same, other)
+    assert not successful
+    assert 'read-only' in reason
+
+
+def test_a_dump_can_be_loaded_again(declared: Any) -> None:
+    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
+    # None is what `ros2 param load` makes of the null that `ros2 param dump` has written.
+    unset = RosParameter('external_wrench.force_max', value='None').to_parameter_msg()
+    inertia = [1e-5, 0.0, 0.0, 1e-5, 0.0, 1e-5]
+    texts = RosParameter('platform.inertia', value=f'{inertia}').to_parameter_msg()
+    assert set_messages(ask, unset, texts) == (True, '')
+    assert set_messages(ask, RosParameter(
+        'platform.inertia', value=inertia).to_parameter_msg()) == (True, '')
+
+
+@pytest.mark.parametrize('sec, nanosec', [(-5, 0), (2 ** 31 - 1, 2 ** 32 - 1), (5, 10 ** 9)])
+def test_a_time_that_ros_cannot_hold_is_not_followed(
+        domain: int, monkeypatch: pytest.MonkeyPatch, sec: int, nanosec: int) -> None:
+    monkeypatch.setenv('ROS_DOMAIN_ID', f'{domain}')
+    monkeypatch.setattr('rclpy.node.TimeSource', rclpy.node.TimeSource)
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    reject_impossible_times()
+    node = Node('follower', context=context, parameter_overrides=[
+        RosParameter('use_sim_time', value=True)])
+    try:
+        for time in ((7, 5), (sec, nanosec)):
+            clock = Clock()
+            clock.clock.sec, clock.clock.nanosec = time
+            node._time_source.clock_callback(clock)
+            assert node.get_clock().now().nanoseconds == 7_000_000_005
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def test_null_in_a_file_is_not_given(declared: Any, tmp_path: Path) -> None:
+    # As `ros2 param dump` writes what has no value.
+    file = tmp_path / 'dump.yaml'
+    text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
+    file.write_text(text.replace('force_max: 6000.0', 'force_max: null').replace(
+        'base_frame: base', 'base_frame: ~') + '    external_wrench.force_max: null\n')
+    assert Parameters.from_yaml(file)['limits.force_max'] is None
+    ask = declared(LifecycleNode, Parameters, str(file))
+    values = ask('get_parameters', GetParameters.Request(
+        names=['limits.force_max', 'external_wrench.force_max', 'base_frame'])).values
+    assert [value.type for value in values] == [
+        ParameterType.PARAMETER_NOT_SET, ParameterType.PARAMETER_NOT_SET,
+        ParameterType.PARAMETER_STRING]
+    assert values[-1].string_value == 'base'
+
+
+def test_a_file_for_another_node_says_so(declared: Any, tmp_path: Path) -> None:
+    file = tmp_path / 'other.yaml'
+    text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
+    file.write_text(text.replace('/**:', 'stewart_dynamic:'))
+    with pytest.raises(ParameterError) as caught:
+        declared(LifecycleNode, Parameters, str(file), 'base_frame:=world')
+    assert str(caught.value) == (f"{file}: is for stewart_dynamic, not for '/stewart_dynamics': "
+                                 "rename the section, or use '/**'")
+
+
+def test_an_integer_from_ros_is_rejected(declared: Any, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match='150: is an integer, must be a double: write 150.0'):
+        declared(LifecycleNode, Parameters, 'platform.yaml', 'other:x:=1',
+                 'platform.mass:=150')

@@ -47,9 +47,9 @@ from running import (  # noqa: E402
     assert_only_log_lines, DEADLINE, DynamicsNode, executable, INPUTS, log_lines, NODE, OUTPUTS,
     Peer, PLATFORM, Program)
 
-from stewart_dynamics import plant  # noqa: E402
 from stewart_dynamics.errors import StewartError  # noqa: E402
 from stewart_dynamics.nodes.security import check_environment  # noqa: E402
+from stewart_dynamics.runtime import plant  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
@@ -311,7 +311,7 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
     """Fast DDS would take nothing in its place."""
     environment(**TLS)
     monkeypatch.delenv('STEWART_KEYS')
-    with pytest.raises(StewartError, match='needs the variable STEWART_KEYS, which is not set'):
+    with pytest.raises(StewartError, match='the variable STEWART_KEYS is not set'):
         check_environment([])
 
 
@@ -669,7 +669,7 @@ def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> No
     (['source=127.0.0.256:7001'], 'source=127.0.0.256:7001: must be NAME=ADDRESS:PORT'),
     (['source=127.0.0.1:65536'], 'source=127.0.0.1:65536: the port must be at most 65535'),
     (['../ca=127.0.0.1:7001'], '../ca=127.0.0.1:7001: must be NAME=ADDRESS:PORT'),
-    (['node=127.0.0.1:7001'], 'node: given twice, or ca or node, which are made anyway'),
+    (['node=127.0.0.1:7001'], 'node: given twice, or ca or node, which are created in any case'),
     (['a=127.0.0.1:7001', 'a=127.0.0.1:7002'], 'a: given twice'),
 ])
 def test_what_no_keys_can_be_made_for_is_said(tmp_path: Path, peers: list[str],

@@ -38,8 +38,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import StewartPlatform
-from stewart_dynamics.parameters import read_yaml
-from stewart_dynamics.runtime.plant import OUTPUT_TYPES, Plant, SimulatorParameters
+from stewart_dynamics.parameter_files import read_yaml
+from stewart_dynamics.runtime.plant import OUTPUT_TYPES, Plant
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 SIMULATOR = '/stewart_simulator'
 FILE = ROOT / 'config' / 'simulator.yaml'

@@ -31,8 +31,8 @@ from running import (
     assert_only_log_lines, executable, INPUTS, log_lines, nanoseconds, Peer, Program, ROOT,
     SEPARATE)
 
-from stewart_dynamics.mechanics.reference_motion import (
-    motion_at, sample_times, TrajectoryParameters)
+from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 MOTION = """\

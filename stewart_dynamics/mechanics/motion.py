@@ -38,6 +38,9 @@ class Motion:
     """
     Pose, twist and acceleration of the platform in one sample or any leading shape of samples.
 
+    The arrays are copied, and read-only as properties; ``rows`` (..., MOTION) holds them as the
+    runtime path takes them.
+
     Parameters
     ----------
     position : (..., 3)
@@ -49,9 +52,11 @@ class Motion:
     linear_acceleration, angular_acceleration : (..., 3), optional
         Their time derivatives, base axes [m/s^2, rad/s^2]; zero by default.
 
-    Leading shapes broadcast against each other. Raises MotionError where they cannot, and
-    for what is not finite or no rotation. The arrays are copied, and read-only as properties;
-    ``rows`` (..., MOTION) holds them as the runtime path takes them.
+    Raises
+    ------
+    MotionError
+        The leading shapes cannot be broadcast against each other, a number is not finite, or a
+        matrix is not a rotation.
 
     """
 

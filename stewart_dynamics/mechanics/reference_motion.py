@@ -12,70 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Motions as functions of time, with exact derivatives, and the parameters that describe them.
-
-A file that holds one belongs to the node stewart_trajectory, which publishes it as setpoints.
-"""
+"""Reference motions as functions of time, with exact derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 import math
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.parameters import Parameter, ParameterSet
-
-_POSE = 'X Y Z alpha beta gamma'
-
-TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
-    Parameter('target', 'string', 'node that gets the setpoints, on <target>/setpoint/...',
-              default='stewart_dynamics'),
-    Parameter('base_frame', 'string', 'frame in which the setpoints are given', default='base'),
-    Parameter('output', 'string', 'pose, twist and accel on three topics, or all in one message',
-              default='separate', choices=('separate', 'combined')),
-    Parameter('rate', 'double', 'setpoints in a second', 'Hz', 100.0, minimum=1e-3,
-              maximum=1e4),
-    Parameter('start_timeout', 'double', 'it begins half a second after all its topics have '
-              'subscribers, or after this time without', 's', 5.0, minimum=0.0,
-              maximum=86400.0),
-    Parameter('loop', 'bool', 'go on until stopped: paper and quintic to and fro, sine and hold '
-              'without an end', default=False),
-    Parameter('motion.type', 'string', 'paper: from initial to final, each coordinate as a half '
-              'cosine; quintic: on the straight line and about one axis; sine: about initial; '
-              'hold: at initial', default='paper', choices=('paper', 'quintic', 'sine', 'hold')),
-    Parameter('motion.duration', 'double', 'how long it lasts, one way', 's', 10.0, minimum=0.0,
-              maximum=86400.0, above=True),
-    Parameter('motion.initial', 'double', f'{_POSE} at the start; the center of a sine',
-              'm, rad', required=True, sizes=(6,)),
-    Parameter('motion.final', 'double', f'{_POSE} at the end; paper and quintic need it',
-              'm, rad', sizes=(6,)),
-    Parameter('motion.amplitude', 'double', f'of {_POSE}; sine only', 'm, rad', (0.0,) * 6,
-              sizes=(6,)),
-    Parameter('motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
-              (0.5,), sizes=(1, 6), minimum=0.0, maximum=1e3),
-    Parameter('motion.phase', 'double', f'of {_POSE}; sine only', 'rad', (0.0,) * 6, sizes=(6,)),
-)})
-
-
-class TrajectoryParameters(ParameterSet):
-    """A motion, and how it is published."""
-
-    table = TRAJECTORY_PARAMETERS
-    node = 'stewart_trajectory'
-
-    def _check_together(self, source: str) -> None:
-        """Check what one parameter demands of another."""
-        if self['motion.type'] in ('paper', 'quintic') and self['motion.final'] is None:
-            raise ParameterError(f'{source}: motion.final: missing, motion.type '
-                                 f'{self["motion.type"]} needs it')
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
 
 
 def sample_times(parameters: TrajectoryParameters) -> Integers:

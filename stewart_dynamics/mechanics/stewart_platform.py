@@ -55,7 +55,7 @@ class InverseDynamics(NamedTuple):
     """
     Largest force of each leg under a unit load on the platform (..., 6).
 
-    The load is any force F and moment M with |F|^2 + |M / l|^2 = 1, l the characteristic length.
+    The load is any force F and moment M with F^2 + (M / l)^2 = 1, l the characteristic length.
     """
     determinant: Array
     """det(J) := det(J_inv), (...) [m^3]."""
@@ -162,8 +162,11 @@ class StewartPlatform:
         wrench : (..., 6), optional
             Load on the platform, as in ``inverse_dynamics``.
 
-        Raises MotionError for what does not fit, is not finite or overflows. No pose is singular
-        here: J_inv is not inverted.
+        Raises
+        ------
+        MotionError
+            The arguments do not fit each other, are not finite or overflow. No pose is singular
+            here: J_inv is not inverted.
 
         """
         pushes = as_array('forces', forces, (6,))
@@ -182,6 +185,9 @@ class StewartPlatform:
         """
         Return the pose that six leg lengths belong to, on the guess's side of singularities.
 
+        The leading shapes of lengths and guess broadcast against each other. The lengths of the
+        pose returned differ by less than 1e-12 m from those given.
+
         Parameters
         ----------
         lengths : (..., 6)
@@ -189,9 +195,6 @@ class StewartPlatform:
         guess : Motion, Pose or (position, rotation)
             Where to begin: the last pose, or the one commanded. From 20 % of the machine's
             height and 0.2 rad away it is found from nearly everywhere (benchmarks/README.md).
-
-        The leading shapes of lengths and guess broadcast against each other. Lengths of the
-        pose returned differ by less than 1e-12 m from those given.
 
         Raises
         ------

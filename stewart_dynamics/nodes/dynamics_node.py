@@ -50,8 +50,10 @@ from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.messages.diagnostics import diagnostics
 from stewart_dynamics.nodes.markers import Markers
-from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
-from stewart_dynamics.parameters import is_of_ros, Parameters
+from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
+from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.parameter_files import is_of_ros
+from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.diagnostics import Diagnostics, OK, Status, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
@@ -545,7 +547,7 @@ class DynamicsNode(LifecycleNode):
                     raise ParameterError(
                         f'{", ".join(fixed)}: only changed while the node is unconfigured: its '
                         'topics and its machine are made of it; deactivate and clean up first')
-            parameters = self._settings.replaced(ours)
+            parameters = self._settings.replaced(ours, exact_types=True)
             step, external_wrench = Step(parameters), ExternalWrench(parameters)
         except ParameterError as exc:
             return SetParametersResult(

@@ -12,14 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the executables that are ROS nodes share: parameters, spinning, exit codes."""
+"""What the nodes share: parameters from ROS, start, spinning, exit codes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
-import gc
 import math
 import signal
 import sys
@@ -30,23 +28,23 @@ from rcl_interfaces.msg import (
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import NameValidationException, ROSInterruptException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
-from rclpy.time_source import TimeSource
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.nodes.programs import parameter_files
+from stewart_dynamics.nodes.rclpy_workarounds import (
+    describe_by, make_executor, reject_impossible_times, set_parameters_together, shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries
-from stewart_dynamics.parameters import is_of_ros, Parameter, ParameterSet
+from stewart_dynamics.parameter_files import is_of_ros, other_nodes
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters_yaml import NULL
 
-# The executor's wait is bounded: rclpy 7.1's unbounded one burns half a core and may hang.
-_SPIN_SECONDS = 10.0
-
-# What is the user's to mend, said in one line: all else is a fault of ours.
+# Errors that the user can mend: said in one line. All else is a defect of this package.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
 
 _TYPES = {
@@ -57,14 +55,8 @@ _TYPES = {
 Kind = TypeVar('Kind', bound=ParameterSet)
 
 
-def parameter_files(arguments: Sequence[str]) -> list[str]:
-    """Return the parameter files that a command line names."""
-    return [value for option, value in zip(arguments, arguments[1:], strict=False)
-            if option == '--params-file']
-
-
 def _overrides(arguments: Sequence[str], node: str) -> list[tuple[str, str]]:
-    """Return names and texts of the values that a command line sets, for all nodes or this."""
+    """Return names and texts of the values that a command line sets, for this node or all."""
     rules = [rule.partition(':=') for option, rule in zip(arguments, arguments[1:], strict=False)
              if option in ('-p', '--param')]
     return [(name.rpartition(':')[2], text) for name, _, text in rules
@@ -75,36 +67,56 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     """
     Return the node's parameters, checked, and declare all of the table.
 
-    The node must have been made with ``automatically_declare_parameters_from_overrides``.
-    Types and ranges are left to the table's own check, whose texts say more than ROS's. A node
-    without a lifecycle takes no changes. Raises ParameterError, for an unknown name as well.
+    The node must have been made with ``automatically_declare_parameters_from_overrides``. Types
+    and ranges are left to the table's own check, whose texts say more than ROS's. A node without
+    a lifecycle accepts no changes. Raises ParameterError, for an unknown name as well.
     """
-    sources = parameter_files(sys.argv)
+    files = parameter_files(sys.argv)
+    sources = list(files)
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
-    # ROS drops a value silently that is of another type than that in a file.
+    # ROS drops a value without a word that is of another type than that in a file.
     for name, text in _overrides(sys.argv, kind.node):
         kind.check_value(name, text, 'command line')
     declared: dict[str, Any] = node.get_parameters_by_prefix('')
-    given = {name: parameter.value for name, parameter in declared.items() if not is_of_ros(name)}
-    parameters = kind(given, source)
+    # A null of a file, as `ros2 param dump` writes it, is a text for rcl.
+    given = {name: parameter.value for name, parameter in declared.items()
+             if not is_of_ros(name) and parameter.value not in NULL}
+    try:
+        parameters = kind(given, source, exact_types=True)
+    except ParameterError as exc:
+        raise _of_other_nodes(files, node.get_fully_qualified_name()) or exc from exc
     for name, parameter in kind.table.items():
         unchecked = ParameterDescriptor(dynamic_typing=True)
-        if node.has_parameter(name):
+        if name in given:
             node.set_descriptor(name, unchecked)
-        else:
-            default = parameter.default
-            if isinstance(default, tuple):
-                default = list(default) or None
-            node.declare_parameter(name, default, unchecked)
+            continue
+        if node.has_parameter(name):
+            node.undeclare_parameter(name)
+        default = parameter.default
+        if isinstance(default, tuple):
+            default = list(default) or None
+        node.declare_parameter(name, default, unchecked, ignore_override=True)
     if not isinstance(node, LifecycleNode):
-        node.add_on_set_parameters_callback(partial(_refuse_changes, kind))
-    _describe_by_table(node, kind)
+        node.add_on_set_parameters_callback(partial(_reject_changes, kind))
+    set_parameters_together(node)
+    describe_by(node, lambda name: _descriptor(
+        kind.table[name], node) if name in kind.table else None)
     return parameters
 
 
-def _refuse_changes(
+def _of_other_nodes(files: Sequence[str], node: str) -> ParameterError | None:
+    """Return what is wrong where no file has a section for the node."""
+    others = [other_nodes(file, node) for file in files]
+    if not others or not all(others):
+        return None
+    return ParameterError('; '.join(
+        f"{file}: is for {other}, not for '{node}': rename the section, or use '/**'"
+        for file, other in zip(files, others, strict=True)))
+
+
+def _reject_changes(
         kind: type[ParameterSet], changes: Sequence[RosParameter]) -> SetParametersResult:
     for change in changes:
         if not is_of_ros(change.name):
@@ -113,30 +125,8 @@ def _refuse_changes(
             except ParameterError as exc:
                 return SetParametersResult(successful=False, reason=str(exc))
             return SetParametersResult(successful=False, reason=(
-                f'{change.name}: only read when the node starts: start it anew'))
+                f'{change.name}: only read when the node starts: restart it'))
     return SetParametersResult(successful=True)
-
-
-def _describe_by_table(node: Node, kind: type[ParameterSet]) -> None:
-    """
-    Answer requests for a parameter's description from the table.
-
-    rclpy 7.1 would check by the description that it holds: a double by its range, in words of
-    its own before our check is asked, and with ``more than 0`` as if it were ``at least 0``. And
-    it writes the type of a value into it that is then refused.
-    """
-    def describe(request: Any, response: Any) -> Any:
-        response = describe_by_node(request, response)
-        if response.descriptors:  # none where a name is unknown
-            response.descriptors = [
-                _descriptor(kind.table[name], node) if name in kind.table else known
-                for name, known in zip(request.names, response.descriptors, strict=True)]
-        return response
-
-    for service in node.services:
-        if service.srv_name.endswith('/describe_parameters'):
-            describe_by_node = service.callback
-            service.callback = describe
 
 
 def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
@@ -149,7 +139,7 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
     constraints = [f'{sizes} entries' if sizes else '', parameter.rule, f'set {when}']
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     in_range = math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum)
-    # What may be one number or six is of the type that it has now.
+    # A parameter of one number or six has the type of its present value.
     type_ = node.get_parameter(parameter.name).type_.value
     if type_ == ParameterType.PARAMETER_NOT_SET:
         type_ = _TYPES[parameter.kind][bool(parameter.sizes)]
@@ -161,71 +151,21 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
             from_value=parameter.minimum, to_value=parameter.maximum)] if in_range else [])
 
 
-def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., None]:
-    """
-    Return a callback that ends in silence where ROS is shut down while it runs.
-
-    A signal does so in the middle of whatever runs; what then asks ROS for anything raises.
-    """
-    def guarded(*arguments: Any) -> None:
-        try:
-            callback(*arguments)
-        except RCLError:
-            if node.context.ok():
-                raise
-
-    return guarded
-
-
-class _TimeSource(TimeSource):
-    """What follows /clock for a node; rclpy's own ends the program at a time before zero."""
-
-    def clock_callback(self, msg: Any) -> None:
-        """Follow a message, or say that it cannot be."""
-        try:
-            super().clock_callback(msg)
-        except ValueError as exc:
-            get_logger('stewart_dynamics').error(
-                f'/clock: {msg.clock.sec} s: not followed: {exc}', throttle_duration_sec=5.0)
-
-
-def _executor() -> Executor:
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
-        get_logger('stewart_dynamics').warning(
-            'this rclpy has no events executor: the single-threaded one takes 2.5 times the '
-            'processor time')
-        return SingleThreadedExecutor()
-    return EventsExecutor()
-
-
-def _usage(kind: type[ParameterSet]) -> str:
-    parameters = [f'  {name} ({parameter.ros_type}{parameter.unit and ", "}{parameter.unit}): '
-                  f'{parameter.text}' for name, parameter in kind.table.items()]
-    return '\n'.join([
-        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]', '',
-        'parameters:', *parameters])
-
-
 def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         done: Future | None = None) -> int:
     """
-    Make a node, spin it until it is told to stop, and return the exit code.
+    Make a node, spin it until a signal or ``done`` stops it, and return the exit code.
 
     Parameters
     ----------
     make_node : callable
-        Called once ROS is up; a StewartError that it raises is said in one line, exit code 1.
+        Called after rclpy.init; a StewartError that it raises is said in one line, exit code 1.
     kind : type of ParameterSet
-        What the parameter files on the command line are checked by before ROS sees them.
+        Its parameters; their files have been checked by ``programs``.
     done : Future, optional
         When it is done, its result is the exit code.
 
     """
-    if {'-h', '--help'} & set(sys.argv[1:]):
-        print(_usage(kind))
-        return 0
     stop = done or Future()
     executor = node = None
     starting = True
@@ -233,8 +173,8 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
 
     def on_signal(number: int, frame: Any) -> None:
         # rclpy's handlers, which init sets, shut ROS down before they call this one, and that
-        # ends the spinning. An exception would strike in the middle of whatever callback runs,
-        # and be logged as an error of it.
+        # ends the spinning. An exception would be raised in whatever callback runs, and logged as
+        # an error of it.
         signals.append(number)
         if starting:
             raise KeyboardInterrupt
@@ -243,43 +183,31 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         signal.signal(number, on_signal)
     try:
         if parameter_files(sys.argv) and '--ros-args' not in sys.argv:
-            raise ParameterError('--params-file is read only behind --ros-args')
-        for path in parameter_files(sys.argv):
-            kind.check_file(path)
+            raise ParameterError('--params-file is only read after --ros-args')
         for stray in remove_ros_args(sys.argv)[1:]:
             raise ParameterError(f'{stray}: unknown argument; see --help')
         warning = check_environment(sys.argv)
-        rclpy.node.TimeSource = _TimeSource  # type: ignore[misc]
+        reject_impossible_times()
         rclpy.init()
         with without_security_libraries():
             node = make_node()
         if warning:
             node.get_logger().warning(warning)
-        executor = _executor()
+        executor = make_executor()
         executor.add_node(node)
         starting = False
-        while rclpy.ok() and not stop.done():
-            executor.spin_until_future_complete(stop, _SPIN_SECONDS)
+        spin(executor, stop, lambda: bool(signals))
         return int(stop.result() or 0) if stop.done() else 0
     except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
         return 0
     except Exception as exc:
         starting = False
         if signals and not rclpy.ok():
-            return 0  # a signal has shut ROS down in the middle of anything
+            return 0  # a signal has shut ROS down in the middle of a call
         if not isinstance(exc, _OF_THE_USER):
             raise
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
         return 1
     finally:
         starting = False
-        # On this thread and before the end, else rclpy 7.1 crashes at exit.
-        if executor is not None:
-            executor.shutdown()
-        if node is not None:
-            node.destroy_node()
-        # What a node has frozen is not collected before the libraries are gone that Fast DDS
-        # needs to leave: over TLS that crashes.
-        gc.unfreeze()
-        with suppress(RCLError):  # a signal's own shutdown may come between check and call
-            rclpy.try_shutdown()
+        shut_down(executor, node)

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Refuses to start where ROS and Fast DDS would start less secure than the environment asks for.
+Rejects an environment in which ROS and Fast DDS would start less secure than it asks for.
 
-Where a keystore, a profile or a setting is missing or misspelt, both go on without a word, open
-to everybody. What each setting is for is in security/README.md.
+Where a keystore, a profile or a setting is missing or misspelt, both start without a message, open
+to anybody. Each setting is explained in security/README.md.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTIL
 
 def check_environment(arguments: Sequence[str]) -> str:
     """
-    Return what to warn of, nothing where all is well.
+    Return the text of a warning, nothing where there is none.
 
-    Raises StewartError, naming the variable, where security that is asked for would not be.
+    Raises StewartError, naming the variable, where security that is asked for would be missing.
     """
     permissive = _check_dds_security(arguments)
     rmw = os.environ.get('RMW_IMPLEMENTATION') or 'rmw_fastrtps_cpp'
@@ -53,9 +53,9 @@ def check_environment(arguments: Sequence[str]) -> str:
 
 @contextmanager
 def without_security_libraries() -> Iterator[None]:
-    """Say what it means when the node cannot be made because Fast DDS has no DDS Security."""
+    """Say in one line that the node cannot be made because Fast DDS has no DDS Security."""
     with warnings.catch_warnings():
-        # rclpy's own, two lines about what it could not clean up then
+        # rclpy's own: two lines about what it could not clean up
         warnings.filterwarnings('ignore', 'Failed to fini', RuntimeWarning)
         try:
             yield
@@ -72,16 +72,15 @@ def _check_dds_security(arguments: Sequence[str]) -> str:
     if enable in ('', 'false'):
         return ''
     if enable != 'true':
-        raise StewartError(f"ROS_SECURITY_ENABLE: '{enable}': must be true or false: ROS takes "
-                           'all but true for false')
+        raise StewartError(f"ROS_SECURITY_ENABLE: '{enable}': must be true or false: ROS "
+                           'reads everything but true as false')
     strategy = os.environ.get('ROS_SECURITY_STRATEGY', '')
     if strategy == 'Permissive':
-        return ('ROS_SECURITY_STRATEGY is Permissive: where ROS finds no keys it runs without '
-                'security')
+        return ('ROS_SECURITY_STRATEGY is Permissive: without keys ROS runs without security')
     if strategy != 'Enforce':
         raise StewartError(f"ROS_SECURITY_STRATEGY: '{strategy}': must be Enforce where "
                            'ROS_SECURITY_ENABLE is true, or Permissive, with which ROS starts '
-                           'without security where it finds no keys')
+                           'without security where there are no keys')
     keystore = os.environ.get('ROS_SECURITY_KEYSTORE', '')
     named = [value for option, value in zip(arguments, arguments[1:], strict=False)
              if option in ('-e', '--enclave')]
@@ -90,7 +89,7 @@ def _check_dds_security(arguments: Sequence[str]) -> str:
         raise StewartError('ROS_SECURITY_KEYSTORE: not set, and ROS_SECURITY_ENABLE is true')
     if not (Path(keystore) / 'enclaves' / enclave.lstrip('/')).is_dir():
         raise StewartError(f"ROS_SECURITY_KEYSTORE: '{keystore}': holds no enclave '{enclave}'; "
-                           'another one is named with --ros-args --enclave NAME')
+                           'choose another with --ros-args --enclave NAME')
     return ''
 
 
@@ -104,7 +103,7 @@ def _check_profile(path: Path) -> None:
         raise StewartError(f'{_PROFILE}: {path}: cannot be read: {reason}') from exc
     unset = [name for name in _VARIABLE.findall(text) if name not in os.environ]
     if unset:
-        raise StewartError(f'{_PROFILE}: {path}: needs the variable {unset[0]}, which is not set')
+        raise StewartError(f'{_PROFILE}: {path}: the variable {unset[0]} is not set')
     elements = [(element.tag.rpartition('}')[2], _VARIABLE.sub(
         lambda found: os.environ[found[1]], element.text or '').strip())
         for element in root.iter()]
@@ -113,7 +112,7 @@ def _check_profile(path: Path) -> None:
                     or os.environ.get('ROS_LOCALHOST_ONLY') == '1')
     if (on_localhost and ('useBuiltinTransports', 'false') in elements
             and kinds & {'interfaceWhiteList', 'tls'}):
-        raise StewartError(f'{_PROFILE}: {path}: does not hold where '
+        raise StewartError(f'{_PROFILE}: {path}: is not in effect where '
                            'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, which adds shared memory '
                            'and UDP on all addresses: set it to SYSTEM_DEFAULT, and '
                            'ROS_LOCALHOST_ONLY not at all')
@@ -123,8 +122,8 @@ def _check_profile(path: Path) -> None:
     if {'tls', 'listening_ports'} <= kinds:
         name = os.environ.get('OPENSSL_CONF', '')
         if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):
-            raise StewartError(f"OPENSSL_CONF: '{name}': has no VerifyMode = Require: everybody "
-                               'could dial the port of the profile')
+            raise StewartError(f"OPENSSL_CONF: '{name}': has no VerifyMode = Require: anybody "
+                               'could connect to the port of the profile')
 
 
 def _read(path: Path, what: str) -> str:

@@ -35,10 +35,12 @@ from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import doubts
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
-from stewart_dynamics.nodes.run import declare_parameters, run, until_shutdown
-from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant, SimulatorParameters
+from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
+from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.runtime.repeated_events import Series
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 from stewart_dynamics.runtime.wrench_input import WrenchInput
 
 _TYPES: dict[str, Any] = {

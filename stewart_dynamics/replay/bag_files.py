@@ -32,6 +32,7 @@ METADATA = 'metadata.yaml'
 # What a compressed file may become: recordings that compress better than this do not exist.
 _TIMES, _AT_LEAST = 1000, 1 << 26
 _PART = 1 << 20
+_LARGEST_METADATA = 1_000_000
 
 
 def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
@@ -56,7 +57,7 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
                     and _is_inside(file, bag)), key=_by_number)
     # rosbags' own reader of this file opens, and unpacks, all that is listed, or nothing.
     try:
-        document = read_document(bag / METADATA)
+        document = read_document(bag / METADATA, _LARGEST_METADATA)
         names = document['rosbag2_bagfile_information']['relative_file_paths']
         listed = [bag / name for name in names]
     except (ParameterError, KeyError, TypeError) as exc:

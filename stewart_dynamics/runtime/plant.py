@@ -29,11 +29,10 @@ but the error of the method.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 import math
 from operator import sub
 from struct import Struct
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +48,8 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, scale, Vector3
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
-from stewart_dynamics.parameters import inertia_matrix, Parameter, PARAMETERS, Parameters
+from stewart_dynamics.parameters import inertia_matrix
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
@@ -62,34 +62,6 @@ OUTPUT_TYPES = {
     'twist': 'geometry_msgs/msg/TwistStamped',
     'accel': 'geometry_msgs/msg/AccelStamped',
 }
-
-_OWN = (
-    Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, in which the brakes hold it '
-              'until the first command', 'm, rad', required=True, sizes=(6,)),
-    Parameter('step', 'double', 'step of the integration; shorter ones are taken where friction '
-              'or end stops need them', 's', 1e-3, minimum=1e-5, maximum=1e-3),
-    Parameter('rate', 'double', 'states published in a second, a whole number of steps apart; '
-              'with use_sim_time what a command advances time by is 1 / rate', 'Hz', 500.0,
-              minimum=1.0, maximum=1e4),
-    Parameter('end_stops.frequency', 'double', 'natural frequency of what a leg carries on its '
-              'end stop: a sixth of platform and pistons, and its own reflected mass', 'Hz', 30.0,
-              minimum=0.0, above=True),
-    Parameter('end_stops.damping_ratio', 'double', 'damping of the same; 1: no rebound', '', 0.5,
-              minimum=0.0),
-    Parameter('noise.length', 'double', 'standard deviation of the measured lengths', 'm', 0.0,
-              minimum=0.0, maximum=1e9),
-    Parameter('noise.rate', 'double', 'of the measured rates', 'm/s', 0.0, minimum=0.0,
-              maximum=1e9),
-    Parameter('noise.force', 'double', 'of the measured forces', 'N', 0.0, minimum=0.0,
-              maximum=1e9),
-    Parameter('noise.seed', 'double', 'another number gives other noise, the same the same',
-              '', 0.0),
-)
-
-SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
-    # The node has no lifecycle, so none of the machine's may change either.
-    **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
-    **{own.name: own for own in _OWN}})
 
 # A leg that is so much beyond its stop stands on it [m]: a pose has no more digits than that.
 _ON_STOP = 1e-9
@@ -120,22 +92,6 @@ _LARGEST_MOVE = 0.5
 _REST: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 _matrix = inlined(from_quaternion)
-
-
-class SimulatorParameters(Parameters):
-    """The machine's parameters, as this node shall have them, and the simulation's."""
-
-    table = SIMULATOR_PARAMETERS
-    node = 'stewart_simulator'
-
-    def _check_together(self, source: str) -> None:
-        """Check what one parameter demands of another."""
-        super()._check_together(source)
-        steps = 1.0 / (self['rate'] * self['step'])
-        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
-            raise ParameterError(
-                f'{source}: rate: {self["rate"]} Hz: a period must be a whole number of steps of '
-                f'{self["step"]:g} s, not {steps:.6g}')
 
 
 class State(NamedTuple):

@@ -14,14 +14,14 @@
 
 
 """
-What each misprint of the paper does to the leg forces: writes docs/misprints.md.
+Write docs/misprints.md: the paper's misprints, and the error of the leg forces that each causes.
 
-    python docs/misprints.py
+    python docs/figures/misprints.py
 
 Run it again when config/platform.yaml has changed. The paper is Alwan and Sarhan, Dynamic
 Analysis of Gough Stewart Robot Manipulator by Using Lagrange Formulation in Matlab Software,
 J. Univ. Babylon Eng. Sci. 26(10), 2018. Its equations are assembled here line by line, each
-line as it is printed or as it holds.
+line as it is printed or as it is correct.
 """
 
 from __future__ import annotations
@@ -42,8 +42,9 @@ from stewart_dynamics.parameters import inertia_matrix
 Array = NDArray[np.float64]
 
 HERE = Path(__file__).resolve().parent
-MACHINE = HERE.parent / 'config' / 'platform.yaml'
-TABLE = HERE / 'misprints.md'
+ROOT = HERE.parent.parent
+HEXAPOD = ROOT / 'config' / 'platform.yaml'
+TABLE = ROOT / 'docs' / 'misprints.md'
 
 SEED = 2018
 STATES = 1000
@@ -58,12 +59,12 @@ NO_ACTUATORS = {'actuator.reflected_mass': 0.0, 'actuator.viscous_friction': 0.0
 
 
 class Misprint(NamedTuple):
-    """A line of the paper that does not hold; without a key, its reading here has no effect."""
+    """A misprinted line of the paper; without a key, its reading here changes no force."""
 
     key: str
     where: str
     printed: str
-    holds: str
+    correct: str
     reading: str = ''
 
 
@@ -79,12 +80,12 @@ MISPRINTS = (
              '`m2 (L - S2) / L - (I_eq + L^2 m_eq) / L^2`'),
     Misprint('leg gravity', 'section 5, linkages: G_Li',
              '`(m1 S1 + m2 (L - S2)) skew(U)^2`', '`(m1 S1 + m2 (L - S2)) / L skew(U)^2`',
-             'kg m stands where kg must: taken as the number it is in SI units'),
+             'has kg m in place of kg: taken as the number in SI units'),
     Misprint('', 'section 5, whole manipulator: G_lini', '`J_i^T G_Li J_i`', '`J_i^T G_Li`',
-             'the shapes do not fit the sum: the second J_i is left out'),
+             'the shapes do not match: the second J_i is left out'),
     Misprint('', 'section 5, whole manipulator: last line',
              "`(J^T)^-1 (M x'' + C x' + G) = F`", "`(J_inv^T)^-1 (M x'' + C x' + G) = F`",
-             'the units fit if J is the matrix of (3), which the text calls the Jacobian'),
+             'the units match if J is the matrix of (3), which the text calls the Jacobian'),
     Misprint('angle rates', 'section 4: angular velocity of the platform',
              "`w = [alpha', beta', gamma']`", "`w = E [alpha', beta', gamma']`"),
 )
@@ -103,7 +104,7 @@ class States(NamedTuple):
 
 
 def random_states(p: Parameters) -> States:
-    """Return the states of the table: those among random ones that the legs can take."""
+    """Return the states of the table: random ones within the limits of lengths and rates."""
     random = np.random.default_rng(SEED)
     kept: list[Array] = []
     count = 0
@@ -115,16 +116,16 @@ def random_states(p: Parameters) -> States:
         at = States(*np.moveaxis(drawn, 1, 0))
         j_inv, lengths, _, _ = _jacobian(p, at)
         rates = np.abs(np.einsum('nij,nj->ni', j_inv, _twist(at, ())[0]))
-        able = np.ones(STATES, dtype=bool)
+        within = np.ones(STATES, dtype=bool)
         for name, broken in (('limits.length_min', np.less), ('limits.length_max', np.greater)):
             if p[name] is not None:
-                able &= ~np.any(broken(lengths, p[name]), axis=-1)
+                within &= ~np.any(broken(lengths, p[name]), axis=-1)
         if p['limits.velocity_max'] is not None:
-            able &= ~np.any(rates > p['limits.velocity_max'], axis=-1)
-        if not np.any(able):
-            raise SystemExit(f'{MACHINE}: no state in the ranges of this script keeps its limits')
-        kept.append(drawn[able])
-        count += int(np.sum(able))
+            within &= ~np.any(rates > p['limits.velocity_max'], axis=-1)
+        if not np.any(within):
+            raise SystemExit(f'{HEXAPOD}: no state of this script is within its limits')
+        kept.append(drawn[within])
+        count += int(np.sum(within))
     return States(*np.moveaxis(np.concatenate(kept)[:STATES], 1, 0))
 
 
@@ -152,7 +153,7 @@ def _twist(at: States, printed: Collection[str]) -> tuple[Array, Array]:
 
 
 def leg_forces(p: Parameters, at: States, printed: Collection[str] = ()) -> Array:
-    """Return the forces (N, 6) [N], the lines of these keys as printed, others as they hold."""
+    """Return the forces (N, 6) [N]: the lines of these keys as printed, all others corrected."""
     j_inv, lengths, u, arms = _jacobian(p, at)
     x_rate, x_acc = _twist(at, printed)
     omega, alpha = x_rate[:, 3:], x_acc[:, 3:]
@@ -217,14 +218,14 @@ def _shown(percent: float) -> str:
     return f'{float(f"{percent:.1e}"):g}'
 
 
-def machine() -> Parameters:
-    """Return the machine of the table: the paper's legs have no actuators."""
-    return Parameters.from_yaml(MACHINE).replaced(NO_ACTUATORS)
+def hexapod() -> Parameters:
+    """Return the hexapod of the table: the paper's legs have no actuators."""
+    return Parameters.from_yaml(HEXAPOD).replaced(NO_ACTUATORS)
 
 
 def table() -> str:
     """Return the text of docs/misprints.md."""
-    p = machine()
+    p = hexapod()
     at = random_states(p)
     lines = []
     for misprint in MISPRINTS:
@@ -232,7 +233,7 @@ def table() -> str:
             median, worst = map(_shown, effect(p, at, {misprint.key}))
         else:
             median = worst = 'none'
-        lines.append(f'| {misprint.where} | {misprint.printed} | {misprint.holds} | '
+        lines.append(f'| {misprint.where} | {misprint.printed} | {misprint.correct} | '
                      f'{median} | {worst} | {misprint.reading} |')
     median, worst = map(_shown, effect(p, at, KEYS))
     lines.append(f'| all of them at once | | | {median} | {worst} | |')
@@ -240,36 +241,38 @@ def table() -> str:
     dx, dy, dz = POSITION
     alpha, beta, gamma = np.degrees(ANGLES)
     return f"""\
-<!-- Written by docs/misprints.py: run it again rather than change this file. -->
-# Where the paper's print does not hold
+<!-- Written by docs/figures/misprints.py (make docs): do not edit this file. -->
+# Misprints in the paper
 
 The package computes with the equations of H. M. Alwan and R. A. Sarhan, *Dynamic Analysis of
 Gough Stewart Robot Manipulator by Using Lagrange Formulation in Matlab Software*, Journal of
-University of Babylon for Engineering Sciences 26(10), 2018, but for the lines below. Each is
-computed as printed with all others as they hold, and the leg forces are compared with those of
-all lines as they hold. The error is that of the worst leg, in percent of the largest leg force
-of the state: the median and the worst of {STATES} states.
+University of Babylon for Engineering Sciences 26(10), 2018, except for the lines in this table.
+Each line is computed as printed, all other lines as corrected, and the leg forces are compared
+with those of the corrected equations. The error is that of the leg with the largest error, in
+percent of the largest leg force of the state: median and maximum of {STATES} states.
 
-| where in the paper | as printed | as it holds | median [%] | worst [%] | read here as |
+| where in the paper | as printed | corrected | median [%] | maximum [%] | how it is read here |
 | --- | --- | --- | ---: | ---: | --- |
 {chr(10).join(lines)}
 
-The machine is that of `config/platform.yaml` without its actuators' inertia and friction, which
-the paper does not have. The states are drawn evenly (`numpy.random.default_rng({SEED})`) from
+The hexapod is that of `config/platform.yaml` without the inertia and friction of its actuators,
+which the paper does not model. The states are uniformly distributed
+(`numpy.random.default_rng({SEED})`) over
 
 - positions within {dx:g}, {dy:g}, {dz:g} m of ({x:g}, {y:g}, {z:g}) m,
 - alpha, beta, gamma within {alpha:g}, {beta:g}, {gamma:g} degrees,
 - velocities within {VELOCITY:g} m/s on each axis, Euler rates within {ANGLE_RATES:g} rad/s,
-- accelerations within {ACCELERATION:g} m/s^2, of the Euler angles {ANGLE_ACCELERATIONS:g} rad/s^2,
+- accelerations within {ACCELERATION:g} m/s^2, of the Euler angles {ANGLE_ACCELERATIONS:g} rad/s^2.
 
-and those kept whose leg lengths and rates are within the machine's limits. An error grows with
-what the line belongs to: the tilt, the angular velocity, the legs' mass, the distance of S2 from
-half the leg. Fast machines with heavy legs see more of it than these states show.
+States outside the limits of leg length and rate are left out. Each error grows with the quantity
+that its line contains: the tilt, the angular velocity, the mass of the legs, the distance of S2
+from the middle of the leg. Fast hexapods with heavy legs have larger errors than these states.
 
-Read in one way throughout: `U_i` is the leg's direction, `I_eq` (printed as a matrix, with I_yy1
-in both of its parts) the sum of both parts' transverse inertias, the dotted L_i between bars the
-rate of the length with its sign, g in G_Li the vector of gravity. The center of mass may lie off
-the platform's origin, for which (5) and (6) have no terms: they are added throughout.
+Notation of the paper, as read throughout: `U_i` is the direction of the leg; `I_eq` (printed as a
+matrix, with I_yy1 in both of its parts) is the sum of the transverse inertias of both parts; the
+dotted L_i between bars is the rate of the length with its sign; g in G_Li is the vector of
+gravity. The center of mass may be away from the platform's origin; (5) and (6) have no terms for
+this, and they are added throughout.
 """
 
 

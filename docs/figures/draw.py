@@ -13,17 +13,16 @@
 # limitations under the License.
 
 """
-Make what the README shows: pictures of the paper's motion and of the loop, and its tables.
+Draw the pictures of README.md and docs/ into docs/figures/.
 
-``make docs`` runs it. The pictures of the motion are drawn from bags/singular, by the joining and
-the step that node and replay have; picture and table of the loop are of what ``make
-demo-loop`` leaves in docs/loop.json.
+``make docs`` runs it. The paper's motion is drawn from bags/singular through the joining and the
+step of node and replay; the loop is what demo/loop.py measures, which also writes loop.json; the
+report is that of stewart_replay in a browser.
 """
 
 from __future__ import annotations
 
 from contextlib import closing
-import json
 from pathlib import Path
 import shutil
 import subprocess
@@ -36,93 +35,26 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.reference_motion import TrajectoryParameters
-from stewart_dynamics.parameters import Parameter, Parameters, ParameterSet
+from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import NODE
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.plant import SimulatorParameters
 from stewart_dynamics.runtime.setpoints import Setpoints
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
 
-ROOT = Path(__file__).resolve().parent.parent
-README = ROOT / 'README.md'
-# Okabe and Ito's, which the colour-blind can tell apart.
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+# The palette of Okabe and Ito, which colour-blind readers can distinguish.
 LEG_COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 
 
-def table(kind: type[ParameterSet]) -> str:
-    """Return a Markdown table of a node's parameters, those of the machine once for all."""
-    lines = ['| name | type | unit | default | meaning |', '| --- | --- | --- | --- | --- |']
-    for parameter in kind.table.values():
-        if kind is SimulatorParameters and parameter.name in Parameters.table:
-            continue
-        rule = f'; {parameter.rule}' if parameter.rule else ''
-        lines.append(f'| `{parameter.name}` | {parameter.ros_type} | {parameter.unit} | '
-                     f'{_default(parameter)} | {parameter.text}{rule} |')
-    return '\n'.join(lines)
-
-
-def _default(parameter: Parameter) -> str:
-    default = parameter.default
-    if parameter.required:
-        return 'required'
-    if isinstance(default, tuple):
-        if not default:
-            return 'none'
-        if len(default) == 6 and all(entry == default[0] for entry in default):
-            default = default[:1]
-        if parameter.name == 'joints':
-            return '`leg_1` .. `leg_6`'
-        return ', '.join(f'`{entry}`' if isinstance(entry, str) else f'{entry}'
-                         for entry in default)
-    if default is None:
-        return 'see there' if 'by default' in parameter.text else 'none'
-    return f'`{default}`' if isinstance(default, str) else f'{default}'.lower()
-
-
-def readme(text: str) -> str:
-    """Return the README with its tables made anew."""
-    for name, kind in (('node', Parameters), ('trajectory', TrajectoryParameters),
-                       ('simulator', SimulatorParameters)):
-        begin, end = f'<!-- parameters of the {name} -->\n', f'<!-- end of {name} -->'
-        before, _, rest = text.partition(begin)
-        _, _, after = rest.partition(end)
-        text = f'{before}{begin}{table(kind)}\n{end}{after}'
-    before, begin, rest = text.partition('<!-- errors in the loop -->\n')
-    _, end, after = rest.partition('<!-- end of the loop -->')
-    figures = json.loads((ROOT / 'docs' / 'loop.json').read_text(encoding='utf-8'))
-    return f'{before}{begin}{loop_table(figures)}\n{end}{after}'
-
-
-def loop_table(figures: dict[str, Any]) -> str:
-    """Return a Markdown table of what demo/loop.py found: RMS and peak of the errors."""
-    lines = ['| simulated machine | legs, PD alone | legs, PD + forces | | platform, PD alone | '
-             'platform, PD + forces | |', '| --- | --- | --- | --- | --- | --- | --- |']
-    runs = figures['runs']
-    for pd, forward in zip(runs[::2], runs[1::2], strict=True):
-        payload = pd['payload'] - 1.0
-        line = f'| payload {100.0 * payload:+.0f} % |' if payload else '| as the node believes |'
-        for name in ('all legs', 'position'):
-            for run in (pd, forward):
-                line += f' {_figure(run["rms"][name])} ({_figure(run["peak"][name])}) |'
-            line += f' 1/{pd["rms"][name] / forward["rms"][name]:.0f} |'
-        lines.append(line)
-    return '\n'.join(lines)
-
-
-def _figure(number: float) -> str:
-    """Return three digits of a number, or all before its point."""
-    return f'{number:.0f}' if number >= 100.0 else f'{number:.3g}'
-
-
 class Recorded(NamedTuple):
-    """The paper's motion as it was recorded, and what the node answers to it."""
+    """The paper's motion as recorded, and the node's answers."""
 
     parameters: Parameters
     seconds: Array
@@ -131,7 +63,7 @@ class Recorded(NamedTuple):
 
     @classmethod
     def of(cls, bag: Path) -> Recorded:
-        """Take a bag through the joining and the step that node and replay have."""
+        """Process a bag by the joining and the step of node and replay."""
         parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
         setpoints = Setpoints(parameters, lambda refusal, details: None, print)
         with closing(Recording(bag)) as recording:
@@ -143,7 +75,7 @@ class Recorded(NamedTuple):
 
     @property
     def crossing(self) -> tuple[int, float]:
-        """The last sample before det(J) is zero, and when it is."""
+        """The last sample before det(J) is zero, and the time of the zero [s]."""
         det, time = self.outputs.determinants, self.seconds
         at = int(np.flatnonzero(np.sign(det[:-1]) != np.sign(det[1:]))[0])
         return at, float(time[at] + det[at] / (det[at] - det[at + 1]) * (time[at + 1] - time[at]))
@@ -167,13 +99,13 @@ def draw_determinant(axes: Any, recorded: Recorded) -> None:
 
 
 def draw_forces(axes: Any, recorded: Recorded) -> None:
-    """Draw the forces demanded, cut at three times the limit, and the warning."""
+    """Draw the demanded forces, the axis cut at three times the limit, and the warning."""
     time = recorded.seconds
     at, crossing = recorded.crossing
     limit = recorded.parameters['limits.force_max'][0] / 1e3
     forces = recorded.outputs.demanded_forces / 1e3
     for leg, force, color in zip(recorded.parameters['joints'], forces.T, LEG_COLORS, strict=True):
-        # No line from the one branch to the other.
+        # No line between the two branches.
         axes.plot(np.insert(time, at + 1, crossing), np.insert(force, at + 1, np.nan),
                   label=leg.replace('_', ' '), linewidth=1.4, color=color)
     axes.set_ylim(-3.0 * limit, 3.0 * limit)
@@ -188,7 +120,7 @@ def draw_forces(axes: Any, recorded: Recorded) -> None:
 
 
 def draw_platform(axes: Any, recorded: Recorded) -> None:
-    """Draw the platform where it begins and where it ends."""
+    """Draw the platform in its initial and its final pose."""
     p = recorded.parameters
     base = p['geometry.base_joints']
     axes.plot(*np.vstack([base, base[:1]]).T, color='0.35')
@@ -269,7 +201,7 @@ def draw_report(path: Path) -> None:
         page.locator('#motion').scroll_into_view_if_needed()
         page.locator('#motion h2').evaluate('heading => heading.scrollIntoView()')
         page.locator('#motion canvas').first.wait_for()
-        page.wait_for_timeout(3000)  # software draws the machine slowly
+        page.wait_for_timeout(3000)  # software rendering is slow
         page.screenshot(path=path)
 
 
@@ -281,21 +213,19 @@ def euler(rotations: Array) -> Array:
 
 
 def save(figure: Any, path: Path) -> None:
-    """Write a picture: no date and no version in it, the same numbers give the same bytes."""
+    """Write a picture without date and version: the same numbers give the same bytes."""
     figure.savefig(path, dpi=110, metadata={'Software': None})
 
 
 def main() -> None:
-    """Make the pictures and the tables."""
+    """Draw all pictures."""
     recorded = Recorded.of(ROOT / 'bags' / 'singular')
     pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
                             'axes.spines.top': False, 'axes.spines.right': False})
-    draw_singular(ROOT / 'docs' / 'singular.png', recorded)
-    draw_figures(ROOT / 'docs' / 'figures.png', recorded)
-    draw_report(ROOT / 'docs' / 'report.png')
-    subprocess.run([sys.executable, ROOT / 'demo' / 'loop.py', '--output', ROOT / 'docs'],
-                   check=True)
-    README.write_text(readme(README.read_text(encoding='utf-8')), encoding='utf-8')
+    draw_singular(HERE / 'singular.png', recorded)
+    draw_figures(HERE / 'paper.png', recorded)
+    draw_report(HERE / 'report.png')
+    subprocess.run([sys.executable, ROOT / 'demo' / 'loop.py', '--output', HERE], check=True)
 
 
 if __name__ == '__main__':

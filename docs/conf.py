@@ -1,0 +1,82 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sphinx configuration of the documentation: ``make docs-site`` builds it to docs/_build/html."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.application import Sphinx
+
+ROOT = Path(__file__).resolve().parent.parent
+
+project = 'stewart_dynamics'
+author = 'The stewart_dynamics developers'
+copyright = f'2026, {author}'  # noqa: A001
+release = ElementTree.parse(ROOT / 'package.xml').getroot().findtext('version')
+
+extensions = ['myst_parser', 'numpydoc', 'sphinx.ext.autodoc']
+exclude_patterns = ['_build', 'figures']
+
+myst_enable_extensions = ['dollarmath']
+# The anchors that GitHub gives headings, so that links work there as well.
+myst_heading_anchors = 4
+
+# Warnings are errors, and an unknown reference is a warning.
+nitpicky = True
+nitpick_ignore_regex = [
+    # Types of other packages and of annotations: they have no page here.
+    ('py:.*', r'(numpy|np|pathlib|collections|typing|typing_extensions)\..*'),
+]
+
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'none'
+autodoc_default_options = {'members': True}
+numpydoc_show_class_members = False
+
+html_theme = 'furo'
+html_title = project
+html_math_renderer = 'mathml'
+html_copy_source = False
+html_show_sphinx = False
+html_theme_options = {
+    'light_css_variables': {'color-brand-primary': '#0072b2', 'color-brand-content': '#0072b2'},
+    'dark_css_variables': {'color-brand-primary': '#56b4e9', 'color-brand-content': '#56b4e9'},
+}
+html_static_path = ['_static']
+html_css_files = ['site.css']
+
+
+# Formulas as MathML, which browsers draw themselves: the pages need no network and no script.
+
+def visit_math(translator: Any, node: nodes.math) -> None:
+    """Write a formula in a line of text."""
+    translator.body.append(tex2mathml(node.astext()))
+    raise nodes.SkipNode
+
+
+def visit_displaymath(translator: Any, node: nodes.math_block) -> None:
+    """Write a formula on lines of its own."""
+    translator.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Register the renderer of formulas."""
+    app.add_html_math_renderer('mathml', (visit_math, None), (visit_displaymath, None))

@@ -1,0 +1,173 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Write the generated tables of README.md and docs/.
+
+    python docs/figures/tables.py
+
+Parameters come from the tables of the code, measured figures from benchmarks/README.md, the
+errors in the loop from docs/figures/loop.json. Each table is between two comments of its page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+from pathlib import Path
+from typing import Any
+
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+HEAD = '| name | type | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n'
+
+# The ten in the README; legs.* stands for the two parts of a leg.
+FIRST = ('joints', 'geometry.base_joints', 'geometry.platform_joints', 'platform.mass',
+         'platform.center_of_mass', 'platform.inertia', 'actuator.reflected_mass',
+         'limits.force_max', 'singularity.action', 'setpoint.source')
+
+
+def rows(names: Mapping[str, Parameter]) -> str:
+    """Return the rows of these parameters in a Markdown table."""
+    lines = []
+    for parameter in names.values():
+        rule = f'; {parameter.rule}' if parameter.rule else ''
+        lines.append(f'| `{parameter.name}` | {parameter.ros_type} | {parameter.unit} | '
+                     f'{_default(parameter)} | {parameter.text}{rule} |')
+    return HEAD + '\n'.join(lines)
+
+
+def parameters_of(kind: type[ParameterSet]) -> str:
+    """Return the table of a program's parameters, without those of the hexapod if it adds some."""
+    own = kind is Parameters
+    return rows({name: parameter for name, parameter in kind.table.items()
+                 if own or name not in Parameters.table
+                 or kind is not SimulatorParameters})
+
+
+def _default(parameter: Parameter) -> str:
+    default = parameter.default
+    if parameter.required:
+        return 'required'
+    if isinstance(default, tuple):
+        if not default:
+            return 'none'
+        if len(default) == 6 and all(entry == default[0] for entry in default):
+            default = default[:1]
+        if parameter.name == 'joints':
+            return '`leg_1` .. `leg_6`'
+        return ', '.join(f'`{entry}`' if isinstance(entry, str) else f'{entry}'
+                         for entry in default)
+    if default is None:
+        return 'see meaning' if 'by default' in parameter.text else 'none'
+    return f'`{default}`' if isinstance(default, str) else f'{default}'.lower()
+
+
+def loop(figures: Mapping[str, Any]) -> str:
+    """Return the table of the errors that demo/loop.py measured: RMS and peak."""
+    lines = ['| simulated hexapod | legs, PD only | legs, PD + forces | ratio | platform, PD only '
+             '| platform, PD + forces | ratio |', '| --- | --- | --- | --- | --- | --- | --- |']
+    runs = figures['runs']
+    for pd, forward in zip(runs[::2], runs[1::2], strict=True):
+        payload = pd['payload'] - 1.0
+        line = f'| payload {100.0 * payload:+.0f} % |' if payload else '| as in the parameters |'
+        for name in ('all legs', 'position'):
+            for run in (pd, forward):
+                line += f' {_digits(run["rms"][name])} ({_digits(run["peak"][name])}) |'
+            line += f' 1/{pd["rms"][name] / forward["rms"][name]:.0f} |'
+        lines.append(line)
+    return '\n'.join(lines)
+
+
+def _digits(number: float) -> str:
+    """Return three digits of a number, or all before its point."""
+    return f'{number:.0f}' if number >= 100.0 else f'{number:.3g}'
+
+
+def measured(row: str, column: str) -> str:
+    """Return a figure of benchmarks/README.md: the first table that has both row and column."""
+    head: list[str] = []
+    for line in (ROOT / 'benchmarks' / 'README.md').read_text(encoding='utf-8').splitlines():
+        cells = [cell.strip() for cell in line.strip('|').split('|')] if line[:1] == '|' else []
+        if not cells:
+            head = []
+        elif not head:
+            head = cells
+        elif cells[0] == row and column in head:
+            return cells[head.index(column)]
+    raise SystemExit(f'benchmarks/README.md: no table has row {row!r} and column {column!r}')
+
+
+def accuracy_and_speed() -> str:
+    """Return the README's four figures."""
+    step, times = '`inverse_dynamics.solve`, one row: the compiled step', 'times `pin.rnea` alone'
+    node, replay = 'separate, `stewart_dynamics`', '`stewart_replay`'
+    micro = 1e-3 * float(measured(step, 'ns').replace(',', ''))
+    return '\n'.join((
+        '| figure | value | command |', '| --- | --- | --- |',
+        '| largest difference of leg forces from Pinocchio, random hexapods and motions | '
+        '1e-12 of the largest force | `make test` |',
+        f'| computing one setpoint, compared with `rnea` of Pinocchio | {micro:.1f} us, '
+        f'{measured(step, times)} times | `make bench` |',
+        '| node at 1 kHz: median and 99th percentile of the latency, compared with an rclpy node '
+        'that takes and publishes the same messages and computes nothing; setpoints lost | '
+        f'{measured(node, "p50, times typed")} and {measured(node, "p99, times typed")} times; '
+        f'{measured(node, "lost")} lost | `make bench-node` |',
+        '| replay of 1,000,000 setpoints with all outputs, compared with reading and '
+        'deserializing the same bag with rosbags | '
+        f'{measured(replay, "times rosbags")} times, {measured(replay, "peak memory (MB)")} MB '
+        '| `make bench-replay` |'))
+
+
+def pages() -> dict[Path, dict[str, str]]:
+    """Return of each page with generated tables their names and texts."""
+    figures = json.loads((HERE / 'loop.json').read_text(encoding='utf-8'))
+    return {
+        ROOT / 'README.md': {
+            'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
+            'accuracy and speed': accuracy_and_speed()},
+        ROOT / 'docs' / 'parameters.md': {
+            'parameters of stewart_dynamics': parameters_of(Parameters),
+            'parameters of stewart_trajectory': parameters_of(TrajectoryParameters),
+            'parameters of stewart_simulator': parameters_of(SimulatorParameters)},
+        ROOT / 'docs' / 'simulator.md': {'errors in the loop': loop(figures)}}
+
+
+def generated(text: str, tables: Mapping[str, str]) -> str:
+    """Return a page with its tables replaced; they are between the comments of their names."""
+    for name, table in tables.items():
+        begin, end = f'<!-- {name} -->\n', f'<!-- end of {name} -->'
+        before, found, rest = text.partition(begin)
+        _, closed, after = rest.partition(end)
+        if not found or not closed:
+            raise SystemExit(f'comment missing: {begin.strip()} or {end}')
+        # Behind the comment an empty line: Markdown sees a table only then.
+        text = f'{before}{begin}\n{table}\n\n{end}{after}'
+    return text
+
+
+def main() -> None:
+    """Write all tables."""
+    for page, tables in pages().items():
+        page.write_text(generated(page.read_text(encoding='utf-8'), tables), encoding='utf-8')
+        print(f'{page.relative_to(ROOT)}: {", ".join(tables)}')
+
+
+if __name__ == '__main__':
+    main()

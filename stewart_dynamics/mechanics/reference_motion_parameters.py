@@ -1,0 +1,70 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The parameters of a reference motion, and of the node stewart_trajectory that publishes it.
+
+Apart from the motion itself, so that ``--help`` and the check of a file need no compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+
+_POSE = 'X Y Z alpha beta gamma'
+
+TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
+    Parameter('target', 'string', 'node that gets the setpoints, on <target>/setpoint/...',
+              default='stewart_dynamics'),
+    Parameter('base_frame', 'string', 'frame of the setpoints', default='base'),
+    Parameter('output', 'string', 'pose, twist and accel on three topics, or combined in one '
+              'message', default='separate', choices=('separate', 'combined')),
+    Parameter('rate', 'double', 'rate of the setpoints', 'Hz', 100.0, minimum=1e-3, maximum=1e4),
+    Parameter('start_timeout', 'double', 'the motion starts half a second after all its topics '
+              'have subscribers, at the latest after this time', 's', 5.0, minimum=0.0,
+              maximum=86400.0),
+    Parameter('loop', 'bool', 'repeat until stopped: paper and quintic to and fro, sine and hold '
+              'without end', default=False),
+    Parameter('motion.type', 'string', 'paper: from initial to final, each coordinate as a half '
+              'cosine; quintic: on the straight line and about one axis; sine: about initial; '
+              'hold: at initial', default='paper', choices=('paper', 'quintic', 'sine', 'hold')),
+    Parameter('motion.duration', 'double', 'duration of the motion, one way', 's', 10.0,
+              minimum=0.0, maximum=86400.0, above=True),
+    Parameter('motion.initial', 'double', f'{_POSE} at the start; the center of a sine',
+              'm, rad', required=True, sizes=(6,)),
+    Parameter('motion.final', 'double', f'{_POSE} at the end; required for paper and quintic',
+              'm, rad', sizes=(6,)),
+    Parameter('motion.amplitude', 'double', f'of {_POSE}; sine only', 'm, rad', (0.0,) * 6,
+              sizes=(6,)),
+    Parameter('motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
+              (0.5,), sizes=(1, 6), minimum=0.0, maximum=1e3),
+    Parameter('motion.phase', 'double', f'of {_POSE}; sine only', 'rad', (0.0,) * 6, sizes=(6,)),
+)})
+
+
+class TrajectoryParameters(ParameterSet):
+    """A reference motion, and how it is published."""
+
+    table = TRAJECTORY_PARAMETERS
+    node = 'stewart_trajectory'
+
+    def _check_together(self, source: str) -> None:
+        """Check what one parameter demands of another."""
+        if self['motion.type'] in ('paper', 'quintic') and self['motion.final'] is None:
+            raise ParameterError(f'{source}: motion.final: missing, motion.type '
+                                 f'{self["motion.type"]} needs it')

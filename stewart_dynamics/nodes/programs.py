@@ -1,0 +1,97 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The console scripts of the nodes: what needs no ROS is answered before rclpy is imported.
+
+``--help``, a parameter file that breaks a rule, and that ROS is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+import signal
+import sys
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+
+
+def dynamics() -> int:
+    """Run the node stewart_dynamics; return its exit code."""
+    return _run(Parameters, 'dynamics_node')
+
+
+def simulator() -> int:
+    """Run the node stewart_simulator; return its exit code."""
+    return _run(SimulatorParameters, 'simulator_node')
+
+
+def trajectory() -> int:
+    """Run the node stewart_trajectory; return its exit code."""
+    return _run(TrajectoryParameters, 'trajectory_node')
+
+
+def parameter_files(arguments: Sequence[str]) -> list[str]:
+    """Return the parameter files that a command line names."""
+    return [value for option, value in zip(arguments, arguments[1:], strict=False)
+            if option == '--params-file']
+
+
+def usage(kind: type[ParameterSet]) -> str:
+    """Return what ``--help`` prints."""
+    return '\n'.join([
+        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]', '',
+        'parameters:', *map(_described, kind.table.values())])
+
+
+def _described(parameter: Parameter) -> str:
+    default = parameter.default
+    if isinstance(default, tuple):
+        default = ', '.join(map(str, default))
+    elif isinstance(default, bool):
+        default = 'true' if default else 'false'
+    notes = [parameter.ros_type, parameter.unit, 'required' if parameter.required else '',
+             '' if default in (None, '') else f'default {default}']
+    return f'  {parameter.name} ({", ".join(filter(None, notes))}): {parameter.text}'
+
+
+def _run(kind: type[ParameterSet], module: str) -> int:
+    if {'-h', '--help'} & set(sys.argv[1:]):
+        print(usage(kind))
+        return 0
+    try:
+        # A signal while the libraries are loaded: the node has its own handlers later.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        for path in parameter_files(sys.argv):
+            kind.check_file(path)
+        program = import_module(f'stewart_dynamics.nodes.{module}')
+    except KeyboardInterrupt:
+        return 0
+    except ParameterError as exc:
+        print(f'{kind.node}: {exc}', file=sys.stderr)
+        return 1
+    except ImportError as exc:
+        if (exc.name or '').startswith('stewart_dynamics'):
+            raise
+        reason = ' '.join(str(exc).split())
+        print(f'{kind.node}: needs ROS 2: {reason}: source its setup file, or pip install '
+              '"stewart_dynamics[ros]"', file=sys.stderr)
+        return 1
+    code: int = program.main()
+    return code

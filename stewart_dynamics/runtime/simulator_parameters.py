@@ -1,0 +1,72 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The parameters of the simulator: those of the hexapod, and its own.
+
+Apart from the plant itself, so that ``--help`` and the check of a file need no compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from types import MappingProxyType
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameter_set import Parameter
+from stewart_dynamics.parameters import PARAMETERS, Parameters
+
+_OWN = (
+    Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '
+              'platform until the first command', 'm, rad', required=True, sizes=(6,)),
+    Parameter('step', 'double', 'step of the integration; smaller where friction or end stops '
+              'need it', 's', 1e-3, minimum=1e-5, maximum=1e-3),
+    Parameter('rate', 'double', 'rate of the published states; a period is a whole number of '
+              'steps. With use_sim_time each command advances time by one period', 'Hz', 500.0,
+              minimum=1.0, maximum=1e4),
+    Parameter('end_stops.frequency', 'double', 'natural frequency of the mass of a leg on its end '
+              'stop: its reflected mass and a sixth of platform and pistons', 'Hz', 30.0,
+              minimum=0.0, above=True),
+    Parameter('end_stops.damping_ratio', 'double', 'damping ratio of the same; 1: no rebound',
+              '', 0.5, minimum=0.0),
+    Parameter('noise.length', 'double', 'standard deviation of the measured lengths', 'm', 0.0,
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.rate', 'double', 'standard deviation of the measured rates', 'm/s', 0.0,
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.force', 'double', 'standard deviation of the measured forces', 'N', 0.0,
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.seed', 'double', 'seed of the noise: equal seeds give equal noise', '', 0.0),
+)
+
+SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
+    # The node has no lifecycle: none of the hexapod's may change while it runs either.
+    **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
+    **{own.name: own for own in _OWN}})
+
+
+class SimulatorParameters(Parameters):
+    """The parameters of the simulated hexapod, and of the simulation."""
+
+    table = SIMULATOR_PARAMETERS
+    node = 'stewart_simulator'
+
+    def _check_together(self, source: str) -> None:
+        """Check what one parameter demands of another."""
+        super()._check_together(source)
+        steps = 1.0 / (self['rate'] * self['step'])
+        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
+            raise ParameterError(
+                f'{source}: rate: {self["rate"]} Hz: a period must be a whole number of steps of '
+                f'{self["step"]:g} s, not {steps:.6g}')

@@ -1,0 +1,178 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The documentation as a site: it is built without warnings, its links lead somewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html.parser import HTMLParser
+import importlib
+import importlib.util
+import inspect
+from pathlib import Path
+import re
+import subprocess
+import sys
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import stewart_dynamics
+
+ROOT = Path(__file__).resolve().parent.parent
+
+pytestmark = pytest.mark.skipif(
+    not all(map(importlib.util.find_spec, ('sphinx', 'myst_parser', 'furo', 'numpydoc'))),
+    reason="needs pip install '.[docs]'")
+
+
+class Page(HTMLParser):
+    """Links, anchors and what a browser loads for a page."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(path.read_text(encoding='utf-8'))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if given.get('id'):
+            self.anchors.add(str(given['id']))
+        if tag == 'a' and given.get('href'):
+            self.links.append(str(given['href']))
+        relation = given.get('rel') or ''
+        if tag == 'link' and given.get('href') and relation in ('stylesheet', 'preload', 'icon'):
+            self.loaded.append(str(given['href']))
+        if tag in ('script', 'img', 'iframe') and given.get('src'):
+            self.loaded.append(str(given['src']))
+
+
+def build(source: Path, output: Path) -> subprocess.CompletedProcess[str]:
+    """Build a site as `make docs-site` does."""
+    return subprocess.run(
+        [sys.executable, '-m', 'sphinx', '--fresh-env', '--fail-on-warning', '--keep-going',
+         '--quiet', str(source), str(output)],
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        timeout=300)
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
+    """Return the pages of the site."""
+    output = tmp_path_factory.mktemp('site')
+    done = build(ROOT / 'docs', output)
+    assert done.returncode == 0, done.stdout
+    return {path.relative_to(output).as_posix(): Page(path) for path in output.rglob('*.html')
+            if '_static' not in path.parts}
+
+
+def test_every_page_is_on_the_site(site: dict[str, Page]) -> None:
+    pages = {path.stem for path in [*ROOT.glob('docs/*.md'), *ROOT.glob('docs/*.rst')]}
+    assert {f'{page}.html' for page in pages} <= set(site)
+    linked = {link.split('#')[0] for link in site['index.html'].links}
+    assert {f'{page}.html' for page in pages - {'index'}} <= linked
+
+
+def test_links_of_the_site_lead_to_pages_and_anchors(site: dict[str, Page]) -> None:
+    checked = 0
+    for page in site.values():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = page.path
+            if parts.path:
+                target = (page.path.parent / unquote(parts.path)).resolve()
+            assert target.is_file(), f'{page.path.name}: {link}'
+            if parts.fragment and target.suffix == '.html':
+                found = site.get(target.name) or Page(target)
+                assert unquote(parts.fragment) in found.anchors, f'{page.path.name}: {link}'
+            checked += 1
+    assert checked > 500
+
+
+def test_the_site_needs_no_network(site: dict[str, Page]) -> None:
+    for page in site.values():
+        assert page.loaded
+        for link in page.loaded:
+            parts = urlsplit(link)
+            assert not parts.scheme or parts.scheme == 'data', link
+            assert not parts.netloc, link
+            assert parts.scheme or (page.path.parent / unquote(parts.path)).is_file(), link
+
+
+def test_the_api_reference_has_every_public_name(site: dict[str, Page]) -> None:
+    anchors = site['api.html'].anchors
+    assert stewart_dynamics.__all__
+    for name in stewart_dynamics.__all__:
+        thing = getattr(stewart_dynamics, name)
+        if not (inspect.isclass(thing) or inspect.isfunction(thing)):
+            continue
+        assert f'stewart_dynamics.{name}' in anchors
+        if inspect.isclass(thing):
+            for member, value in vars(thing).items():
+                if not member.startswith('_') and inspect.isfunction(value) and value.__doc__:
+                    assert f'stewart_dynamics.{name}.{member}' in anchors
+
+
+def callables() -> Iterator[tuple[str, object]]:
+    """Yield the names and objects of the public interface that have parameters."""
+    for name in stewart_dynamics.__all__:
+        thing = getattr(stewart_dynamics, name)
+        if not (inspect.isclass(thing) or inspect.isfunction(thing)):
+            continue
+        yield name, thing
+        for member, value in vars(thing).items() if inspect.isclass(thing) else ():
+            if not member.startswith('_') and (
+                    inspect.isfunction(value) or isinstance(value, classmethod)):
+                yield f'{name}.{member}', getattr(thing, member)
+
+
+@pytest.mark.parametrize('name, thing', list(callables()), ids=lambda value: str(value)[:40])
+def test_documented_parameters_are_those_of_the_call(name: str, thing: object) -> None:
+    """Text after a section without its own heading would be shown as a parameter."""
+    docscrape = importlib.import_module('numpydoc.docscrape')
+    documented = docscrape.NumpyDocString(inspect.getdoc(thing) or '')['Parameters']
+    names = [each.strip(' *') for entry in documented for each in entry.name.split(',')]
+    if names:
+        assert callable(thing)
+        assert set(names) <= set(inspect.signature(thing).parameters)
+
+
+MISTAKES = {
+    'page': ('[no page](nowhere.md)', 'xref_missing'),
+    'anchor': ('[no heading](#nowhere)', 'xref_missing'),
+    'name': ('```{py:function} f(x: nothing.Known)\n```', 'reference target not found'),
+    'image': ('![no image](nowhere.png)', 'image file not readable'),
+    'orphan': ('A page in no table of contents.', 'toctree'),
+}
+
+
+def test_each_mistake_on_a_page_fails_the_build(tmp_path: Path) -> None:
+    source = tmp_path / 'docs'
+    (source / '_static').mkdir(parents=True)
+    for name in ('docs/conf.py', 'docs/_static/site.css', 'package.xml'):
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    contents = '\n'.join(name for name in MISTAKES if name != 'orphan')
+    (source / 'index.md').write_text(f'# Pages\n\n```{{toctree}}\n{contents}\n```\n')
+    for name, (text, _) in MISTAKES.items():
+        (source / f'{name}.md').write_text(f'# Page\n\n{text}\n')
+    done = build(source, tmp_path / 'site')
+    assert done.returncode != 0
+    for name, (_, warning) in MISTAKES.items():
+        assert re.search(rf'{name}\.md.*WARNING.*{warning}', done.stdout), done.stdout

@@ -1,0 +1,100 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The console scripts of the nodes: what they answer before ROS is loaded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+from referees import ROOT
+
+from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.nodes.programs import usage
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+
+PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
+            'trajectory': TrajectoryParameters}
+HEAVY = ('numba', 'scipy', 'rclpy', 'rosbags')
+
+# Without ROS: none of what it brings can be imported. The last line says what was loaded.
+RUN = f"""\
+import sys
+if sys.argv.pop(1) == 'without ROS':
+    for name in ('rclpy', 'rcl_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'std_msgs'):
+        sys.modules[name] = None
+from stewart_dynamics.nodes import programs
+code = getattr(programs, sys.argv.pop(1))()
+print([name for name in {HEAVY} if sys.modules.get(name)])
+sys.exit(code)
+"""
+
+
+def run(program: str, *arguments: str, ros: str = 'with ROS') -> tuple[int, str, str]:
+    """Return exit code, stdout and stderr of a program."""
+    done = subprocess.run([sys.executable, '-c', RUN, ros, program, *arguments], check=False,
+                          capture_output=True, text=True, timeout=60)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize('program', PROGRAMS)
+def test_help_is_answered_without_ros_and_without_a_compiler(program: str) -> None:
+    kind = PROGRAMS[program]
+    assert run(program, '--help', ros='without ROS') == (0, f'{usage(kind)}\n[]\n', '')
+    for name, parameter in kind.table.items():
+        line, = (line for line in usage(kind).splitlines() if line.startswith(f'  {name} ('))
+        assert line.endswith(f': {parameter.text}')
+        assert ('required' in line.partition('):')[0]) == parameter.required
+
+
+def test_help_shows_defaults() -> None:
+    text = usage(Parameters)
+    for line in ('  gravity (double[3], m/s^2, default 0.0, 0.0, -9.80665): ',
+                 '  autostart (bool, default true): ', '  platform.mass (double, kg, required): ',
+                 '  limits.force_max (double[1 or 6], N): ',
+                 '  legs.piston.mass (double[1 or 6], kg, default 0.0): '):
+        assert line in text
+
+
+@pytest.mark.parametrize('program', PROGRAMS)
+def test_a_program_that_lacks_ros_says_so_in_one_line(program: str) -> None:
+    code, out, error = run(program, ros='without ROS')
+    assert code == 1
+    assert 'rclpy' not in out
+    assert error.startswith(f'{PROGRAMS[program].node}: needs ROS 2: ')
+    assert error.count('\n') == 1
+
+
+@pytest.mark.parametrize('program', PROGRAMS)
+def test_a_bad_file_is_rejected_before_anything_is_loaded(program: str, tmp_path: Path) -> None:
+    file = tmp_path / 'bad.yaml'
+    file.write_text('/**: {ros__parameters: {rat: 1.0}}\n')
+    code, out, error = run(program, '--ros-args', '--params-file', str(file))
+    assert (code, out) == (1, '[]\n')
+    assert error.startswith(f'{PROGRAMS[program].node}: {file}: rat: unknown parameter')
+    assert error.count('\n') == 1
+
+
+def test_a_file_is_checked_without_a_compiler() -> None:
+    done = subprocess.run([sys.executable, '-c', f"""\
+import sys
+from stewart_dynamics import Parameters
+print(len(Parameters.from_yaml({str(ROOT / 'config' / 'platform.yaml')!r})))
+print([name for name in {HEAVY} if name in sys.modules])
+"""], check=True, capture_output=True, text=True, timeout=60)
+    assert done.stdout == f'{len(Parameters.table)}\n[]\n'
