@@ -24,11 +24,13 @@ import pytest
 from referees import symmetric_parameters
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
+from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity import Cause, Singularity
 from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
-from stewart_dynamics.runtime.setpoints import (
-    ACCEL, NOT_FINITE, NOT_JOINED, PASSED_OVER, POSE, Refusal, TWICE, TWIST)
-from stewart_dynamics.runtime.step import Excess, Output, Setpoint, Step
+from stewart_dynamics.runtime.input_topics import ACCEL, POSE, TWIST
+from stewart_dynamics.runtime.rejections import (
+    DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE)
+from stewart_dynamics.runtime.step import Output, Setpoint, Step
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -168,8 +170,8 @@ def test_refusals_are_counted_with_their_reason_and_warned_of() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
     for _ in range(3):
-        diagnostics.refused(Refusal(TWIST, NOT_FINITE), '(nan, 0.0)', BEGIN)
-    diagnostics.refused(Refusal(POSE, TWICE), 'stamp 5 ns', BEGIN)
+        diagnostics.refused(Rejection(TWIST, NOT_FINITE), '(nan, 0.0)', BEGIN)
+    diagnostics.refused(Rejection(POSE, TWICE), 'stamp 5 ns', BEGIN)
     of = status(diagnostics, 'setpoints', BEGIN + 0.01)
     assert of.level == WARN
     assert of.message == f'{POSE}: {TWICE} (stamp 5 ns)'
@@ -216,7 +218,7 @@ def test_where_all_is_refused_silence_is_not_said_to_be_of_stamps() -> None:
     diagnostics = begun()
     for topic in TOPICS:
         diagnostics.heard(topic, BEGIN)
-    diagnostics.refused(Refusal(POSE, NOT_FINITE), 'nan', BEGIN)
+    diagnostics.refused(Rejection(POSE, NOT_FINITE), 'nan', BEGIN)
     of = status(diagnostics, 'setpoints', BEGIN + 0.01)
     assert (of.level, of.message) == (STALE, f'no setpoint: {POSE}: {NOT_FINITE} (nan)')
 
@@ -245,12 +247,12 @@ def test_processing_times_are_those_of_the_last_seconds() -> None:
 def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> None:
     diagnostics = begun()
     for n in range(3):
-        diagnostics.refused(Refusal('setpoint', PASSED_OVER), f'stamp {n} ns', BEGIN)
-    diagnostics.refused(Refusal(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
-    diagnostics.refused(Refusal(POSE, TWICE), 'stamp 4 ns', BEGIN)
+        diagnostics.refused(Rejection('setpoint', DROPPED), f'stamp {n} ns', BEGIN)
+    diagnostics.refused(Rejection(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
+    diagnostics.refused(Rejection(POSE, TWICE), 'stamp 4 ns', BEGIN)
     answered(diagnostics, BEGIN + 0.5)
     of = status(diagnostics, 'timing', BEGIN + 0.5)
-    assert (of.level, of.message) == (WARN, f'setpoint: {PASSED_OVER} (stamp 2 ns)')
+    assert (of.level, of.message) == (WARN, f'setpoint: {DROPPED} (stamp 2 ns)')
     answered(diagnostics, BEGIN + 1.5)
     of = status(diagnostics, 'timing', BEGIN + 1.5)
     assert (of.level, of.message) == (OK, 'on time')
@@ -341,18 +343,19 @@ def test_held_limits_are_ok() -> None:
         assert values[f'{name}: force demanded (N)'] == f'{CLEAR.demanded_forces[leg]:.6g}'
 
 
-@pytest.mark.parametrize(('excess', 'words'), [
-    (Excess('limits.length_min', 0, 0.9, 0.95),
+@pytest.mark.parametrize(('exceedance', 'words'), [
+    (Exceedance('limits.length_min', 0, 0.9, 0.95),
      'leg_1: length 0.9 m is 0.05 m beyond limits.length_min'),
-    (Excess('limits.length_max', 1, 1.75, 1.5),
+    (Exceedance('limits.length_max', 1, 1.75, 1.5),
      'leg_2: length 1.75 m is 0.25 m beyond limits.length_max'),
-    (Excess('limits.velocity_max', 2, -0.75, 0.5),
+    (Exceedance('limits.velocity_max', 2, -0.75, 0.5),
      'leg_3: rate -0.75 m/s is 0.25 m/s beyond limits.velocity_max'),
-    (Excess('limits.force_max', 5, -7000.0, 6000.0),
+    (Exceedance('limits.force_max', 5, -7000.0, 6000.0),
      'leg_6: force -7000 N is 1000 N beyond limits.force_max, clipped')])
-def test_a_broken_limit_is_an_error_that_says_by_how_much(excess: Excess, words: str) -> None:
+def test_a_limit_exceeded_is_an_error_that_says_by_how_much(
+        exceedance: Exceedance, words: str) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, CLEAR._replace(excesses=(excess,)))
+    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(exceedance,)))
     of = status(diagnostics, 'limits', BEGIN)
     assert (of.level, of.message) == (ERROR, words)
 
@@ -375,14 +378,14 @@ def test_a_clipped_force_is_said_as_the_leg_would_need_it() -> None:
 
 def test_a_level_holds_for_a_second_after_its_cause() -> None:
     diagnostics = begun()
-    excess = Excess('limits.force_max', 0, 2.0, 1.0)
-    answered(diagnostics, BEGIN, CLEAR._replace(excesses=(excess,)))
+    exceedance = Exceedance('limits.force_max', 0, 2.0, 1.0)
+    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(exceedance,)))
     for after in (0.1, 0.5, 0.99):
         answered(diagnostics, BEGIN + after)
         assert status(diagnostics, 'limits', BEGIN + after).level == ERROR
     assert status(diagnostics, 'limits', BEGIN + 1.0).level == OK
-    answered(diagnostics, BEGIN + 3.0, CLEAR._replace(excesses=(excess,)))
-    answered(diagnostics, BEGIN + 3.9, CLEAR._replace(excesses=(excess,)))
+    answered(diagnostics, BEGIN + 3.0, CLEAR._replace(exceedances=(exceedance,)))
+    answered(diagnostics, BEGIN + 3.9, CLEAR._replace(exceedances=(exceedance,)))
     assert status(diagnostics, 'limits', BEGIN + 4.8).level == ERROR
 
 
@@ -416,7 +419,7 @@ def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
     assert diagnostics.level_changed(BEGIN)
     diagnostics.report(BEGIN)
     assert not answered(diagnostics, BEGIN + 0.01)
-    diagnostics.refused(Refusal(POSE, TWICE), '', BEGIN + 0.01)
+    diagnostics.refused(Rejection(POSE, TWICE), '', BEGIN + 0.01)
     assert diagnostics.level_changed(BEGIN + 0.01)
     diagnostics.report(BEGIN + 0.01)
     assert not answered(diagnostics, BEGIN + 0.02)
@@ -463,7 +466,7 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
         now += pause
         output = step(Setpoint(0, (*position, *rotation, *rates)), state)
         if output is None:
-            diagnostics.refused(Refusal('setpoint', 'out of range'), '', now)
+            diagnostics.refused(Rejection('setpoint', 'out of range'), '', now)
         else:
             answered(diagnostics, now, output)
             state = output.singularity

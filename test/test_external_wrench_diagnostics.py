@@ -23,11 +23,12 @@ from test_external_wrench import (
     BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, UNFILTERED)
 
 from stewart_dynamics import Motion
+from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench
 from stewart_dynamics.runtime.external_wrench_diagnostics import WrenchDiagnostics
-from stewart_dynamics.runtime.measured_legs import LACKING, MEASURED_LEGS
-from stewart_dynamics.runtime.setpoints import Refusal
+from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
+from stewart_dynamics.runtime.rejections import Rejection
 
 TARGET = tuple(HOME.rows.tolist())
 
@@ -155,14 +156,14 @@ def test_measurements_that_are_too_far_apart_are_stale() -> None:
 def test_a_refusal_is_told_and_counted() -> None:
     diagnostics = WrenchDiagnostics(MACHINE)
     felt(diagnostics, 1.0)
-    diagnostics.refused(Refusal(MEASURED_LEGS, LACKING), 'leg_6', 1.01)
+    diagnostics.refused(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.01)
     now = status(diagnostics, 1.02)
     assert (now.level, now.message) == (
         WARN, 'measured_legs: lacks one of the joints (leg_6)')
     assert dict(now.values)['refused, measured_legs: lacks one of the joints'] == '1'
     for n in range(10):
         diagnostics.heard(1.1 + 0.1 * n)
-        diagnostics.refused(Refusal(MEASURED_LEGS, LACKING), 'leg_6', 1.1 + 0.1 * n)
+        diagnostics.refused(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.1 + 0.1 * n)
     now = status(diagnostics, 2.0)
     assert (now.level, now.message) == (
         STALE, 'no wrench: measured_legs: lacks one of the joints (leg_6)')

@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 
 from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.runtime import planned_trajectory, plant, setpoints, step
+from stewart_dynamics.runtime import input_topics, output_messages, planned_trajectory, plant
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
@@ -64,7 +64,7 @@ def test_a_table_without_its_comments_is_an_error(tables: ModuleType) -> None:
 
 
 def test_topics_are_those_of_the_code() -> None:
-    node = {**setpoints.INPUT_TYPES, **step.OUTPUT_TYPES,
+    node = {**input_topics.INPUT_TYPES, **output_messages.OUTPUT_TYPES,
             'markers': 'visualization_msgs/msg/MarkerArray',
             planned_trajectory.INPUT: planned_trajectory.INPUT_TYPE,
             planned_trajectory.OUTPUT: planned_trajectory.OUTPUT_TYPE}
