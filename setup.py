@@ -23,6 +23,7 @@ share = f'share/{package_name}'
 # No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
 # knows them under other names. Everything else that an executable imports is here.
 install_requires = [
+    'jinja2>=3.1',  # the replay's pages
     'lz4>=4',
     'mcap>=1.2',
     'numba>=0.57; platform_machine in "x86_64 AMD64 aarch64 arm64"',
