@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 import numpy as np
 from running import (
     bits, DynamicsNode, HOME, log_lines, nanoseconds, NODE, Planner, Sample, wrench_message)
@@ -52,8 +51,8 @@ def check(answer: JointTrajectory, samples: list[Sample], platform: StewartPlatf
         assert len(point.accelerations) == 0
 
 
-def test_a_motion_is_answered_with_the_librarys_bits(start: Start) -> None:
-    node = start()
+def test_a_motion_is_answered_with_the_librarys_bits(fresh: Start) -> None:
+    node = fresh()
     node.until_active()
     planner = Planner(node)
     planner.send(MOTION, step=500_000_000, stamp=123_456_789_012)
@@ -72,11 +71,10 @@ def test_a_motion_is_answered_with_the_librarys_bits(start: Start) -> None:
                'the load has come')
     planner.send(MOTION, step=500_000_000)
     check(planner.until_answered(2), MOTION, node.platform, load)
-    node.stop()
 
 
-def test_without_effort_there_is_none(start: Start) -> None:
-    node = start('trajectory.effort:=false', 'singularity.warn_condition:=2.0')
+def test_without_effort_there_is_none(fresh: Start) -> None:
+    node = fresh('trajectory.effort:=false', 'singularity.warn_condition:=2.0')
     node.until_active()
     planner = Planner(node)
     planner.send(MOTION, step=500_000_000)
@@ -88,8 +86,8 @@ def test_without_effort_there_is_none(start: Start) -> None:
         node.program.stderr, 'WARN')), 'it is logged')
 
 
-def test_a_refused_motion_is_not_answered_and_the_next_one_is(start: Start) -> None:
-    node = start()
+def test_a_refused_motion_is_not_answered_and_the_next_one_is(fresh: Start) -> None:
+    node = fresh()
     node.until_active()
     planner = Planner(node)
     for number in (1, 2):
@@ -108,13 +106,13 @@ def test_a_refused_motion_is_not_answered_and_the_next_one_is(start: Start) -> N
     assert 'beyond limits.' in line
 
 
-def test_setpoints_are_answered_while_motions_are_in_work(start: Start) -> None:
+def test_setpoints_are_answered_while_motions_are_in_work(fresh: Start) -> None:
     """
     By order: many setpoints, one after the other, are answered before the next motion is done.
 
     The motions are refused at their ends: answers so long may come later than they are sent.
     """
-    node = start()
+    node = fresh()
     node.until_active()
     planner = Planner(node)
     planner.fill(leap=0.01)
@@ -140,8 +138,8 @@ def test_setpoints_are_answered_while_motions_are_in_work(start: Start) -> None:
     assert longest > 8
 
 
-def test_a_motion_is_answered_with_one_set_of_parameters(start: Start) -> None:
-    node = start()
+def test_a_motion_is_answered_with_one_set_of_parameters(fresh: Start) -> None:
+    node = fresh()
     node.until_active()
     planner = Planner(node)
     planner.send_long(20_000)
@@ -165,8 +163,7 @@ def test_what_is_in_work_ends_with_the_node(start: Start) -> None:
     planner = Planner(node)
     planner.fill()
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-        assert node.call('change_state', ChangeState.Request(
-            transition=Transition(id=transition))).success
+        assert node.change(transition)
     node.until(lambda: f'{NODE}/leg_trajectory' not in dict(
         node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/')),
         'its topic is closed')

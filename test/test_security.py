@@ -124,12 +124,13 @@ def test_the_policy_is_one_of_sros2() -> None:
             assert re.fullmatch(r'[~/]?[a-z_/]+', element.text or ''), element.text
 
 
-def test_the_policy_is_what_the_node_does(start: Start) -> None:
+def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     """Each name that the node has with any source of setpoints is in it, and no other."""
-    nodes = [start('setpoint.source:=separate'), start('setpoint.source:=combined'),
-             start('setpoint.source:=pose', 'use_sim_time:=true')]
     union: dict[str, set[str]] = {}
-    for node in nodes:
+    for begin, overrides in ((fresh, ('setpoint.source:=separate',)),
+                             (fresh, ('setpoint.source:=combined',)),
+                             (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
+        node = begin(*overrides)
         node.until_active()
         of_inputs = {f'{NODE}/{topic}' for topic in (
             *node.topics, 'wrench', 'measured_legs')}

@@ -17,8 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 import math
 from pathlib import Path
+import re
 import signal
 import time
 from typing import Any
@@ -32,12 +35,13 @@ from rclpy.serialization import deserialize_message
 from referees import rng
 from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, bits, executable, log_lines, nanoseconds, Peer, PLATFORM, Program, ROOT,
-    wrench_message)
+    assert_only_log_lines, bits, executable, Inside, log_lines, nanoseconds, Peer, PLATFORM,
+    Program, ROOT, wrench_message)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import Pose, StewartError, StewartPlatform
+from stewart_dynamics.nodes.simulator_node import SimulatorNode
 from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.plant import OUTPUT_TYPES, Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
@@ -56,20 +60,43 @@ SPECIAL = (math.nan, math.inf, -math.inf)
 
 
 class Simulator:
-    """The simulator in a process of its own, and a peer that commands it and keeps its states."""
+    """
+    The simulator, and a peer that commands it and keeps its states.
 
-    def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = ()
-                 ) -> None:
+    Parameters
+    ----------
+    domain : int
+        Its ROS domain.
+    folder : Path
+        Gets what it writes.
+    overrides : str
+        Parameters on the command line, ``name:=value``.
+    files : sequence of Path
+        Its parameter files; by default those of config/.
+    said : callable, optional
+        What this process says on stderr, where the simulator is to be in it, and not in a process
+        of its own.
+
+    """
+
+    def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
+                 said: Callable[[], str] | None = None) -> None:
         self.peer = Peer(domain)
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
         self.raw['clock'] = self.peer.listen('/clock', Clock)
         self._commands = self.peer.writer(f'{SIMULATOR}/commands', Float64MultiArray)
         self._wrench = self.peer.writer(f'{SIMULATOR}/wrench', WrenchStamped)
-        paths = [part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)]
-        self.program = Program(
-            [executable('stewart_simulator'), '--ros-args', *paths,
-             *(part for override in overrides for part in ('-p', override))], domain, folder)
+        arguments = ['--ros-args', *(
+            part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)), *(
+            part for override in overrides for part in ('-p', override))]
+        self._stepped = STEPPED in overrides
+        try:
+            self.program: Any = Inside(SimulatorNode, arguments, domain, said) if said else (
+                Program([executable('stewart_simulator'), *arguments], domain, folder))
+        except StewartError:
+            self.peer.close()
+            raise
         self.peer.watched = self.program
 
     def until(self, condition: Callable[[], Any], what: str) -> None:
@@ -82,10 +109,6 @@ class Simulator:
         self.until(lambda: all(self.raw[topic] for topic in topics)
                    and self._commands.get_subscription_count()
                    and self._wrench.get_subscription_count(), 'the simulator is there')
-
-    @property
-    def _stepped(self) -> bool:
-        return any(part == STEPPED for part in self.program.process.args)
 
     def until_said(self, level: str, text: str) -> str:
         """Return the first line of its log that has a text in it, once it is said."""
@@ -144,7 +167,7 @@ class Simulator:
     def close(self) -> None:
         """Leave ROS, and stop the program if it still runs."""
         try:
-            if not self.program.ended:
+            if isinstance(self.program, Program) and not self.program.ended:
                 self.stop()
         finally:
             self.program.kill()
@@ -173,32 +196,42 @@ Start = Callable[..., Simulator]
 
 @pytest.fixture
 def start(domain: int, tmp_path: Path) -> Iterator[Start]:
-    """Return a function that starts a simulator, one after the other; it stops with the test."""
+    """Return a function that starts a simulator in a process of its own, one after the other."""
+    with one_after_the_other(partial(Simulator, domain), tmp_path) as begin:
+        yield begin
+
+
+@pytest.fixture
+def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+    """Return a function that makes a simulator in this process; in the end it must be at work."""
+    begun: list[Simulator] = []
+    make = partial(Simulator, domain, said=lambda: capfd.readouterr().err)
+    with one_after_the_other(make, tmp_path) as start:
+        def started(*overrides: str, **options: Any) -> Simulator:
+            begun.append(start(*overrides, **options))
+            begun[-1].until_there()
+            return begun[-1]
+
+        yield started
+        begun[-1].at_work()
+
+
+@contextmanager
+def one_after_the_other(make: Callable[..., Simulator], folder: Path) -> Iterator[Start]:
+    """Give a function that makes a simulator, and ends the one before; the last ends with this."""
     started: list[Simulator] = []
 
     def begin(*overrides: str, **options: Any) -> Simulator:
         if started:
             started[-1].close()
-        started.append(Simulator(domain, tmp_path / str(len(started)), *overrides, **options))
+        started.append(make(folder / str(len(started)), *overrides, **options))
         return started[-1]
 
-    yield begin
-    if started:
-        started[-1].close()
-
-
-@pytest.fixture
-def begin(start: Start) -> Iterator[Start]:
-    """Return the same where it must be at work in the end."""
-    begun: list[Simulator] = []
-
-    def started(*overrides: str, **options: Any) -> Simulator:
-        begun.append(start(*overrides, **options))
-        begun[-1].until_there()
-        return begun[-1]
-
-    yield started
-    begun[-1].at_work()
+    try:
+        yield begin
+    finally:
+        if started:
+            started[-1].close()
 
 
 @pytest.fixture
@@ -216,10 +249,9 @@ def holding() -> list[float]:
     """Return the forces that hold the machine in its initial pose."""
     plant = Plant(SimulatorParameters(GIVEN))
     platform = StewartPlatform(plant.parameters)
-    position, rotation = plant.state.pose[:3], np.eye(3)
+    pose = Pose(plant.state.pose[:3], np.eye(3))
     forces: list[float] = np.linalg.solve(
-        platform.jacobian(position, rotation).T,
-        platform.gravity_vector(position, rotation)).tolist()
+        platform.inverse_jacobian(pose).T, platform.gravity_vector(pose)).tolist()
     return forces
 
 
@@ -228,13 +260,14 @@ def holding() -> list[float]:
 NOISY = ('noise.length:=1.0e-5', 'noise.rate:=1.0e-3', 'noise.force:=2.0')
 
 
-def test_step_by_step_the_same_commands_give_the_same_bits(begin: Start) -> None:
+def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None:
     """Two processes, and the library in this one; however long each takes for what."""
     random = rng()
     commands = np.array(holding()) + random.uniform(-300.0, 300.0, (40, 6))
     seen = []
     for _ in range(2):
-        simulator = begin(STEPPED, *NOISY)
+        simulator = start(STEPPED, *NOISY)
+        simulator.until_there()
         for n, command in enumerate(commands):
             if n == 20:
                 simulator.load((100.0, 0.0, -50.0, 0.0, 10.0, 0.0))
@@ -294,7 +327,7 @@ def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> 
     simulator.until(lambda: len(simulator.raw['accel']) > 100, 'it goes on')
     assert simulator.raw['clock'] == []
     home = StewartPlatform(SimulatorParameters(GIVEN)).inverse_kinematics(
-        [0.0, 0.0, 1.1], np.eye(3)) - 0.95
+        Pose([0.0, 0.0, 1.1], np.eye(3))) - 0.95
     for state in simulator.states():
         assert np.allclose(state.position, home, rtol=0.0, atol=1e-15)
         assert not np.any([*state.velocity, *state.effort])
@@ -411,8 +444,9 @@ def test_a_machine_too_stiff_for_real_time_lets_time_go(begin: Start) -> None:
 
 
 def test_a_simulator_that_was_stopped_takes_what_is_due_and_lets_the_rest_go(
-        begin: Start) -> None:
-    simulator = begin()
+        start: Start) -> None:
+    simulator = start()
+    simulator.until_there()
     simulator.program.process.send_signal(signal.SIGSTOP)
     end = time.monotonic() + 1.0
     simulator.until(lambda: time.monotonic() > end, 'a second goes by')
@@ -434,7 +468,7 @@ def test_a_signal_ends_it(start: Start) -> None:
             simulator.stop(number)
 
 
-@pytest.mark.parametrize(('overrides', 'said'), [
+CANNOT = [
     (('actuator.coulomb_friction:=1.0e+9',),
      'actuator.coulomb_friction: [1000000000.0, '),
     (('actuator.viscous_friction:=1.0e+9', 'actuator.reflected_mass:=0.0'),
@@ -443,15 +477,22 @@ def test_a_signal_ends_it(start: Start) -> None:
     (('rate:=300.0',), 'rate: 300.0 Hz: a period must be a whole number of steps of 0.001 s'),
     (('step:=0.01',), 'step: 0.01 s: must be at least 1e-05, at most 0.001'),
     (('noise.lenght:=0.1',), 'noise.lenght: unknown parameter; do you mean noise.length?'),
-], ids=str)
+]
+
+
 def test_what_it_cannot_simulate_is_said_in_one_line(
-        start: Start, overrides: tuple[str, ...], said: str) -> None:
-    program = start(*overrides).program
-    assert program.wait() == 1, program.stderr
-    lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
-    assert len(lines) == 1, program.stderr
-    assert lines[0].startswith('stewart_simulator: ')
-    assert said in lines[0]
+        domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: Start) -> None:
+    for overrides, said in CANNOT:
+        with pytest.raises(StewartError, match=re.escape(said)):
+            Simulator(domain, tmp_path / 'inside', *overrides,
+                      said=lambda: capfd.readouterr().err)
+    for overrides, said in (CANNOT[0], CANNOT[-1]):
+        program = start(*overrides).program
+        assert program.wait() == 1, program.stderr
+        lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
+        assert len(lines) == 1, program.stderr
+        assert lines[0].startswith('stewart_simulator: ')
+        assert said in lines[0]
 
 
 def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
@@ -464,7 +505,7 @@ def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
     simulator.until(future.done, 'it answers')
     assert not future.result().result.successful
     assert future.result().result.reason == (
-        'platform.mass: only read when the node starts: start it anew')
+        'platform.mass: only read when the node starts: restart it')
 
 
 def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:

@@ -31,8 +31,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
-from stewart_dynamics.mechanics.force_breakdown import ForceCauses
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
@@ -107,7 +107,7 @@ def replay(
         notices = notices_of(recording, topics, options)
         with whole_folder(folder, options) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
-            run.notices += [*doubts(parameters), *notices]
+            run.notices += [*likely_mistakes(parameters), *notices]
             for messages, size in recording.messages({name: key for key, name in topics.items()}):
                 answered = run.take(messages)
                 if progress is not None:
@@ -147,10 +147,10 @@ class _Run:
         self._comparison = None if options.measured is None else Comparison(parameters)
         self._efforts = Efforts(parameters['joints'])
         self.report: Report | None = None
-        self._breakdown: ForceCauses | None = None
+        self._breakdown: ForceBreakdownRows | None = None
         if options.report:
             self.report = Report(parameters, measured=options.measured is not None)
-            self._breakdown = ForceCauses(parameters)
+            self._breakdown = ForceBreakdownRows(parameters)
         self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters))
         stack.callback(self._bag.abandon)
         table = ParquetTable if options.parquet else CsvTable

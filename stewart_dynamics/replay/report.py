@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.force_breakdown import CAUSES as SOURCES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay import report_plots as channels
 from stewart_dynamics.replay.curves import Curves, Frames

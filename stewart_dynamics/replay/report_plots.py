@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.force_breakdown import CAUSES as SOURCES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 
 # Okabe and Ito's colours, which the colour-blind can tell apart; their yellow is lost on white.

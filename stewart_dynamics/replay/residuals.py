@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Stamps
-from stewart_dynamics.mechanics.kernel import COULOMB_RATE
+from stewart_dynamics.mechanics.friction import friction
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.contacts import WrenchBins
@@ -183,8 +183,10 @@ class Comparison:
         self._measured_squares += np.sum(measured ** 2, axis=1)
         self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
                            np.sum(computed * measured, axis=1)]
-        # as the dynamics have friction: offset, Coulomb's, viscous
-        terms = np.ones_like(rates), np.clip(rates / COULOMB_RATE, -1.0, 1.0), rates
+        # offset, and of unit coefficients Coulomb and viscous friction
+        coulomb = np.empty((len(seconds), 6))
+        friction(np.ascontiguousarray(rows[:, _RATES]), np.zeros(6), np.ones(6), coulomb)
+        terms = np.ones_like(rates), np.ascontiguousarray(coulomb.T), rates
         for row, one in enumerate(terms):
             self._fitted[:, row] += np.sum(one * residual, axis=1)
             for column, other in enumerate(terms):

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.mechanics.force_breakdown import CAUSES as SOURCES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.limits import (
     FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
 from stewart_dynamics.parameters import Parameters
