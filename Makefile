@@ -44,13 +44,17 @@ export ROS_HOME := $(CACHE)/ros
 export ROS_LOG_DIR := $(CACHE)/ros/log
 export XDG_CACHE_HOME := $(CACHE)
 
+# Processes that run the tests.
+TESTERS := 3
+
 PIP := .venv/bin/python -m pip --quiet
 # One stamp for each kind of environment: the other kind is no use once ROS is sourced, or not.
 DEPENDENCIES := .venv/dependencies-$(ROS)
 INSTALLED := .venv/installed-$(ROS)
 
+# More processes than cores: tests with ROS wait half of their time. A module's tests stay in one.
 test: lint
-	.venv/bin/python -m pytest
+	.venv/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
 lint: $(INSTALLED)
 	.venv/bin/python -m ruff check --quiet .

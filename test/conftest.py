@@ -17,15 +17,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing, ExitStack
+from itertools import count
 from pathlib import Path
+import subprocess
+from subprocess import DEVNULL
+import sys
 from typing import Any, TYPE_CHECKING
 
 import pytest
 
 if TYPE_CHECKING:
-    from running import DynamicsNode
+    from running import DynamicsNode, NodeProcess
+
+COMPILE_AHEAD = Path(__file__).with_name('compile_ahead.py')
 
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Before several processes run the tests, compile what each of them would compile."""
+    is_worker = hasattr(session.config, 'workerinput')
+    if not is_worker and getattr(session.config.option, 'numprocesses', None):
+        programs = [subprocess.Popen([sys.executable, COMPILE_AHEAD, part], stdin=DEVNULL,
+                                     stdout=DEVNULL, cwd=COMPILE_AHEAD.parent)
+                    for part in ('step', 'plant', 'library')]
+        for program in programs:
+            if program.wait():
+                raise pytest.UsageError(f'{program.args}: exit code {program.returncode}')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests with ROS, and put their modules first: they wait most; then slow ones."""
+    for item in items:
+        if 'ros_environment' in getattr(item, 'fixturenames', ()):
+            item.add_marker('ros')
+    slow = {mark: {item.path for item in items if item.get_closest_marker(mark)}
+            for mark in ('ros', 'slow')}
+    items.sort(key=lambda item: (item.path not in slow['ros'], item.path not in slow['slow']))
 
 
 @pytest.fixture(scope='session')
@@ -49,29 +78,56 @@ def domain(ros_environment: None) -> Iterator[int]:
         yield number
 
 
-@pytest.fixture
-def start(ros_environment: None, tmp_path: Path) -> Iterator[Callable[..., DynamicsNode]]:
-    """Return a function that starts a node; it stops with the test."""
-    from running import DynamicsNode
-    started: list[DynamicsNode] = []
-
-    def begin(*overrides: str, **options: Any) -> DynamicsNode:
-        started.append(DynamicsNode(tmp_path / f'node_{len(started)}', *overrides, **options))
-        return started[-1]
-
-    yield begin
-    for each in started:
-        each.close()
-
-
 @pytest.fixture(scope='module')
-def node(ros_environment: None, tmp_path_factory: pytest.TempPathFactory,
-         ) -> Iterator[DynamicsNode]:
-    """Return a node with the parameters of config/platform.yaml, one for a whole module."""
-    from running import DynamicsNode
-    each = DynamicsNode(tmp_path_factory.mktemp('node'))
+def shared(ros_environment: None, tmp_path_factory: pytest.TempPathFactory,
+           ) -> Iterator[NodeProcess]:
+    """Return the process in which a module's tests have the node, one after the other."""
+    from running import NodeProcess
+    process = NodeProcess(tmp_path_factory.mktemp('shared'))
     try:
-        each.until_active()
-        yield each
+        yield process
     finally:
-        each.close()
+        process.close()
+
+
+@pytest.fixture
+def start(ros_environment: None, tmp_path: Path,
+          ) -> Iterator[Callable[..., DynamicsNode]]:
+    """Return a function that starts a node in a process of its own; it stops with the test."""
+    from running import DynamicsNode, NodeProcess
+    with ExitStack() as stack:
+        def begin(*overrides: str, **options: Any) -> DynamicsNode:
+            folder = tmp_path / f'node_{next(numbers)}'
+            process = stack.enter_context(closing(NodeProcess(folder, *overrides, **options)))
+            return stack.enter_context(closing(DynamicsNode(process)))
+
+        numbers = count(1)
+        yield begin
+
+
+@pytest.fixture
+def fresh(request: pytest.FixtureRequest, shared: NodeProcess,
+          ) -> Iterator[Callable[..., DynamicsNode]]:
+    """
+    Return a function that gives the module's node, as good as new, with these parameters.
+
+    It is active when ``until_active`` returns. Where a test fails its process is not used again.
+    """
+    from running import DynamicsNode
+    failed = request.session.testsfailed
+    with ExitStack() as stack:
+        def begin(*overrides: str) -> DynamicsNode:
+            stack.pop_all().close()  # of the same process there is one at a time
+            return stack.enter_context(closing(DynamicsNode(shared, *overrides)))
+
+        yield begin
+        if request.session.testsfailed > failed:
+            shared.kill()
+
+
+@pytest.fixture
+def node(fresh: Callable[..., DynamicsNode]) -> DynamicsNode:
+    """Return the module's node, as good as new and active."""
+    each = fresh()
+    each.until_active()
+    return each

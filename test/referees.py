@@ -22,6 +22,10 @@ Nothing here uses the package's equations; only Parameters and Motion, which car
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
+from functools import cache
+from io import StringIO
+import json
 import os
 from pathlib import Path
 import subprocess
@@ -237,28 +241,61 @@ def friction(p: Parameters, rates: Array) -> Array:
     return f
 
 
+# Runs code that comes in lines of JSON, and answers what it prints on stdout and on stderr.
+_UNCOMPILED = """
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+import json
+import sys
+import traceback
+import warnings
+warnings.simplefilter('always')
+for line in sys.stdin:
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        try:
+            exec(json.loads(line), {'__name__': 'uncompiled'})
+        except Exception:
+            traceback.print_exc()
+    print(json.dumps([out.getvalue(), err.getvalue()]), flush=True)
+"""
+
+
+@cache
+def _without_compiler() -> subprocess.Popen[str]:
+    """Return the process that runs code with no compiler: one for all, it ends with this one."""
+    return subprocess.Popen(
+        [sys.executable, '-c', _UNCOMPILED], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        text=True, cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
+
+
+def printed_uncompiled(code: str) -> str:
+    """Return what code in the folder of the tests prints with no compiler."""
+    process = _without_compiler()
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(json.dumps(code) + '\n')
+    process.stdin.flush()
+    printed, said = json.loads(process.stdout.readline())
+    assert said == ''
+    return str(printed)
+
+
 def uncompiled(code: str, given: Mapping[str, Array]) -> dict[str, Array]:
     """Return what becomes of arrays, the dict ``given``, where code runs with no compiler."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'arrays.npz'
         np.savez(path, **given)
-        whole = (f'import numpy as np\ngiven = dict(np.load({str(path)!r}))\n'
-                 f'{code}np.savez({str(path)!r}, **given)\n')
-        done = subprocess.run([sys.executable, '-c', whole], cwd=ROOT, capture_output=True,
-                              text=True, check=False,
-                              env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
-        assert done.returncode == 0, done.stderr
-        assert done.stderr == '', done.stderr
+        printed_uncompiled(f'import numpy as np\ngiven = dict(np.load({str(path)!r}))\n'
+                           f'{code}np.savez({str(path)!r}, **given)\n')
         with np.load(path) as arrays:
             return dict(arrays)
 
 
 def printed_compiled_and_not(code: str) -> set[str]:
     """Return what code in the folder of the tests prints with the compiler and without it."""
-    return {subprocess.run(
-        [sys.executable, '-c', code], check=True, stdout=subprocess.PIPE, text=True,
-        cwd=ROOT / 'test', env={**os.environ, 'NUMBA_DISABLE_JIT': off}).stdout
-        for off in ('0', '1')}
+    with redirect_stdout(StringIO()) as out:
+        exec(code, {'__name__': 'compiled'})
+    return {out.getvalue(), printed_uncompiled(code)}
 
 
 class PinocchioReferee:

@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 import fcntl
 from functools import partial
+import gc
 from itertools import count
 import math
 import os
@@ -37,32 +38,40 @@ import struct
 import subprocess
 import sys
 import tempfile
+from threading import Thread
 import time
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import (
     Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
     Vector3, Wrench, WrenchStamped)
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 import numpy as np
 from rcl_interfaces.msg import Log, SetParametersResult
-from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.task import Future
 from rclpy.time import Time
 from referees import ROOT
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
+import yaml
 
-from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 
@@ -88,7 +97,8 @@ OUTPUTS: dict[str, Any] = {
     'jacobian_determinant': Float64, 'singularity_warning': Bool}
 SERVICES: dict[str, Any] = {
     'change_state': ChangeState, 'get_state': GetState, 'describe_parameters': DescribeParameters,
-    'set_parameters': SetParameters, 'set_parameters_atomically': SetParametersAtomically}
+    'get_parameters': GetParameters, 'set_parameters': SetParameters,
+    'set_parameters_atomically': SetParametersAtomically}
 SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
 # What a program may say on stderr: lines of ROS's log. Fast DDS complains there of what other
@@ -99,6 +109,7 @@ LOG_LINE = re.compile(
     r"Failed to publish log message to rosout: publisher's context is invalid")
 
 _DOMAINS = range(1, 101)
+_ENDLESS = 10_000_000
 
 
 def executable(name: str) -> str:
@@ -155,6 +166,7 @@ class Program:
                  **environment: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._out, self._err = folder / 'stdout', folder / 'stderr'
+        self._forgotten = 0
         with self._out.open('wb') as out, self._err.open('wb') as err:
             self.process = subprocess.Popen(
                 [str(part) for part in command], stdin=subprocess.DEVNULL, stdout=out,
@@ -164,8 +176,13 @@ class Program:
 
     @property
     def stderr(self) -> str:
-        """What it has said on stderr so far."""
-        return self._err.read_text(errors='replace')
+        """What it has said on stderr so far, or since it was last forgotten."""
+        return self._err.read_bytes()[self._forgotten:].decode(errors='replace')
+
+    def forget(self) -> None:
+        """Forget what it has said on stderr so far, once it is checked."""
+        assert_only_log_lines(self.stderr)
+        self._forgotten = self._err.stat().st_size
 
     @property
     def stdout(self) -> str:
@@ -204,6 +221,76 @@ class Program:
                 'threads': int(status['Threads']), 'memory': int(status['VmRSS'].split()[0])}
 
 
+class Inside:
+    """
+    A node of the package in this process, spun by a thread, where a test asks for no process.
+
+    Parameters
+    ----------
+    kind : type
+        Which; it is made as its executable makes it, with ROS's own context.
+    arguments : sequence of str
+        The command line, without the executable.
+    domain : int
+        Its ROS domain.
+    said : callable
+        Returns what this process has said on stderr since it was last asked.
+    done : Future, optional
+        When it is done, its result is the exit code.
+
+    """
+
+    def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
+                 said: Callable[[], str], done: Future | None = None) -> None:
+        self._said, self._stderr, self._done = said, '', done
+        self._stack = ExitStack()
+        with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
+            rclpy.init(args=sys.argv, domain_id=domain)
+            try:
+                node = kind()
+            except BaseException:
+                rclpy.shutdown()
+                raise
+        self._executor = EventsExecutor()
+        self._executor.add_node(node)
+        self._thread = Thread(target=self._spin)
+        for end in (gc.unfreeze, node.destroy_node, self._executor.shutdown, self._thread.join,
+                    rclpy.try_shutdown):
+            self._stack.callback(end)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        # Bounded waits, and an end by ROS's own: as the executables have it.
+        with suppress(ExternalShutdownException):
+            while rclpy.ok():
+                self._executor.spin_until_future_complete(Future(), 10.0)
+
+    @property
+    def stderr(self) -> str:
+        """What it has said so far, and this process beside it."""
+        self._stderr += self._said()
+        return self._stderr
+
+    @property
+    def ended(self) -> bool:
+        """Whether an exception has ended its thread."""
+        return not self._thread.is_alive()
+
+    def wait(self) -> int:
+        """Return its exit code once it is done."""
+        assert self._done is not None
+        end = time.monotonic() + DEADLINE
+        while not self._done.done():
+            assert time.monotonic() < end, f'it does not end:\n{self.stderr}'
+            self._thread.join(0.01)
+        return int(self._done.result())
+
+    def kill(self) -> None:
+        """End it, and check what it has said."""
+        self._stack.close()
+        assert_only_log_lines(self.stderr)
+
+
 def refused(domain: int, folder: Path, *arguments: str | Path) -> str:
     """Return the one line that the node ends with, exit code 1, for these ROS arguments."""
     program = Program([executable('stewart_dynamics'), '--ros-args', *arguments], domain, folder)
@@ -226,7 +313,7 @@ class Peer:
         self.node = rclpy.create_node(name, context=self.context)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
-        self.watched: Program | None = None
+        self.watched: Program | Inside | None = None
 
     def listen(self, topic: str, kind: Any, qos: QoSProfile = QOS) -> list[bytes]:
         """Return a list that gets every message of a topic, as it came."""
@@ -247,8 +334,7 @@ class Peer:
         end = time.monotonic() + DEADLINE
         while not condition():
             if self.watched is not None and self.watched.ended:
-                raise AssertionError(f'{what}: the program has ended with exit code '
-                                     f'{self.watched.process.returncode}:\n{self.watched.stderr}')
+                raise AssertionError(f'{what}: the program has ended:\n{self.watched.stderr}')
             if time.monotonic() > end:
                 said = self.watched.stderr if self.watched else ''
                 raise AssertionError(f'{what}: not within {DEADLINE:g} s\n{said}')
@@ -332,9 +418,9 @@ def _twist(six: Sequence[float]) -> Twist:
     return Twist(linear=_vector(six[:3]), angular=_vector(six[3:]))
 
 
-class DynamicsNode:
+class NodeProcess:
     """
-    The node in a process of its own, and a peer that feeds it and keeps what it answers.
+    The node's process, in a domain that no other has, and what it is started with.
 
     Parameters
     ----------
@@ -355,40 +441,116 @@ class DynamicsNode:
                  command: Sequence[str | Path] | None = None, **environment: str) -> None:
         self._stack = ExitStack()
         self.domain = self._stack.enter_context(own_domain())
+        self.file = file
+        arguments = [part for override in overrides for part in ('-p', override)]
+        self._begin = partial(
+            Program, [*(command or [executable('stewart_dynamics')]), '--ros-args',
+                      '--params-file', file, *arguments], self.domain,
+            # Said of who asks before the node knows him: see DynamicsNode.until_known.
+            **{'PYTHONWARNINGS': 'ignore:failed to send response:RuntimeWarning', **environment})
+        self._folders = (folder / str(n) for n in count(1))
+        self._program: Program | None = None
+
+    @property
+    def program(self) -> Program:
+        """The program, which has been started."""
+        assert self._program is not None
+        return self._program
+
+    @property
+    def runs(self) -> bool:
+        """Whether it has been started and has not ended."""
+        return self._program is not None and not self.program.ended
+
+    def start(self) -> Program:
+        """Start it, for the first time or anew."""
+        self._program = self._begin(folder=next(self._folders))
+        self._stack.callback(self._program.kill)
+        return self._program
+
+    def stop(self, number: int = signal.SIGINT) -> None:
+        """Stop it with a signal, and check how it ends."""
+        code = self.program.stop(number)
+        assert code == 0, self.program.stderr
+        assert_only_log_lines(self.program.stderr)
+        # NUMBA_DEBUG_CACHE has numba say there what it loads and saves.
+        assert not [line for line in self.program.stdout.splitlines()
+                    if not line.startswith('[cache] ')]
+
+    def kill(self) -> None:
+        """End it, if it runs, without a chance to end by itself."""
+        if self._program is not None:
+            self._program.kill()
+
+    def close(self) -> None:
+        """Stop it if it runs, and give its domain back."""
+        with self._stack:
+            if self.runs:
+                self.stop()
+
+
+class DynamicsNode:
+    """
+    The node in a process of its own, and a peer that feeds it and keeps what it answers.
+
+    Where the process runs already, the node in it is brought to the state ``unconfigured``, with
+    the parameters of its file and these; ``until_active`` configures and activates it then. The
+    peer is new as well, so that nothing is left of what was before.
+
+    Parameters
+    ----------
+    process : NodeProcess
+        It is started if it does not run.
+    overrides : str
+        Parameters that are set once it runs, ``name:=value``.
+
+    """
+
+    def __init__(self, process: NodeProcess, *overrides: str) -> None:
+        self._process = process
+        self._stack = ExitStack()
+        self.domain = process.domain
         self.peer = Peer(self.domain)
         self._stack.callback(self.peer.close)
         self._stamp = 1_700_000_000_000_000_000
         self.expected: Counter[str] = Counter()
         self.asked: Counter[int] = Counter()  # setpoints that were sent, by their stamp
-        self.platform = StewartPlatform.from_yaml(file)
+        self.fed: list[range] = []  # stamps that others may have sent, each once
+        self.platform = StewartPlatform.from_yaml(process.file)
         self._statuses: dict[str, DiagnosticStatus] = {}
         self._reported: list[DiagnosticStatus] = []
-        self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
-                        for topic, kind in INPUTS.items()}
-        self.raw = {topic: self.peer.listen(
-            f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
-            for topic, kind in OUTPUTS.items()}
         self._decoded: dict[str, list[Any]] = defaultdict(list)
         self._clients = {name: self.peer.node.create_client(kind, f'{NODE}/{name}')
                          for name, kind in SERVICES.items()}
-        # The last that are made, so the last that the node discovers: when they hear it, it
-        # knows the others as well. A service whose answer finds no reader gives it up.
         self._said: list[str] = []
-        self.peer.node.create_subscription(
-            Log, '/rosout', lambda message: self._said.append(message.msg), LATCHED)
-        self.peer.node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
-        arguments = [part for override in overrides for part in ('-p', override)]
-        self._begin = partial(
-            Program, [*(command or [executable('stewart_dynamics')]), '--ros-args',
-                      '--params-file', file, *arguments], self.domain, **environment)
-        self._folders = (folder / f'again_{n}' for n in count(1))
-        self._run(folder)
+        self._known = False
+        self._unconfigured = process.runs or bool(overrides)
+        try:
+            if process.runs:
+                # Before the others listen: what is latched there is of another test.
+                self.peer.watched = self.program
+                self._clean_up()
+            self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
+                            for topic, kind in INPUTS.items()}
+            self.raw = {topic: self.peer.listen(
+                f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
+                for topic, kind in OUTPUTS.items()}
+            self.peer.node.create_subscription(
+                Log, '/rosout', lambda message: self._said.append(message.msg), LATCHED)
+            self.peer.node.create_subscription(
+                DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
+            if not process.runs:
+                self.peer.watched = process.start()
+            if self._unconfigured:
+                self._renew(overrides)
+        except BaseException:
+            self._stack.close()  # or the next one hears this one as well
+            raise
 
-    def _run(self, folder: Path) -> None:
-        self.program = self._begin(folder=folder)
-        self._stack.callback(self.program.kill)
-        self.peer.watched = self.program
+    @property
+    def program(self) -> Program:
+        """The process in which the node runs."""
+        return self._process.program
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -401,27 +563,55 @@ class DynamicsNode:
         """Take messages until a condition holds."""
         self.peer.until(condition, what)
 
-    def until_active(self) -> None:
+    def until_active(self, writers: int = 1) -> None:
         """
         Wait until the node answers: it hears us and we hear it.
 
-        Its first diagnostics tell that it is active, those of a second later how many writers
-        it has found on each topic.
+        Its diagnostics tell that it is active, and how many writers it has found on each topic.
         """
+        if self._unconfigured:
+            self._unconfigured = False
+            for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+                assert self.change(transition), self.program.stderr
+        self.until_known()
         self._statuses.clear()
-        writers = re.compile('setpoint/.*: writers')
+        key_of_writers = re.compile('setpoint/.*: writers')
 
         def heard() -> bool:
             values = self.values('setpoints')
-            found = [number for key, number in values.items() if writers.fullmatch(key)]
-            return bool(found) and set(found) == {'1'} and all(
+            found = [number for key, number in values.items() if key_of_writers.fullmatch(key)]
+            return bool(found) and set(found) == {str(writers)} and all(
                 self.writers[topic].get_subscription_count() for topic in self.topics)
 
         self.until(heard, 'the node is active and hears us')
 
+    def until_known(self) -> None:
+        """
+        Wait until the node knows all that the peer has made so far.
+
+        It discovers readers and writers in the order in which they are made, so it knows the
+        others when it has answered the one that is made last, a client. A service whose answer
+        finds no reader gives it up after 0.1 s: it is asked again.
+        """
+        client = self.peer.node.create_client(GetState, f'{NODE}/get_state')
+        asked: list[Any] = []
+        ask_at = 0.0
+
+        def answered() -> bool:
+            nonlocal ask_at
+            if client.service_is_ready() and time.monotonic() > ask_at:
+                asked.append(client.call_async(GetState.Request()))
+                ask_at = time.monotonic() + 1.0
+            return any(future.done() for future in asked)
+
+        self.until(answered, 'the node knows us')
+        self.peer.node.destroy_client(client)
+        self._known = True
+
     def until_said(self, text: str) -> None:
-        """Wait until the node has logged a text: it is there and knows us."""
-        self.until(lambda: any(text in said for said in self._said), f'the node says {text!r}')
+        """Wait until the node has logged a text, on stderr and on /rosout."""
+        self.until(lambda: any(text in said for said in self._said)
+                   and text in self.program.stderr, f'the node says {text!r}')
 
     @property
     def topics(self) -> list[str]:
@@ -434,6 +624,12 @@ class DynamicsNode:
         decoded += [deserialize_message(raw, OUTPUTS[topic])
                     for raw in self.raw[topic][len(decoded):]]
         return decoded
+
+    @property
+    def warning(self) -> bool | None:
+        """The last warning of a singularity, None before the first."""
+        warnings = self.received('singularity_warning')
+        return bool(warnings[-1].data) if warnings else None
 
     def status(self, name: str) -> DiagnosticStatus:
         """Return the last diagnostics of a name, empty ones where there are none."""
@@ -448,6 +644,11 @@ class DynamicsNode:
         self.until(lambda: self.status(name).level == level and text in self.status(name).message,
                    f'diagnostics of {name} have level {level!r} and {text!r}')
         return str(self.status(name).message)
+
+    def until_reported_anew(self) -> None:
+        """Forget the diagnostics so far, and wait for the next."""
+        self._statuses.clear()
+        self.until(lambda: self._statuses, 'the node reports')
 
     def until_reported(self, name: str, level: bytes, text: str) -> None:
         """Wait until the diagnostics of a name have had a level and a text in it, ever."""
@@ -485,8 +686,10 @@ class DynamicsNode:
         def answered() -> bool:
             found[:] = [state for state in self.received('leg_states')
                         if nanoseconds(state.header.stamp) == stamp]
+            states = self.received('leg_states')
             return bool(found) and len(self.raw['leg_lengths']) == len(
-                self.raw['jacobian_determinant']) == len(self.raw['leg_states'])
+                self.raw['jacobian_determinant']) == len(states) and len(
+                    self.raw['leg_forces']) == sum(len(state.effort) > 0 for state in states)
 
         self.until(answered, f'the setpoint with stamp {stamp} is answered')
         assert len(found) == 1
@@ -553,6 +756,8 @@ class DynamicsNode:
 
     def call(self, name: str, request: Any) -> Any:
         """Return the answer of one of the node's services."""
+        if not self._known:
+            self.until_known()
         client = self._clients[name]
         self.until(client.service_is_ready, f'{name} is there')
         future = client.call_async(request)
@@ -570,29 +775,67 @@ class DynamicsNode:
         return self.call('set_parameters_atomically', SetParametersAtomically.Request(
             parameters=[change.to_parameter_msg() for change in changes])).result
 
+    # -- lifecycle -------------------------------------------------------------------------
+
+    def change(self, transition: int) -> bool:
+        """Ask for a transition of the lifecycle, and return whether it is done."""
+        return bool(self.call('change_state', ChangeState.Request(
+            transition=Transition(id=transition))).success)
+
+    @property
+    def state(self) -> str:
+        """The state of the lifecycle."""
+        return str(self.call('get_state', GetState.Request()).current_state.label)
+
+    def _clean_up(self) -> None:
+        """Bring the node that runs to the state ``unconfigured``."""
+        state = self.state
+        if state == 'active':
+            assert self.change(Transition.TRANSITION_DEACTIVATE)
+        if state != 'unconfigured':
+            assert self.change(Transition.TRANSITION_CLEANUP)
+
+    def _renew(self, overrides: Sequence[str]) -> None:
+        """Bring the node that runs to the state ``unconfigured``, with these parameters."""
+        self._clean_up()
+        wanted = {name: parameter.default for name, parameter in Parameters.table.items()}
+        wanted.update(Parameters.from_yaml(self._process.file).given)
+        wanted.update((name, yaml.safe_load(text)) for name, _, text in (
+            override.partition(':=') for override in overrides))
+        values = self.call('get_parameters', GetParameters.Request(names=list(wanted))).values
+        changes = {
+            name: _listed(value)
+            for (name, value), message in zip(wanted.items(), values, strict=True)
+            if _listed(value) != _listed(parameter_value_to_python(message))}
+        if None in changes.values():  # what is set cannot be unset
+            self._process.stop()
+            self.peer.watched = self._process.start()
+            self._known = False
+            self._renew(overrides)
+            return
+        if changes:
+            result = self.set_atomically([
+                RosParameter(name, value=value) for name, value in changes.items()])
+            assert result.successful, result.reason
+        self.program.forget()
+        self._said.clear()
+
     # -- the end ---------------------------------------------------------------------------
 
     def stop(self, number: int = signal.SIGINT) -> None:
         """Stop the node with a signal and check how it ends, and all that it has said."""
-        code = self.program.stop(number)
-        assert code == 0, self.program.stderr
-        assert_only_log_lines(self.program.stderr)
-        assert self.program.stdout == ''
+        self._process.stop(number)
         self.check_answers()
 
-    def start_again(self) -> None:
-        """Kill the node, as nothing in it can notice, and start it anew with what it had."""
-        self.program.kill()
-        # What was on its way comes before anything of the new one.
-        came = -1
-        while came != (came := sum(map(len, self.raw.values()))):
-            self.peer.spin(0.2)
-        assert_only_log_lines(self.program.stderr)
-        self.check_answers()
-        for messages in (*self.raw.values(), *self._decoded.values()):
-            messages.clear()
-        self.expected.clear()
-        self._run(next(self._folders))
+    def start_again(self) -> DynamicsNode:
+        """
+        Kill the node, as nothing in it can notice, and start it anew with what it had.
+
+        It has a peer of its own: what is still on its way from the one before does not come there.
+        """
+        self._process.kill()
+        self.close()
+        return DynamicsNode(self._process)
 
     def check_answers(self) -> None:
         """
@@ -603,7 +846,8 @@ class DynamicsNode:
         self.check_finite()
         states = self.received('leg_states')
         answered = Counter(nanoseconds(state.header.stamp) for state in states)
-        repeated = answered - self.asked
+        repeated = answered - self.asked - Counter(
+            stamp for stamp in answered if any(stamp in stamps for stamps in self.fed))
         assert repeated.total() <= self.asked[0], repeated
         # Forces carry no stamp: each is that of an answer, in their order.
         efforts = [bits(state.effort) for state in states if len(state.effort)]
@@ -620,12 +864,10 @@ class DynamicsNode:
                 assert np.all(np.isfinite(numbers)), (topic, message)
 
     def close(self) -> None:
-        """Leave ROS, and stop the node if it still runs."""
-        try:
-            if not self.program.ended:
-                self.stop()
-        finally:
-            self._stack.close()
+        """Check what the node has said and answered, and leave ROS; the process may run on."""
+        with self._stack:
+            assert_only_log_lines(self.program.stderr)
+            self.check_answers()
 
 
 class Feeder(Program):
@@ -640,16 +882,16 @@ class Feeder(Program):
         Gets what it writes.
     rate : int
         Setpoints in a second.
-    many : int
-        How many it sends; it ends when the node has them all.
+    many : int, optional
+        How many it sends; it ends when the node has them all, or else when it is told to.
     environment
         What its environment has beside.
 
     """
 
-    def __init__(self, node: DynamicsNode, folder: Path, rate: int, many: int,
+    def __init__(self, node: DynamicsNode, folder: Path, rate: int, many: int = _ENDLESS,
                  **environment: str) -> None:
-        self._node = node
+        self.node = node
         self._before, self._known = self._writers(), self._endpoints()
         first = node.stamp()
         self.stamps = range(first, first + many * STEP, STEP)
@@ -662,10 +904,10 @@ class Feeder(Program):
     def begin(self, heard: bool = True) -> None:
         """Let it begin, and expect answers; its first setpoints may be lost if it is not heard."""
         if heard:
-            self._node.until(lambda: self._writers() > self._before, 'the node hears the feeder')
+            self.node.until(lambda: self._writers() > self._before, 'the node hears the feeder')
         else:
-            self._node.until(lambda: self._endpoints() - self._known, 'the feeder is there')
-        self._node.asked.update(self.stamps)
+            self.node.until(lambda: self._endpoints() - self._known, 'the feeder is there')
+        self.node.fed.append(self.stamps)
         self.process.send_signal(signal.SIGUSR1)
 
     def end(self) -> None:
@@ -674,17 +916,18 @@ class Feeder(Program):
             self.process.terminate()
         assert self.wait() == 0, self.stderr
         assert_only_log_lines(self.stderr)
-        self._node.until(lambda: self._writers() <= self._before, 'the feeder is gone')
+        self.node.until_reported_anew()
+        self.node.until(lambda: self._writers() <= self._before, 'the feeder is gone')
 
     def _endpoints(self) -> set[bytes]:
         """Return what identifies the writers, those of killed processes as well."""
-        topic = f'{NODE}/{self._node.topics[-1]}'  # the last that it makes
+        topic = f'{NODE}/{self.node.topics[-1]}'  # the last that it makes
         return {bytes(info.endpoint_gid) for info in
-                self._node.peer.node.get_publishers_info_by_topic(topic)}
+                self.node.peer.node.get_publishers_info_by_topic(topic)}
 
     def _writers(self) -> int:
-        values = self._node.values('setpoints')
-        return min(int(values[f'{topic}: writers']) for topic in self._node.topics)
+        values = self.node.values('setpoints')
+        return min(int(values[f'{topic}: writers']) for topic in self.node.topics)
 
 
 class Planner:
@@ -697,6 +940,7 @@ class Planner:
         node.until(lambda: self._writer.get_subscription_count() == 1, 'the node hears it')
         node.until(lambda: node.peer.node.count_publishers(f'{NODE}/leg_trajectory') == 1,
                    'it hears the node')
+        node.until_known()
 
     def send(self, samples: Sequence[Sample], step: int = 10 * STEP, frame: str = 'base',
              stamp: int = STEP) -> None:
@@ -739,11 +983,12 @@ class Planner:
         assert len(self.raw) == number
         return deserialize_message(self.raw[-1], JointTrajectory)
 
-    def until_refused(self, text: str, number: int) -> None:
-        """Wait until the last trajectory is refused for a reason, so many in all."""
-        self._node.until_status('trajectory', b'\2', text)
-        self._node.until(lambda: self._node.values('trajectory')['refused'] == str(number),
-                         f'{number} trajectories are refused')
+    def until_rejected(self, text: str, number: int) -> None:
+        """Wait until the last trajectory is rejected for a reason, so many in all."""
+        self._node.until_status('planned trajectory', b'\2', text)
+        self._node.until(
+            lambda: self._node.values('planned trajectory')['rejected'] == str(number),
+            f'{number} trajectories are rejected')
 
 
 def bits(numbers: Any) -> bytes:
@@ -754,6 +999,13 @@ def bits(numbers: Any) -> bytes:
 def raw(message: Any) -> bytes:
     """Return a message's bytes as they are sent."""
     return bytes(serialize_message(message))
+
+
+def _listed(value: Any) -> Any:
+    """Return a parameter's value, an array as a list; None for no entries."""
+    if isinstance(value, str) or not hasattr(value, '__len__'):
+        return value
+    return list(value) or None
 
 
 def _stamp_of(message: Any) -> int:

@@ -28,7 +28,7 @@ from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Progra
 from trajectory_msgs.msg import JointTrajectory
 
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 EXAMPLES = ROOT / 'examples'
 
@@ -62,7 +62,7 @@ def test_a_planned_motion_is_answered_or_its_refusal_is_said(
     def planned(*arguments: object) -> Program:
         return run('plan_motion.py', node.domain, '--timeout', '60.0', *arguments)
 
-    settings = TrajectoryParameters({
+    settings = ReferenceMotionParameters({
         'motion.type': 'quintic', 'motion.initial': HOME, 'motion.final': THERE,
         'motion.duration': 2.0, 'rate': 100.0})
     expected = node.platform.inverse_dynamics(motion_at(settings, sample_times(settings) * 1e-9))
@@ -76,7 +76,7 @@ def test_a_planned_motion_is_answered_or_its_refusal_is_said(
                             program.stderr)
         program = planned(*arguments)
         assert program.wait() == 0, program.stderr
-        assert program.stdout == ('answered: 201 points over 2 s, largest effort '
+        assert program.stdout == ('accepted: 201 points over 2 s, largest effort '
                                   f'{np.abs(expected.forces).max():.0f} N\n')
         node.until(lambda n=n: len(answers) == n + 1, 'the answer is heard here, too')
     program = planned('--duration', '-1.0')

@@ -23,7 +23,6 @@ from typing import Any
 
 from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -53,7 +52,6 @@ class Felt:
 
     def __init__(self, node: DynamicsNode) -> None:
         self.node = node
-        # Made before the node is there: when it knows the others it knows these.
         self.connect()
         self.raw = node.peer.listen(f'{NODE}/external_wrench', WrenchStamped)
         self.stamp = BEGIN
@@ -108,9 +106,9 @@ class Felt:
 
 
 @pytest.fixture
-def begin(start: Start) -> Callable[..., Felt]:
-    def of(*overrides: str, **options: Any) -> Felt:
-        felt = Felt(start(*overrides, **options))
+def begin(fresh: Start) -> Callable[..., Felt]:
+    def of(*overrides: str) -> Felt:
+        felt = Felt(fresh(*overrides))
         felt.until_heard()
         return felt
 
@@ -293,9 +291,7 @@ def test_measured_legs_do_not_outlive_a_deactivation(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
-        request = ChangeState.Request()
-        request.transition.id = transition
-        assert felt.node.call('change_state', request).success
+        assert felt.node.change(transition)
     many = len(felt.raw)
     first = felt.rest()
     felt.until_answered(felt.rest())

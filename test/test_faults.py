@@ -18,16 +18,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 import math
 import os
 from pathlib import Path
+import re
 import signal
+import subprocess
 import sys
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
 import numpy as np
 import pytest
 from rcl_interfaces.srv import DescribeParameters, SetParameters
@@ -36,11 +38,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
-    bits, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS, own_domain,
+    bits, DEADLINE, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
     Peer, Planner, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
+import yaml
 
-import stewart_dynamics
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import ParameterError, Parameters, StewartPlatform
 
 Start = Callable[..., DynamicsNode]
 
@@ -54,22 +56,28 @@ SPECIAL = (math.nan, math.inf, -math.inf)
 
 
 # In every case the node is at work when the fault has ended, and all that it has published was
-# asked for: these two fixtures check it behind every test, `close` how the node ends.
+# asked for: these fixtures check it behind every test, `close` how the node ends.
 
 @pytest.fixture
 def at_work(node: DynamicsNode) -> Iterator[DynamicsNode]:
-    """Return the module's node."""
+    """Return the module's node, as good as new and active."""
     yield node
-    try:
-        node.at_work()
-    except AssertionError:
-        node.expected = node.counted()  # the next test begins anew
-        raise
+    node.at_work()
+
+
+@pytest.fixture
+def renew(fresh: Start) -> Iterator[Start]:
+    """Return a function that gives the module's node with other parameters, active."""
+    yield from _started(fresh)
 
 
 @pytest.fixture
 def begin(start: Start) -> Iterator[Start]:
-    """Return a function that starts a node and waits until it is active."""
+    """Return a function that starts an active node in a process of its own."""
+    yield from _started(start)
+
+
+def _started(start: Start) -> Iterator[Start]:
     begun: list[DynamicsNode] = []
 
     def started(*overrides: str, **options: Any) -> DynamicsNode:
@@ -113,8 +121,8 @@ def test_nan_and_infinity_in_each_field_are_refused(at_work: DynamicsNode) -> No
     assert log_lines(node.program.stderr, 'WARN')
 
 
-def test_nan_and_infinity_in_each_field_of_one_message_are_refused(begin: Start) -> None:
-    node = begin('setpoint.source:=combined')
+def test_nan_and_infinity_in_each_field_of_one_message_are_refused(renew: Start) -> None:
+    node = renew('setpoint.source:=combined')
     for _, sample in SPOILT:
         node.send(sample)
         node.refuses('setpoint/combined', 'not finite')
@@ -470,12 +478,12 @@ def _brief(folder: Path) -> dict[str, str]:
 def test_a_publisher_that_is_killed_and_started_again_is_heard(
         at_work: DynamicsNode, tmp_path: Path) -> None:
     node = at_work
-    killed = Feeder(node, tmp_path / 'killed', 100, 10_000, **_brief(tmp_path))
+    killed = Feeder(node, tmp_path / 'killed', 100, **_brief(tmp_path))
     killed.begin()
     _until_answered(node, killed)
     killed.kill()
     # Whether the node knows already that the first is gone or not.
-    again = Feeder(node, tmp_path / 'again', 100, 10_000)
+    again = Feeder(node, tmp_path / 'again', 100)
     again.begin(heard=False)
     _until_answered(node, again)
     node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
@@ -512,8 +520,8 @@ def _expect_what_was_cut_off(node: DynamicsNode) -> None:
 
 
 def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_forgotten(
-        begin: Start, tmp_path: Path) -> None:
-    node = begin('setpoint.exclusive:=true')
+        renew: Start, tmp_path: Path) -> None:
+    node = renew('setpoint.exclusive:=true')
     node.answer(MOVING)
     second = Feeder(node, tmp_path, 100, 1, **_brief(tmp_path))
     node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
@@ -527,36 +535,38 @@ def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_forgotte
 
 # The node itself
 
-def test_a_killed_node_is_soon_back_at_work(begin: Start, tmp_path: Path) -> None:
-    def machine_code() -> dict[str, int]:
-        folder = Path(stewart_dynamics.__file__).parent
-        return {str(path): path.stat().st_mtime_ns for path in folder.rglob('*.nbi')}
-
-    node = begin(NUMBA_CACHE_DIR='')  # where it is kept by default
-    feeder = Feeder(node, tmp_path, 100, 10_000)
+def test_a_killed_node_is_soon_back_at_work(start: Start, tmp_path: Path) -> None:
+    killed = start(NUMBA_DEBUG_CACHE='1')
+    killed.until_active()
+    feeder = Feeder(killed, tmp_path, 100)
     feeder.begin()
-    _until_answered(node, feeder)
-    kept = machine_code()
-    assert kept
-    node.start_again()
-    node.until(lambda: node.raw['leg_states'], 'it answers what flows on')
-    assert machine_code() == kept
-    assert 'dynamics ready after' in node.program.stderr
-    feeder.end()
-    _expect_what_was_cut_off(node)
+    _until_answered(killed, feeder)
+    with closing(killed.start_again()) as node:
+        node.stamp(feeder.stamps.stop - node.stamp(0))
+        node.fed.append(feeder.stamps)
+        feeder.node = node
+        node.until_active(writers=2)
+        node.until(lambda: node.raw['leg_states'], 'it answers what flows on')
+        assert 'dynamics ready after' in node.program.stderr
+        # It has compiled nothing.
+        assert '[cache] data loaded from ' in node.program.stdout
+        assert ' saved to ' not in node.program.stdout
+        feeder.end()
+        _expect_what_was_cut_off(node)
+        node.at_work()
 
 
 def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
         begin: Start, tmp_path: Path) -> None:
     node = begin()
-    feeder = Feeder(node, tmp_path, 200, 100_000)
+    feeder = Feeder(node, tmp_path, 200)
     feeder.begin()
 
     def cycle() -> None:
         for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
                            Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-            assert _change(node, transition)
-        assert _state(node) == 'active'
+            assert node.change(transition)
+        assert node.state == 'active'
 
     def held() -> tuple[dict[str, int], dict[str, int]]:
         before = len(node.raw['leg_states'])
@@ -581,28 +591,19 @@ def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
     _expect_what_was_cut_off(node)
 
 
-def _change(node: DynamicsNode, transition: int) -> bool:
-    return bool(node.call('change_state', ChangeState.Request(
-        transition=Transition(id=transition))).success)
-
-
-def _state(node: DynamicsNode) -> str:
-    return str(node.call('get_state', GetState.Request()).current_state.label)
-
-
 @pytest.mark.parametrize('configured', [False, True], ids=['unconfigured', 'inactive'])
 def test_it_is_shut_down_from_where_it_has_not_begun(start: Start, configured: bool) -> None:
     node = start('autostart:=false')
     node.until_said('unconfigured: autostart is false')
     shutdown = Transition.TRANSITION_UNCONFIGURED_SHUTDOWN
     if configured:
-        assert _change(node, Transition.TRANSITION_CONFIGURE)
+        assert node.change(Transition.TRANSITION_CONFIGURE)
         shutdown = Transition.TRANSITION_INACTIVE_SHUTDOWN
-    assert _change(node, shutdown)
-    assert _state(node) == 'finalized'
+    assert node.change(shutdown)
+    assert node.state == 'finalized'
     # There is no way back, and it says so.
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE, shutdown):
-        assert not _change(node, transition)
+        assert not node.change(transition)
     assert 'transition refused: ' in node.program.stderr
     node.until(lambda: not any(writer.get_subscription_count()
                                for writer in node.writers.values()), 'it has no topics')
@@ -621,9 +622,9 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> 
         assert node.set_parameters(platform__mass=masses[-1]).successful
         assert len(node.call('describe_parameters', DescribeParameters.Request(
             names=names)).descriptors) == len(names)
-        assert _state(node) == 'active'
+        assert node.state == 'active'
         assert not node.set_parameters(platform__mass=0.0).successful
-    assert not _change(node, Transition.TRANSITION_ACTIVATE)
+    assert not node.change(Transition.TRANSITION_ACTIVATE)
     assert 'transition refused: ' in node.program.stderr
     assert node.set_parameters(platform__mass=mass).successful
     feeder.end()
@@ -686,8 +687,7 @@ def _turned(degrees: float, rate: float = 0.0) -> Sample:
 def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> None:
     node = at_work
     node.answer()
-    node.until(lambda: node.received('singularity_warning')
-               and not node.received('singularity_warning')[-1].data, 'no warning is on')
+    node.until(lambda: node.warning is False, 'no warning is on')
     crossings = int(node.values('singularity').get('crossings', '0'))
     # 4 degrees in 10 ms.
     there = [_turned(degrees, math.radians(400.0)) for degrees in (84.0, 88.0, 92.0, 96.0)]
@@ -696,7 +696,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
     for sample in there:
         state = node.answer(sample)
         assert np.abs(state.effort).max() <= 6000.0
-        node.until(lambda: node.received('singularity_warning')[-1].data, 'it warns')
+        node.until(lambda: node.warning, 'it warns')
     # One sample crossed, the next ones are only near: it is said for a second nevertheless.
     node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
     # Back with one leap, from where nothing is near into where nothing is.
@@ -704,7 +704,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
         node.answer(_turned(degrees))
     node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
     node.answer(_turned(50.0))
-    node.until(lambda: not node.received('singularity_warning')[-1].data, 'the warning ends')
+    node.until(lambda: node.warning is False, 'the warning ends')
     node.until_status('singularity', OK, 'clear')
     assert node.values('singularity')['crossings'] == str(crossings + 2)
 
@@ -742,9 +742,9 @@ def test_a_machine_that_is_singular_at_home_starts_and_gives_no_forces(
         state = node.state_of(node.send(sample))
         assert len(state.effort) == 0
         assert bits(state.position) == bits(node.platform.inverse_kinematics(
-            sample.position, sample.motion().rotation))
+            sample.motion()))
     assert node.raw['leg_forces'] == []
-    assert node.received('singularity_warning')[-1].data
+    node.until(lambda: node.warning, 'it warns')
     node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
     node.check_answers()
     assert any('singular' in line for line in log_lines(node.program.stderr, 'WARN'))
@@ -769,7 +769,7 @@ def test_both_services_refuse_a_bad_parameter(
     assert reason in answer.reason
 
 
-@pytest.mark.parametrize('name, value, reason', [
+NO_MACHINE = [
     ('legs.cylinder.mass', '-12.0', '-12.0 kg: must be at least 0'),
     ('legs.piston.mass', '[6.0, 6.0, 6.0, -6.0, 6.0, 6.0]', ''),
     ('platform.mass', 'heavy', ''),
@@ -778,21 +778,34 @@ def test_both_services_refuse_a_bad_parameter(
     ('limits.length_max', '-1.6', '-1.6 m: must be more than 0'),
     ('platform.inertia', '[13.0, 20.0, 0.0, 14.0, 0.0, 22.0]', 'must be positive definite'),
     ('platform.inertia', '[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]', 'must be positive definite'),
-])
-def test_legs_and_inertias_that_no_machine_has_are_refused(
-        domain: int, tmp_path: Path, name: str, value: str, reason: str) -> None:
-    line = refused(domain, tmp_path, '--params-file', PLATFORM, '-p', f'{name}:={value}')
-    assert line.startswith('stewart_dynamics: ')
-    assert f'{name}: ' in line
-    assert reason in line
+]
 
 
+def test_legs_and_inertias_that_no_machine_has_are_refused(domain: int, tmp_path: Path) -> None:
+    given = Parameters.from_yaml(PLATFORM).given
+    for name, value, reason in NO_MACHINE:
+        with pytest.raises(ParameterError, match=f'^command line: {name}: .*{re.escape(reason)}'):
+            Parameters({**given, name: yaml.safe_load(value)}, 'command line')
+    for n in (0, -1):
+        name, value, reason = NO_MACHINE[n]
+        line = refused(domain, tmp_path / str(n), '--params-file', PLATFORM, '-p',
+                       f'{name}:={value}')
+        assert line.startswith('stewart_dynamics: ')
+        assert f'{name}: ' in line
+        assert reason in line
+
+
+# Says why each file is refused, and the most memory [kB] after the first and after all.
 MEASURED = """\
 import sys
-from stewart_dynamics.nodes.dynamics_node import main
-code = main()
-print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))
-sys.exit(code)
+from stewart_dynamics import ParameterError, Parameters
+for path in sys.argv[1:]:
+    try:
+        Parameters.check_file(path)
+    except ParameterError as exc:
+        print(exc)
+    if path in (sys.argv[1], sys.argv[-1]):
+        print(*(line.split()[1] for line in open('/proc/self/status') if 'VmHWM' in line))
 """
 
 
@@ -815,110 +828,104 @@ HOSTILE = {
 }
 
 
-@pytest.fixture(scope='module')
-def usual(ros_environment: None, tmp_path_factory: pytest.TempPathFactory) -> int:
-    """Return the memory that it takes to refuse a file of one line [kB]."""
-    folder = tmp_path_factory.mktemp('usual')
-    file = folder / 'machine.yaml'
-    file.write_text('/**:\n  ros__parameters:\n    mass: 1.0\n', encoding='utf-8')
-    with own_domain() as domain:
-        return _memory_to_refuse(domain, folder / 'node', file, 'mass: unknown parameter')
-
-
-@pytest.mark.parametrize('case', HOSTILE)
 def test_a_hostile_parameter_file_is_refused_with_little_time_and_memory(
-        domain: int, tmp_path: Path, usual: int, case: str) -> None:
-    content, reason = HOSTILE[case]
-    file = tmp_path / 'machine.yaml'
-    file.write_text(content, encoding='utf-8')
-    assert _memory_to_refuse(domain, tmp_path / 'node', file, reason) < usual + 50_000
+        domain: int, tmp_path: Path) -> None:
+    files = []
+    for n, (content, _) in enumerate(HOSTILE.values()):
+        files.append(tmp_path / f'{n}.yaml')
+        files[-1].write_text(content, encoding='utf-8')
+    _refused_in_little_memory(tmp_path, dict(zip(files, (
+        reason for _, reason in HOSTILE.values()), strict=True)))
+    # The node checks the file before ROS reads it.
+    line = refused(domain, tmp_path / 'node', '--params-file', files[0])
+    assert line.startswith(f'stewart_dynamics: {files[0]}: ')
+    assert next(iter(HOSTILE.values()))[1] in line
     assert not list(tmp_path.rglob('called'))
 
 
-def test_a_parameter_file_of_100_mb_or_without_an_end_is_refused(
-        domain: int, tmp_path: Path, usual: int) -> None:
+def test_a_parameter_file_of_100_mb_or_without_an_end_is_refused(tmp_path: Path) -> None:
     large, pipe = tmp_path / 'large.yaml', tmp_path / 'pipe'
     large.touch()
     os.truncate(large, 100_000_000)
     os.mkfifo(pipe)
-    for n, (file, reason) in enumerate((
-            (large, 'larger than '), (pipe, 'not a regular file'),
-            (Path('/dev/zero'), 'not a regular file'))):
-        assert _memory_to_refuse(domain, tmp_path / f'{n}', file, reason) < usual + 50_000
+    _refused_in_little_memory(tmp_path, {
+        large: 'larger than ', pipe: 'not a regular file',
+        Path('/dev/zero'): 'not a regular file'})
 
 
-def _memory_to_refuse(domain: int, folder: Path, file: Path, reason: str) -> int:
-    """Return the most memory that the node had, until it refused a file for a reason [kB]."""
-    program = Program([sys.executable, '-c', MEASURED, '--ros-args', '--params-file', file],
-                      domain, folder)
-    try:
-        assert program.wait() == 1, program.stderr
-    finally:
-        program.kill()
-    line, = program.stderr.splitlines()
-    assert line.startswith(f'stewart_dynamics: {file}: ')
-    assert reason in line
-    assert len(line) < 500
-    return int(program.stdout)
+def _refused_in_little_memory(folder: Path, reasons: dict[Path, str]) -> None:
+    """Check that files are refused for these reasons, with hardly more memory than any other."""
+    file = folder / 'usual.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    mass: 1.0\n', encoding='utf-8')
+    done = subprocess.run([sys.executable, '-c', MEASURED, file, *reasons], cwd=folder,
+                          capture_output=True, text=True, timeout=DEADLINE, check=True)
+    assert done.stderr == ''
+    _, usual, *lines, largest = done.stdout.splitlines()
+    for line, (path, reason) in zip(lines, reasons.items(), strict=True):
+        assert line.startswith(f'{path}: ')
+        assert reason in line
+        assert len(line) < 500
+    assert int(largest) < int(usual) + 50_000
 
 
-# Planned motions
+# Planned trajectories
 
 TURNED = HOME._replace(quaternion=(0.0, 0.0, math.sin(1.0), math.cos(1.0)))
 UNFIT = {
-    'refused: at ': ([HOME, HOME._replace(position=(0.0, 0.0, 4.0))], {}),
-    'det(J) passes zero': ([HOME, TURNED], {}),
+    'rejected: at ': ([HOME, HOME._replace(position=(0.0, 0.0, 4.0))], {}),
+    'det(J) crosses zero': ([HOME, TURNED], {}),
     'not finite: points[1]': ([HOME, HOME._replace(position=(0.0, 0.0, math.nan))], {}),
     'quaternion not of unit length: points[0]': (
         [HOME._replace(quaternion=(0.0, 0.0, 0.0, 1.1)), HOME], {}),
     "wrong frame_id: 'world', must be 'base' or empty": ([HOME, HOME], {'frame': 'world'}),
-    'time_from_start does not rise: points[1]': ([HOME, HOME], {'step': 0}),
+    'time_from_start is not strictly increasing: points[1]': ([HOME, HOME], {'step': 0}),
     'malformed: 0 points': ([], {}),
-    'out of range: the numbers overflow': ([HOME._replace(position=(1e200, 0.0, 0.0))], {}),
-    'too far between points': ([HOME, HOME._replace(position=(1e9, 0.0, 0.0))], {}),
+    'out of range: numbers overflow': ([HOME._replace(position=(1e200, 0.0, 0.0))], {}),
+    'points too far apart': ([HOME, HOME._replace(position=(1e9, 0.0, 0.0))], {}),
 }
 
 
-def test_a_trajectory_that_is_unfit_is_refused_as_a_whole(begin: Start) -> None:
-    node = begin('singularity.stop_condition:=1.0e9', 'limits.force_max:=1.0e9',
+def test_a_trajectory_that_is_unfit_is_rejected_as_a_whole(renew: Start) -> None:
+    node = renew('singularity.stop_condition:=1.0e+9', 'limits.force_max:=1.0e+9',
                  'limits.velocity_max:=100.0', 'limits.length_max:=3.0')
     planner = Planner(node)
     for number, (text, (samples, how)) in enumerate(UNFIT.items(), start=1):
         planner.send(samples, **{'step': 10**9, **how})
-        planner.until_refused(text, number)
+        planner.until_rejected(text, number)
         node.answer(MOVING)
     planner.send_bytes(raw(HOME.combined(1))[:-20])
-    planner.until_refused('refused: malformed: ', len(UNFIT) + 1)
-    assert any('trajectory refused: ' in line for line in log_lines(node.program.stderr, 'ERROR'))
+    planner.until_rejected('rejected: malformed: ', len(UNFIT) + 1)
+    assert any('planned trajectory rejected: ' in line
+               for line in log_lines(node.program.stderr, 'ERROR'))
     assert not planner.raw
     planner.send([HOME, HOME])
     planner.until_answered(1)
-    node.until_status('trajectory', OK, 'answered: 2 points')
+    node.until_status('planned trajectory', OK, 'accepted: 2 points')
 
 
-def test_more_trajectories_than_can_wait_are_refused(begin: Start) -> None:
-    node = begin()
+def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> None:
+    node = renew()
     planner = Planner(node)
     planner.fill()
-    node.until_reported('trajectory', ERROR, 'refused: more than can wait: 5 are in work or wait')
-    node.until_status('trajectory', OK, 'answered: 50000 points')
-    node.until(lambda: int(node.values('trajectory')['refused: more than can wait']) > 0,
+    node.until_reported(
+        'planned trajectory', ERROR, 'rejected: queue full: 5 are in work or wait')
+    node.until_status('planned trajectory', OK, 'accepted: 50000 points')
+    node.until(lambda: int(node.values('planned trajectory')['rejected: queue full']) > 0,
                'they are counted')
 
 
-def test_a_trajectory_in_work_is_given_up_with_the_node(begin: Start) -> None:
-    node = begin()
+def test_a_trajectory_in_work_is_dropped_with_the_node(renew: Start) -> None:
+    node = renew()
     planner = Planner(node)
     planner.fill()
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
-        assert node.call('change_state', ChangeState.Request(
-            transition=Transition(id=transition))).success
-    node.until_said('trajectories given up, the node is deactivated: ')
+        assert node.change(transition)
+    node.until_said('planned trajectories dropped, because the node is deactivated: ')
     node.until_active()
 
     def answered() -> bool:
         # What was still in the middleware may come before it, and leave no place for it.
         planner.send([HOME, HOME])
-        return 'answered: 2 points' in node.status('trajectory').message
+        return 'accepted: 2 points' in node.status('planned trajectory').message
 
     node.until(answered, 'the next trajectory is answered')

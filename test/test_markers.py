@@ -33,7 +33,7 @@ from referees import (  # noqa: E402
 from running import DynamicsNode, nanoseconds, NODE, PLATFORM, Sample  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
-from stewart_dynamics import Parameters, StewartPlatform  # noqa: E402
+from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.nodes import markers as pictures  # noqa: E402
 from stewart_dynamics.nodes.markers import Markers  # noqa: E402
@@ -197,7 +197,7 @@ def test_legs_are_drawn_from_joint_to_joint(parameters: Parameters, to: Setpoint
     drawn = picture(parameters, to)
     tolerance = 1e-13 * (size_of(parameters) + float(np.abs(to.motion[:3]).max()))
     lengths = StewartPlatform(parameters).inverse_kinematics(
-        to.motion[:3], np.reshape(to.motion[3:12], (3, 3)))
+        Pose(to.motion[:3], np.reshape(to.motion[3:12], (3, 3))))
     shortest = parameters['limits.length_min']
     for n, (base, platform) in enumerate(zip(*joints_of(parameters, to), strict=True)):
         piston, cylinder = drawn['pistons', n], drawn['cylinders', n]
@@ -421,8 +421,8 @@ def test_a_picture_is_the_one_of_its_answer(node: DynamicsNode) -> None:
     assert seen[_stamps(seen).index(stamp)] == deserialize_message(expected, MarkerArray)
 
 
-def test_the_last_answer_is_drawn_though_no_other_comes(start: Start) -> None:
-    node = start('visualization_rate:=2.0')
+def test_the_last_answer_is_drawn_though_no_other_comes(fresh: Start) -> None:
+    node = fresh('visualization_rate:=2.0')
     node.until_active()
     seen = _seen(node)
     for _ in range(5):
@@ -433,8 +433,8 @@ def test_the_last_answer_is_drawn_though_no_other_comes(start: Start) -> None:
     assert len(set(_stamps(seen))) == len(seen) < len(node.received('leg_states'))
 
 
-def test_no_answer_is_drawn_twice_at_whatever_rate(start: Start) -> None:
-    node = start('visualization_rate:=1000000.0')
+def test_no_answer_is_drawn_twice_at_whatever_rate(fresh: Start) -> None:
+    node = fresh('visualization_rate:=1000000.0')
     node.until_active()
     seen = _seen(node)
     for _ in range(50):
@@ -445,8 +445,8 @@ def test_no_answer_is_drawn_twice_at_whatever_rate(start: Start) -> None:
     assert len(seen) > 50
 
 
-def test_pictures_come_no_more_often_than_the_rate(start: Start) -> None:
-    node = start('visualization_rate:=0.001')
+def test_pictures_come_no_more_often_than_the_rate(fresh: Start) -> None:
+    node = fresh('visualization_rate:=0.001')
     node.until_active()
     _look(node)
     # The first answer is due, and the next one in 1000 s, whether somebody looks or not.
@@ -458,8 +458,8 @@ def test_pictures_come_no_more_often_than_the_rate(start: Start) -> None:
     assert len(seen) <= 1
 
 
-def test_without_a_rate_there_is_no_such_topic(start: Start) -> None:
-    node = start('visualization_rate:=0.0')
+def test_without_a_rate_there_is_no_such_topic(fresh: Start) -> None:
+    node = fresh('visualization_rate:=0.0')
     node.until_active()
     node.answer()
     topics = [name for name, _ in node.peer.node.get_publisher_names_and_types_by_node(
@@ -468,8 +468,8 @@ def test_without_a_rate_there_is_no_such_topic(start: Start) -> None:
     assert f'{NODE}/markers' not in topics
 
 
-def test_who_looks_later_sees_nothing_of_before(start: Start) -> None:
-    node = start()
+def test_who_looks_later_sees_nothing_of_before(fresh: Start) -> None:
+    node = fresh()
     node.until_active()
     before = node.stamp()
     node.answer(stamp=before)

@@ -48,8 +48,8 @@ from running import (  # noqa: E402
     Peer, PLATFORM, Program)
 
 from stewart_dynamics.errors import StewartError  # noqa: E402
+from stewart_dynamics.nodes import simulator_messages  # noqa: E402
 from stewart_dynamics.nodes.security import check_environment  # noqa: E402
-from stewart_dynamics.runtime import plant  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
@@ -124,12 +124,13 @@ def test_the_policy_is_one_of_sros2() -> None:
             assert re.fullmatch(r'[~/]?[a-z_/]+', element.text or ''), element.text
 
 
-def test_the_policy_is_what_the_node_does(start: Start) -> None:
+def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     """Each name that the node has with any source of setpoints is in it, and no other."""
-    nodes = [start('setpoint.source:=separate'), start('setpoint.source:=combined'),
-             start('setpoint.source:=pose', 'use_sim_time:=true')]
     union: dict[str, set[str]] = {}
-    for node in nodes:
+    for begin, overrides in ((fresh, ('setpoint.source:=separate',)),
+                             (fresh, ('setpoint.source:=combined',)),
+                             (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
+        node = begin(*overrides)
         node.until_active()
         of_inputs = {f'{NODE}/{topic}' for topic in (
             *node.topics, 'wrench', 'measured_legs')}
@@ -196,8 +197,8 @@ def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> N
         peer.until(lambda: name not in peer.node.get_node_names(), 'the simulator has gone')
     peer.close()
     assert union == granted('/stewart_simulator')
-    assert {f'/{name}/{topic}' for topic in plant.OUTPUT_TYPES} < union['publish']
-    assert {f'/{name}/{topic}' for topic in plant.INPUT_TYPES} < union['subscribe']
+    assert {f'/{name}/{topic}' for topic in simulator_messages.OUTPUT_TYPES} < union['publish']
+    assert {f'/{name}/{topic}' for topic in simulator_messages.INPUT_TYPES} < union['subscribe']
 
 
 # What would start with less security than is asked for does not start

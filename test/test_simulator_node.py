@@ -17,8 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 import math
 from pathlib import Path
+import re
 import signal
 import time
 from typing import Any
@@ -32,14 +35,16 @@ from rclpy.serialization import deserialize_message
 from referees import rng
 from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, bits, executable, log_lines, nanoseconds, Peer, PLATFORM, Program, ROOT,
-    wrench_message)
+    assert_only_log_lines, bits, executable, Inside, log_lines, nanoseconds, Peer, PLATFORM,
+    Program, ROOT, wrench_message)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import Pose, StewartError, StewartPlatform
+from stewart_dynamics.nodes.simulator_messages import OUTPUT_TYPES, StateMessages
+from stewart_dynamics.nodes.simulator_node import SimulatorNode
 from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.plant import OUTPUT_TYPES, Plant
+from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 SIMULATOR = '/stewart_simulator'
@@ -56,20 +61,43 @@ SPECIAL = (math.nan, math.inf, -math.inf)
 
 
 class Simulator:
-    """The simulator in a process of its own, and a peer that commands it and keeps its states."""
+    """
+    The simulator, and a peer that commands it and keeps its states.
 
-    def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = ()
-                 ) -> None:
+    Parameters
+    ----------
+    domain : int
+        Its ROS domain.
+    folder : Path
+        Gets what it writes.
+    overrides : str
+        Parameters on the command line, ``name:=value``.
+    files : sequence of Path
+        Its parameter files; by default those of config/.
+    said : callable, optional
+        What this process says on stderr, where the simulator is to be in it, and not in a process
+        of its own.
+
+    """
+
+    def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
+                 said: Callable[[], str] | None = None) -> None:
         self.peer = Peer(domain)
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
         self.raw['clock'] = self.peer.listen('/clock', Clock)
         self._commands = self.peer.writer(f'{SIMULATOR}/commands', Float64MultiArray)
         self._wrench = self.peer.writer(f'{SIMULATOR}/wrench', WrenchStamped)
-        paths = [part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)]
-        self.program = Program(
-            [executable('stewart_simulator'), '--ros-args', *paths,
-             *(part for override in overrides for part in ('-p', override))], domain, folder)
+        arguments = ['--ros-args', *(
+            part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)), *(
+            part for override in overrides for part in ('-p', override))]
+        self._stepped = STEPPED in overrides
+        try:
+            self.program: Any = Inside(SimulatorNode, arguments, domain, said) if said else (
+                Program([executable('stewart_simulator'), *arguments], domain, folder))
+        except StewartError:
+            self.peer.close()
+            raise
         self.peer.watched = self.program
 
     def until(self, condition: Callable[[], Any], what: str) -> None:
@@ -82,10 +110,6 @@ class Simulator:
         self.until(lambda: all(self.raw[topic] for topic in topics)
                    and self._commands.get_subscription_count()
                    and self._wrench.get_subscription_count(), 'the simulator is there')
-
-    @property
-    def _stepped(self) -> bool:
-        return any(part == STEPPED for part in self.program.process.args)
 
     def until_said(self, level: str, text: str) -> str:
         """Return the first line of its log that has a text in it, once it is said."""
@@ -144,7 +168,7 @@ class Simulator:
     def close(self) -> None:
         """Leave ROS, and stop the program if it still runs."""
         try:
-            if not self.program.ended:
+            if isinstance(self.program, Program) and not self.program.ended:
                 self.stop()
         finally:
             self.program.kill()
@@ -173,32 +197,42 @@ Start = Callable[..., Simulator]
 
 @pytest.fixture
 def start(domain: int, tmp_path: Path) -> Iterator[Start]:
-    """Return a function that starts a simulator, one after the other; it stops with the test."""
+    """Return a function that starts a simulator in a process of its own, one after the other."""
+    with one_after_the_other(partial(Simulator, domain), tmp_path) as begin:
+        yield begin
+
+
+@pytest.fixture
+def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+    """Return a function that makes a simulator in this process; in the end it must be at work."""
+    begun: list[Simulator] = []
+    make = partial(Simulator, domain, said=lambda: capfd.readouterr().err)
+    with one_after_the_other(make, tmp_path) as start:
+        def started(*overrides: str, **options: Any) -> Simulator:
+            begun.append(start(*overrides, **options))
+            begun[-1].until_there()
+            return begun[-1]
+
+        yield started
+        begun[-1].at_work()
+
+
+@contextmanager
+def one_after_the_other(make: Callable[..., Simulator], folder: Path) -> Iterator[Start]:
+    """Give a function that makes a simulator, and ends the one before; the last ends with this."""
     started: list[Simulator] = []
 
     def begin(*overrides: str, **options: Any) -> Simulator:
         if started:
             started[-1].close()
-        started.append(Simulator(domain, tmp_path / str(len(started)), *overrides, **options))
+        started.append(make(folder / str(len(started)), *overrides, **options))
         return started[-1]
 
-    yield begin
-    if started:
-        started[-1].close()
-
-
-@pytest.fixture
-def begin(start: Start) -> Iterator[Start]:
-    """Return the same where it must be at work in the end."""
-    begun: list[Simulator] = []
-
-    def started(*overrides: str, **options: Any) -> Simulator:
-        begun.append(start(*overrides, **options))
-        begun[-1].until_there()
-        return begun[-1]
-
-    yield started
-    begun[-1].at_work()
+    try:
+        yield begin
+    finally:
+        if started:
+            started[-1].close()
 
 
 @pytest.fixture
@@ -216,10 +250,9 @@ def holding() -> list[float]:
     """Return the forces that hold the machine in its initial pose."""
     plant = Plant(SimulatorParameters(GIVEN))
     platform = StewartPlatform(plant.parameters)
-    position, rotation = plant.state.pose[:3], np.eye(3)
+    pose = Pose(plant.state.pose[:3], np.eye(3))
     forces: list[float] = np.linalg.solve(
-        platform.jacobian(position, rotation).T,
-        platform.gravity_vector(position, rotation)).tolist()
+        platform.inverse_jacobian(pose).T, platform.gravity_vector(pose)).tolist()
     return forces
 
 
@@ -228,19 +261,20 @@ def holding() -> list[float]:
 NOISY = ('noise.length:=1.0e-5', 'noise.rate:=1.0e-3', 'noise.force:=2.0')
 
 
-def test_step_by_step_the_same_commands_give_the_same_bits(begin: Start) -> None:
+def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None:
     """Two processes, and the library in this one; however long each takes for what."""
     random = rng()
     commands = np.array(holding()) + random.uniform(-300.0, 300.0, (40, 6))
     seen = []
     for _ in range(2):
-        simulator = begin(STEPPED, *NOISY)
+        simulator = start(STEPPED, *NOISY)
+        simulator.until_there()
         for n, command in enumerate(commands):
             if n == 20:
                 simulator.load((100.0, 0.0, -50.0, 0.0, 10.0, 0.0))
-                # What is not a command comes behind what is: a refused one tells that it came.
+                # Wrenches and commands come in any order: a rejected one tells that they came.
                 simulator.load((1.0,) * 6, frame='elsewhere')
-                simulator.until_said('WARN', 'wrench refused: wrong frame_id')
+                simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
             simulator.step(command)
         seen.append({topic: simulator.raw[topic][-len(commands):] for topic in TYPES})
         assert simulator.stamps()[-len(commands):] == [
@@ -248,10 +282,11 @@ def test_step_by_step_the_same_commands_give_the_same_bits(begin: Start) -> None
     assert seen[0] == seen[1]
     plant = Plant(SimulatorParameters({
         **GIVEN, 'noise.length': 1e-5, 'noise.rate': 1e-3, 'noise.force': 2.0}))
-    list(plant.messages(FIRST))
+    plant.measured()  # of the messages that it publishes until the first command
+    messages = StateMessages(plant.parameters)
     for n, command in enumerate(commands.tolist()):
         plant.advance(tuple(command), (100.0, 0.0, -50.0, 0.0, 10.0, 0.0) if n >= 20 else NO_LOAD)
-        for topic, data in plant.messages(FIRST + PERIOD * (n + 1)):
+        for topic, data in messages.write(FIRST + PERIOD * (n + 1), plant.measured()):
             assert seen[0][topic][n] == data
 
 
@@ -294,7 +329,7 @@ def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> 
     simulator.until(lambda: len(simulator.raw['accel']) > 100, 'it goes on')
     assert simulator.raw['clock'] == []
     home = StewartPlatform(SimulatorParameters(GIVEN)).inverse_kinematics(
-        [0.0, 0.0, 1.1], np.eye(3)) - 0.95
+        Pose([0.0, 0.0, 1.1], np.eye(3))) - 0.95
     for state in simulator.states():
         assert np.allclose(state.position, home, rtol=0.0, atol=1e-15)
         assert not np.any([*state.velocity, *state.effort])
@@ -328,7 +363,7 @@ def test_a_load_moves_it(begin: Start) -> None:
 # Faults: see docs/faults.md
 
 @pytest.mark.parametrize('mode', ['real time', 'stepped'])
-def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mode: str) -> None:
+def test_bad_commands_are_rejected_and_the_last_holds(begin: Start, mode: str) -> None:
     simulator = begin(*([STEPPED] if mode == 'stepped' else []))
     good = holding()
     if mode == 'stepped':
@@ -343,8 +378,8 @@ def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mod
         simulator.command([1.0] * many)
     simulator.command(b'\0\1\0\0\0')
     simulator.command(b'\0\7\0\0' + bytes(68))
-    for reason in ('not finite: (', 'not six numbers: 0 of them', 'malformed: '):
-        simulator.until_said('WARN', f'commands refused: {reason}')
+    for reason in ('not finite: (', 'not six numbers: 0 numbers', 'malformed: '):
+        simulator.until_said('WARN', f'commands rejected: {reason}')
     before = stamp_of(simulator.raw['leg_states'][-1])
     if mode == 'stepped':
         # Time stood; the next is one period.
@@ -355,15 +390,15 @@ def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mod
     simulator.until_said('WARN', '(the last of 18)')
 
 
-def test_loads_that_are_none_are_refused_and_the_last_holds(begin: Start) -> None:
+def test_bad_wrenches_are_rejected_and_the_last_holds(begin: Start) -> None:
     simulator = begin(STEPPED)
     simulator.load((0.0, 0.0, 500.0, 0.0, 0.0, 0.0))
     for n in range(6):
         for special in SPECIAL:
             simulator.load([0.0] * n + [special] + [0.0] * (5 - n))
     simulator.load((1e6, 0.0, 0.0, 0.0, 0.0, 0.0), frame='world')
-    simulator.until_said('WARN', 'wrench refused: wrong frame_id')
-    simulator.until_said('WARN', 'wrench refused: not finite')
+    simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
+    simulator.until_said('WARN', 'wrench rejected: not finite')
     simulator.step(holding())
     assert np.allclose(numbers_of(simulator.last('accel'))[:2], 0.0, atol=1e-1)
     assert simulator.last('accel').accel.linear.z > 0.5
@@ -374,8 +409,8 @@ def test_forces_beyond_their_limit_saturate(begin: Start) -> None:
     simulator.step([1000.0, -7000.0, 6000.0, 6001.0, 0.0, 1e300])
     assert simulator.last().effort.tolist() == [
         1000.0, -6000.0, 6000.0, 6000.0, 0.0, 6000.0]
-    line = simulator.until_said('WARN', 'is beyond limits.force_max, clipped to')
-    assert 'commands: leg_6: 1e+300 N is beyond limits.force_max, clipped to 6000 N' in line
+    line = simulator.until_said('WARN', 'exceeds limits.force_max, clipped to')
+    assert 'commands: leg_6: 1e+300 N exceeds limits.force_max, clipped to 6000 N' in line
 
 
 @pytest.mark.parametrize('mode', ['real time', 'stepped'])
@@ -386,7 +421,7 @@ def test_what_cannot_be_computed_holds_it_at_rest(
         assert simulator.step([1e300] * 6) == FIRST + PERIOD
     else:
         simulator.command([1e300] * 6)
-    simulator.until_said('ERROR', 'held at rest, for good')
+    simulator.until_said('ERROR', 'held at rest for good')
     assert simulator.said('ERROR', 'motion cannot be computed')
     if mode == 'stepped':
         assert simulator.step(holding()) == FIRST + 2 * PERIOD
@@ -411,8 +446,9 @@ def test_a_machine_too_stiff_for_real_time_lets_time_go(begin: Start) -> None:
 
 
 def test_a_simulator_that_was_stopped_takes_what_is_due_and_lets_the_rest_go(
-        begin: Start) -> None:
-    simulator = begin()
+        start: Start) -> None:
+    simulator = start()
+    simulator.until_there()
     simulator.program.process.send_signal(signal.SIGSTOP)
     end = time.monotonic() + 1.0
     simulator.until(lambda: time.monotonic() > end, 'a second goes by')
@@ -434,24 +470,31 @@ def test_a_signal_ends_it(start: Start) -> None:
             simulator.stop(number)
 
 
-@pytest.mark.parametrize(('overrides', 'said'), [
+CANNOT = [
     (('actuator.coulomb_friction:=1.0e+9',),
      'actuator.coulomb_friction: [1000000000.0, '),
     (('actuator.viscous_friction:=1.0e+9', 'actuator.reflected_mass:=0.0'),
      'too large for a platform of 150 kg: the integration would need steps of '),
-    (('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]',), 'beyond limits.length_max, 1.65 m'),
+    (('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]',), 'leg_1: length 1.6'),
     (('rate:=300.0',), 'rate: 300.0 Hz: a period must be a whole number of steps of 0.001 s'),
     (('step:=0.01',), 'step: 0.01 s: must be at least 1e-05, at most 0.001'),
     (('noise.lenght:=0.1',), 'noise.lenght: unknown parameter; do you mean noise.length?'),
-], ids=str)
+]
+
+
 def test_what_it_cannot_simulate_is_said_in_one_line(
-        start: Start, overrides: tuple[str, ...], said: str) -> None:
-    program = start(*overrides).program
-    assert program.wait() == 1, program.stderr
-    lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
-    assert len(lines) == 1, program.stderr
-    assert lines[0].startswith('stewart_simulator: ')
-    assert said in lines[0]
+        domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: Start) -> None:
+    for overrides, said in CANNOT:
+        with pytest.raises(StewartError, match=re.escape(said)):
+            Simulator(domain, tmp_path / 'inside', *overrides,
+                      said=lambda: capfd.readouterr().err)
+    for overrides, said in (CANNOT[0], CANNOT[-1]):
+        program = start(*overrides).program
+        assert program.wait() == 1, program.stderr
+        lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
+        assert len(lines) == 1, program.stderr
+        assert lines[0].startswith('stewart_simulator: ')
+        assert said in lines[0]
 
 
 def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
@@ -464,7 +507,7 @@ def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
     simulator.until(future.done, 'it answers')
     assert not future.result().result.successful
     assert future.result().result.reason == (
-        'platform.mass: only read when the node starts: start it anew')
+        'platform.mass: only read when the node starts: restart it')
 
 
 def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
@@ -474,6 +517,6 @@ def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
         assert f'  {name} (double' in program.stdout
 
 
-def test_the_topics_are_those_of_the_plant() -> None:
+def test_the_topics_are_those_of_the_messages() -> None:
     assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
             for topic, kind in TYPES.items()} == OUTPUT_TYPES

@@ -17,7 +17,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, ExitStack
+from functools import partial
 from pathlib import Path
+import re
 import signal
 from typing import Any
 
@@ -25,15 +28,18 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from rclpy.serialization import deserialize_message
+from rclpy.task import Future
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, executable, INPUTS, log_lines, nanoseconds, Peer, Program, ROOT,
+    assert_only_log_lines, executable, INPUTS, Inside, log_lines, nanoseconds, Peer, Program, ROOT,
     SEPARATE)
 
+from stewart_dynamics import ParameterError
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.nodes.trajectory_node import TrajectoryNode
 
 MOTION = """\
 stewart_trajectory:
@@ -50,16 +56,37 @@ stewart_trajectory:
 
 
 class Trajectory:
-    """The publisher in a process of its own, and a peer that keeps what it sends."""
+    """
+    The publisher, and a peer that keeps what it sends.
 
-    def __init__(self, domain: int, folder: Path, file: Path, *overrides: str) -> None:
+    Parameters
+    ----------
+    domain : int
+        Its ROS domain.
+    folder : Path
+        Gets what it writes.
+    file : Path
+        Its parameter file.
+    overrides : str
+        Parameters on the command line, ``name:=value``.
+    said : callable, optional
+        What this process says on stderr, where the publisher is to be in it, and not in a process
+        of its own.
+
+    """
+
+    def __init__(self, domain: int, folder: Path, file: Path, *overrides: str,
+                 said: Callable[[], str] | None = None) -> None:
         self.peer = Peer(domain)
         self._raw = {topic: self.peer.listen(f'/stewart_dynamics/{topic}', kind)
                      for topic, kind in INPUTS.items()}
-        arguments = [part for override in overrides for part in ('-p', override)]
         self._clock = self.peer.writer('/clock', Clock)
-        self.program = Program([executable('stewart_trajectory'), '--ros-args', '--params-file',
-                                file, *arguments], domain, folder)
+        arguments = ['--ros-args', '--params-file', file,
+                     *(part for override in overrides for part in ('-p', override))]
+        done = Future()
+        self.program: Any = Inside(
+            partial(TrajectoryNode, done), arguments, domain, said, done) if said else (
+                Program([executable('stewart_trajectory'), *arguments], domain, folder))
 
     def received(self, topic: str) -> list[Any]:
         """Return the messages on a topic so far."""
@@ -90,18 +117,29 @@ Start = Callable[..., Trajectory]
 
 @pytest.fixture
 def start(domain: int, tmp_path: Path) -> Iterator[Start]:
-    """Return a function that starts the publisher with a parameter file's text."""
-    started: list[Trajectory] = []
+    """Return a function that starts it in a process of its own, with a parameter file's text."""
+    with started(partial(Trajectory, domain), tmp_path) as begin:
+        yield begin
 
-    def begin(text: str, *overrides: str) -> Trajectory:
-        file = tmp_path / 'trajectory.yaml'
-        file.write_text(text, encoding='utf-8')
-        started.append(Trajectory(domain, tmp_path / 'run', file, *overrides))
-        return started[-1]
 
-    yield begin
-    for each in started:
-        each.close()
+@pytest.fixture
+def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+    """Return a function that makes it in this process, with a parameter file's text."""
+    make = partial(Trajectory, domain, said=lambda: capfd.readouterr().err)
+    with started(make, tmp_path) as begin:
+        yield begin
+
+
+@contextmanager
+def started(make: Callable[..., Trajectory], folder: Path) -> Iterator[Start]:
+    """Give a function that makes a publisher, which ends with this."""
+    with ExitStack() as stack:
+        def begin(text: str, *overrides: str) -> Trajectory:
+            file = folder / 'trajectory.yaml'
+            file.write_text(text, encoding='utf-8')
+            return stack.enter_context(closing(make(folder / 'run', file, *overrides)))
+
+        yield begin
 
 
 def _separate(trajectory: Trajectory) -> tuple[list[int], NDArray[np.float64]]:
@@ -134,7 +172,7 @@ def _row(position: Any, quaternion: Any, twist: Any, accel: Any) -> list[float]:
             quaternion.w, *(number for v in vectors for number in (v.x, v.y, v.z))]
 
 
-def _expected(parameters: TrajectoryParameters, times: Any) -> NDArray[np.float64]:
+def _expected(parameters: ReferenceMotionParameters, times: Any) -> NDArray[np.float64]:
     motion = motion_at(parameters, np.asarray(times) * 1e-9)
     return np.concatenate([
         motion.position, to_quaternion(motion.rotation), motion.linear_velocity,
@@ -144,9 +182,9 @@ def _expected(parameters: TrajectoryParameters, times: Any) -> NDArray[np.float6
 @pytest.mark.parametrize('output, kind', [
     ('separate', 'paper'), ('separate', 'quintic'), ('separate', 'sine'), ('combined', 'paper')])
 def test_what_is_sent_is_the_motion_and_then_it_is_done(
-        start: Start, tmp_path: Path, output: str, kind: str) -> None:
-    trajectory = start(MOTION.format(kind=kind, more=f'output: {output}'))
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+        begin: Start, tmp_path: Path, output: str, kind: str) -> None:
+    trajectory = begin(MOTION.format(kind=kind, more=f'output: {output}'))
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     times = sample_times(parameters)
     assert len(times) == 301
     topics = ('setpoint/combined',) if output == 'combined' else SEPARATE
@@ -161,7 +199,6 @@ def test_what_is_sent_is_the_motion_and_then_it_is_done(
     assert f'{kind} motion at 200 Hz to stewart_dynamics, 301 setpoints' in lines[0]
     assert '301 setpoints published' in lines[1]
     assert_only_log_lines(trajectory.program.stderr)
-    assert trajectory.program.stdout == ''
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
@@ -171,8 +208,9 @@ def test_looped_it_goes_to_and_fro_until_it_is_told_to_stop(
     trajectory.until(dict.fromkeys(SEPARATE, 650))  # twice 1.5 s at 200 Hz, and some
     assert trajectory.program.stop(number) == 0
     assert_only_log_lines(trajectory.program.stderr)
+    assert trajectory.program.stdout == ''
     assert 'until stopped' in trajectory.program.stderr
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     # What was on its way when it ended may lack a topic.
     whole = min(len(trajectory.received(topic)) for topic in SEPARATE)
     for topic in SEPARATE:
@@ -207,8 +245,8 @@ SECOND = 1_000_000_000
 PERIOD = 5_000_000  # at 200 Hz
 
 
-def test_in_simulated_time_what_is_due_comes_with_the_clock(start: Start, tmp_path: Path) -> None:
-    trajectory = start(MOTION.format(kind='sine', more='output: combined'), 'use_sim_time:=true',
+def test_in_simulated_time_what_is_due_comes_with_the_clock(begin: Start, tmp_path: Path) -> None:
+    trajectory = begin(MOTION.format(kind='sine', more='output: combined'), 'use_sim_time:=true',
                        'motion.duration:=0.1')
     topics = ('setpoint/combined',)
     # It begins where the clock stands, by itself, and waits for it at each sample.
@@ -221,15 +259,15 @@ def test_in_simulated_time_what_is_due_comes_with_the_clock(start: Start, tmp_pa
     trajectory.at(2 * SECOND, 21, topics)
     assert trajectory.program.wait() == 0
     stamps, rows = _combined(trajectory)
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     times = sample_times(parameters)[:21]
     assert stamps == (SECOND + times).tolist()
     np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
     assert_only_log_lines(trajectory.program.stderr)
 
 
-def test_it_begins_anew_where_the_clock_does(start: Start, tmp_path: Path) -> None:
-    trajectory = start(MOTION.format(kind='sine', more='loop: true'), 'use_sim_time:=true')
+def test_it_begins_anew_where_the_clock_does(begin: Start, tmp_path: Path) -> None:
+    trajectory = begin(MOTION.format(kind='sine', more='loop: true'), 'use_sim_time:=true')
     trajectory.at(7 * SECOND, 1)
     trajectory.at(7 * SECOND + 3 * PERIOD, 4)
     # No sample comes twice where the clock goes back less than to the start.
@@ -240,24 +278,24 @@ def test_it_begins_anew_where_the_clock_does(start: Start, tmp_path: Path) -> No
     # A simulation that starts anew begins where it began.
     trajectory.at(SECOND, 8)
     trajectory.at(SECOND + PERIOD, 9)
-    assert trajectory.program.stop() == 0
+    trajectory.program.kill()
     stamps, rows = _separate(trajectory)
     times = np.array([0, 1, 2, 3, 4, 0, 1, 0, 1]) * PERIOD
     assert stamps == (np.repeat([7, 1], [5, 4]) * SECOND + times).tolist()
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
     warnings = log_lines(trajectory.program.stderr, 'WARN')
     assert len(warnings) == 2
     assert all('it begins anew' in warning for warning in warnings)
 
 
-def test_it_waits_for_the_clock(start: Start) -> None:
-    trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
+def test_it_waits_for_the_clock(begin: Start) -> None:
+    trajectory = begin(MOTION.format(kind='hold', more='start_timeout: 0.1'),
                        'use_sim_time:=true')
     trajectory.peer.until(lambda: 'waiting for /clock' in trajectory.program.stderr, 'it waits')
     assert not trajectory.received('setpoint/pose')
     trajectory.at(SECOND, 1)
-    assert trajectory.program.stop() == 0
+    trajectory.program.kill()
     assert len(log_lines(trajectory.program.stderr, 'WARN')) == 1
 
 
@@ -278,21 +316,27 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize('case', BROKEN)
-def test_a_broken_rule_is_said_in_one_line(start: Start, tmp_path: Path, case: str) -> None:
+def test_a_broken_rule_is_said_in_one_line(start: Start, tmp_path: Path) -> None:
     text = MOTION.format(kind='quintic', more='output: separate')
-    good, bad, said = BROKEN[case]
-    assert good in text
-    program = start(text.replace(good, bad)).program
-    assert program.wait() == 1, program.stderr
-    lines = program.stderr.splitlines()
-    assert len(lines) == 1, program.stderr
-    assert lines[0].startswith(f'stewart_trajectory: {tmp_path / "trajectory.yaml"}: {said}')
+    file = tmp_path / 'trajectory.yaml'
+    for good, bad, said in BROKEN.values():
+        assert good in text
+        file.write_text(text.replace(good, bad), encoding='utf-8')
+        with pytest.raises(ParameterError, match='^' + re.escape(f'{file}: {said}')):
+            ReferenceMotionParameters.from_yaml(file)
+    # In these two the executable finds it in different places.
+    for case in ('no end', 'not YAML'):
+        good, bad, said = BROKEN[case]
+        program = start(text.replace(good, bad)).program
+        assert program.wait() == 1, program.stderr
+        lines = program.stderr.splitlines()
+        assert len(lines) == 1, program.stderr
+        assert lines[0].startswith(f'stewart_trajectory: {file}: {said}')
 
 
 def test_the_files_of_the_package_are_good(start: Start) -> None:
     for file in sorted((ROOT / 'config').glob('trajectory_*.yaml')):
-        TrajectoryParameters.from_yaml(file)
+        ReferenceMotionParameters.from_yaml(file)
     trajectory = start((ROOT / 'config/trajectory_clear.yaml').read_text(encoding='utf-8'))
     trajectory.until(dict.fromkeys(SEPARATE, 10))
     assert trajectory.program.stop() == 0
