@@ -25,6 +25,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Six
 from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, RATES
 from stewart_dynamics.parameters import Parameters
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = LIMITS = (
@@ -111,7 +112,13 @@ def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
 
 
 @inlined
-def any_exceeded(thresholds: Array, leg: int, length: float, rate: float, force: float) -> bool:
-    """Return whether a leg exceeds one of the thresholds (24,), flat; an unknown force is nan."""
-    return bool(length < thresholds[leg] or length > thresholds[6 + leg]
-                or abs(rate) > thresholds[12 + leg] or abs(force) > thresholds[18 + leg])
+def any_exceeded(thresholds: Array, result: Array) -> bool:
+    """Return whether a row of a result exceeds one of the thresholds (24,); nan never does."""
+    exceeded = False
+    for leg in range(6):
+        if (result[LENGTHS.start + leg] < thresholds[leg]
+                or result[LENGTHS.start + leg] > thresholds[6 + leg]
+                or abs(result[RATES.start + leg]) > thresholds[12 + leg]
+                or abs(result[FORCES.start + leg]) > thresholds[18 + leg]):
+            exceeded = True
+    return exceeded

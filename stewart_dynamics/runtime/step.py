@@ -167,7 +167,8 @@ class Outputs(NamedTuple):
         return Singularity.of(self.states[n].tolist())
 
 
-# The settings as numbers: of the warning, whether to suppress, the limits' thresholds, clipping.
+# The settings as numbers, those of the warning first; whether to suppress, the thresholds of the
+# limits, what forces are clipped to.
 _THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
 
 # One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
@@ -179,8 +180,8 @@ _GIVES = Struct(f'{_EXCEEDING.stop}d')
 
 
 @inlined
-def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result: Array,
-           forces: Array) -> tuple[bool, bool]:
+def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart: bool,
+           result: Array, forces: Array) -> tuple[bool, bool]:
     """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
     finite = is_stamp
     for k in range(RESULT):
@@ -190,35 +191,30 @@ def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result:
     if restart:
         forget(state)
     condition = result[CONDITION]
-    advance(state, settings[_THRESHOLDS], result[DETERMINANT], result[DETERMINANT_RATE],
+    advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
     solved = condition < UNSOLVABLE_CONDITION
     published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
-    lengths, rates, demanded = result[LENGTHS], result[RATES], result[FORCES]
-    thresholds_of_legs, force_max = settings[_LIMITS], settings[_FORCE_MAX]
-    exceeding = False
     for leg in range(6):
         if not solved:
-            demanded[leg] = np.nan
-        force, most = demanded[leg], force_max[leg]
+            result[FORCES.start + leg] = np.nan
+        force, most = result[FORCES.start + leg], settings[_FORCE_MAX.start + leg]
         forces[leg] = min(max(force, -most), most) if published else np.nan
-        if any_exceeded(thresholds_of_legs, leg, lengths[leg], rates[leg], force):
-            exceeding = True
-    return True, exceeding
+    return True, any_exceeded(limits, result)
 
 
 @entry_point
 def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
                 forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
     """Go through results in their order and write what becomes of them, see Outputs."""
-    state = before.copy()
+    state, limits = before.copy(), settings[_LIMITS]
     restart = False
     for n in range(len(results)):
         # One that cannot be answered hands it on.
         restart = restart or restarts[n]
         is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
         answered[n], exceeding[n] = _watch(
-            settings, is_stamp, state, restart, results[n], forces[n])
+            settings, limits, is_stamp, state, restart, results[n], forces[n])
         restart = restart and not answered[n]
         states[n] = state
 
@@ -226,14 +222,14 @@ def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array,
 @entry_point
 def _one(numbers: Array) -> None:
     """Do with one setpoint what solve and watch do with many."""
-    written = numbers[_WRITTEN]
+    settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
     state[:] = numbers[_BEFORE]
     kernel.solve(numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
                  numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
     written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
-        numbers[_SETTINGS], numbers[_IS_STAMP.start] > 0.0, state, numbers[_RESTART.start] > 0.0,
-        result, written[_FORCES])
+        settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0, state,
+        numbers[_RESTART.start] > 0.0, result, written[_FORCES])
 
 
 _FIRST = Singularity()
