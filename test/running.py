@@ -958,7 +958,7 @@ class Planner:
         self._writer.publish(message)
 
     def send_long(self, points: int, stamp: int = STEP, leap: float = 0.0) -> None:
-        """Send a motion that is at home for so many points, 1 ms apart, and leaps to the last."""
+        """Send a trajectory that is at home for so many points, 1 ms apart, and leaps to the last."""
         point, = HOME.combined(0).points
         two = raw(MultiDOFJointTrajectory(header=header(stamp, ''), points=[point, point]))
         # Points are of 184 bytes, their times in the last eight.
@@ -971,8 +971,8 @@ class Planner:
         self._writer.publish(head[:-4] + points.to_bytes(4, 'little') + many.tobytes())
 
     def fill(self, leap: float = 0.0) -> None:
-        """Send long motions until as many are in work as can wait."""
-        while not any('more than can wait' in line for line in log_lines(
+        """Send long trajectories until the queue is full."""
+        while not any('queue full' in line for line in log_lines(
                 self._node.program.stderr, 'ERROR')):
             self.send_long(50_000, leap=leap)
             self._node.peer.spin(0.0)
