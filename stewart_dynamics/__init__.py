@@ -29,11 +29,13 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.motion import Motion
     from stewart_dynamics.mechanics.stewart_platform import InverseDynamics, Pose, StewartPlatform
     from stewart_dynamics.parameters import Parameters
+    from stewart_dynamics.runtime.planned_trajectory import (
+        check_planned_trajectory, PlannedTrajectory)
 
 __all__ = [
     'BagError', 'CAUSES', 'ForceCauses', 'InverseDynamics', 'Motion', 'MotionError',
-    'ParameterError', 'Parameters', 'Pose', 'PoseError', 'SingularityError', 'StewartError',
-    'StewartPlatform']
+    'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'SingularityError',
+    'StewartError', 'StewartPlatform', 'check_planned_trajectory']
 
 _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
@@ -42,6 +44,7 @@ _MODULES = {
     'mechanics.motion': ('Motion',),
     'mechanics.stewart_platform': ('InverseDynamics', 'Pose', 'StewartPlatform'),
     'parameters': ('Parameters',),
+    'runtime.planned_trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
