@@ -14,11 +14,17 @@
 
 
 from glob import glob
+from pathlib import Path
+import re
 
 from setuptools import find_packages, setup
 
 package_name = 'stewart_dynamics'
 share = f'share/{package_name}'
+
+# Read, not imported: where the package is built its dependencies need not be installed.
+version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py').read_text(
+    encoding='utf-8'), re.MULTILINE)[0]
 
 # No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
 # knows them under other names. Everything else that an executable imports is here.
@@ -82,7 +88,7 @@ extras_require = {
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version=version,
     description='Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs',
     author='The stewart_dynamics developers',
     maintainer='The stewart_dynamics developers',

@@ -47,7 +47,7 @@ from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'
@@ -93,7 +93,8 @@ from pathlib import Path
 import sys
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.setpoints import Setpoints, SOURCES
+from stewart_dynamics.runtime.input_topics import SOURCES
+from stewart_dynamics.runtime.setpoints import Setpoints
 
 many = 0
 setpoints = Setpoints(Parameters.from_yaml({str(PARAMETERS)!r}), print, print)
@@ -179,7 +180,7 @@ SETPOINT = np.dtype([(topic, message(numbers)) for topic, _, numbers in TOPICS])
 
 def make_bag(path: Path, setpoints: int) -> None:
     """Write setpoints at 1 kHz on three topics, in chunks with checksums."""
-    trajectory = TrajectoryParameters(MOTION)
+    trajectory = ReferenceMotionParameters(MOTION)
     store = get_typestore(Stores.ROS2_JAZZY)
     declared: list[McapRecord] = []
     for n, (topic, kind, _) in enumerate(TOPICS, start=1):
@@ -230,7 +231,7 @@ def make_bag(path: Path, setpoints: int) -> None:
                    + b'\x89MCAP0\r\n')
 
 
-def setpoints_of(trajectory: TrajectoryParameters, index: Array) -> Array:
+def setpoints_of(trajectory: ReferenceMotionParameters, index: Array) -> Array:
     """Return the messages of setpoints with these numbers, from 0 on, as they are in a chunk."""
     motion = motion_at(trajectory, index * (STEP * 1e-9))
     numbers = {

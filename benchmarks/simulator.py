@@ -49,7 +49,7 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.standard import float64_array
 from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.plant import _advance, Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
@@ -141,7 +141,7 @@ class Controller(Node):
         self._simulator, self._seconds = simulator, seconds
         self._states = 0
         self._begin = (0.0, 0.0, 0)
-        self._forces = cdr.float64_array(holding(SimulatorParameters(GIVEN)))
+        self._forces = float64_array(holding(SimulatorParameters(GIVEN)))
         qos = QoSProfile(depth=2000)
         self._commands = self.create_publisher(
             Float64MultiArray, '/stewart_simulator/commands', qos)

@@ -30,12 +30,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import rclpy
 from rclpy.serialization import serialize_message
 
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.diagnostics import diagnostics as written
 from stewart_dynamics.nodes.dynamics_node import DynamicsNode
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics import Diagnostics
+from stewart_dynamics.runtime.input_topics import SOURCES
 from stewart_dynamics.runtime.repeated_events import Series
-from stewart_dynamics.runtime.setpoints import SOURCES
 from stewart_dynamics.runtime.step import Setpoint, Step
 
 REPEATED = 21
@@ -79,7 +79,7 @@ def main() -> None:
             for level, (name, message, hardware), values in statuses])))
 
     def ours() -> bytes:
-        return cdr.diagnostics(0, statuses)
+        return written(0, statuses)
 
     rows.append(('the first diagnostics as a message, rclpy loads what it needs',
                  milliseconds(typed, 1), milliseconds(ours, 1)))

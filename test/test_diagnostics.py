@@ -24,11 +24,13 @@ import pytest
 from referees import symmetric_parameters
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
+from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity import Cause, Singularity
-from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
-from stewart_dynamics.runtime.setpoints import (
-    ACCEL, NOT_FINITE, NOT_JOINED, PASSED_OVER, POSE, Refusal, TWICE, TWIST)
-from stewart_dynamics.runtime.step import Excess, Output, Setpoint, Step
+from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.input_topics import ACCEL, POSE, TWIST
+from stewart_dynamics.runtime.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
+from stewart_dynamics.runtime.step import Output, Setpoint, Step
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -48,24 +50,33 @@ def output_of(setpoint: Setpoint = HOME, before: Singularity | None = None,
 CLEAR = output_of()
 
 
-def begun() -> Diagnostics:
-    return Diagnostics(PARAMETERS, TOPICS, BEGIN)
+def begun() -> DynamicsDiagnostics:
+    return DynamicsDiagnostics(PARAMETERS, TOPICS, BEGIN)
 
 
-def answered(diagnostics: Diagnostics, now: float, output: Output = CLEAR,
+def answered(diagnostics: DynamicsDiagnostics, now: float, output: Output = CLEAR,
              topics: tuple[str, ...] = TOPICS, took: float = 1e-4) -> bool:
     """Let messages of some topics come, and a setpoint be answered."""
     for topic in topics:
-        diagnostics.heard(topic, now)
+        diagnostics.setpoints.heard(topic, now)
     return diagnostics.answered(output, now - took, now)
 
 
-def status(diagnostics: Diagnostics, name: str, now: float) -> Status:
-    return next(status for status in diagnostics.report(now) if status.name == name)
+def status(diagnostics: DynamicsDiagnostics, name: str, now: float) -> Status:
+    return next(each for each in report(diagnostics, now) if each.name == name)
+
+
+def report(diagnostics: DynamicsDiagnostics, now: float) -> list[Status]:
+    return diagnostics.report.make(now)[0]
+
+
+def logged(diagnostics: DynamicsDiagnostics, now: float) -> list[tuple[int, str]]:
+    """Return levels and texts that a report gives to the log."""
+    return [(level, text) for level, text, _ in diagnostics.report.make(now)[1]]
 
 
 def test_there_is_one_status_for_each_of_four_things() -> None:
-    assert [s.name for s in begun().report(BEGIN)] == [
+    assert [s.name for s in report(begun(), BEGIN)] == [
         'setpoints', 'singularity', 'limits', 'timing']
 
 
@@ -93,7 +104,7 @@ def test_a_silent_topic_is_named_and_since_when(silent: str) -> None:
     for now in (BEGIN + 0.05, BEGIN + 1.5, BEGIN + 2.48):
         for topic in TOPICS:
             if topic != silent:
-                diagnostics.heard(topic, now)
+                diagnostics.setpoints.heard(topic, now)
     of = status(diagnostics, 'setpoints', BEGIN + 2.5)
     assert of.level == STALE
     assert f'{silent} silent for 2.5 s' in of.message
@@ -105,7 +116,7 @@ def test_a_silent_topic_is_named_and_since_when(silent: str) -> None:
 def test_a_topic_that_never_came_is_named() -> None:
     diagnostics = begun()
     for topic in (POSE, TWIST):
-        diagnostics.heard(topic, BEGIN + 1.0)
+        diagnostics.setpoints.heard(topic, BEGIN + 1.0)
     of = status(diagnostics, 'setpoints', BEGIN + 1.02)
     assert of.level == STALE
     assert f'{ACCEL} never came' in of.message
@@ -116,15 +127,15 @@ def test_a_topic_that_never_came_is_named() -> None:
 def test_topics_that_all_speak_but_do_not_meet_are_stale() -> None:
     diagnostics = begun()
     for topic in TOPICS:
-        diagnostics.heard(topic, BEGIN + 1.0)
+        diagnostics.setpoints.heard(topic, BEGIN + 1.0)
     of = status(diagnostics, 'setpoints', BEGIN + 1.02)
     assert (of.level, of.message) == (
-        STALE, 'no setpoint: all topics speak, but none is joined: '
+        STALE, 'no setpoint: all topics arrive, but none is joined: '
         'their stamps differ by more than setpoint.sync_tolerance, 0 s')
 
 
 def test_the_timeout_is_that_of_the_parameters() -> None:
-    diagnostics = Diagnostics(
+    diagnostics = DynamicsDiagnostics(
         PARAMETERS.replaced({'setpoint.timeout': 5.0}), TOPICS, BEGIN)
     answered(diagnostics, BEGIN)
     assert status(diagnostics, 'setpoints', BEGIN + 4.9).level == OK
@@ -162,30 +173,86 @@ def test_reports_that_come_often_do_not_tear_the_rate_apart() -> None:
     assert max(rates[20:]) <= 6.0
 
 
-# Refusals and writers
+# What is warned of in the log
+
+def come(diagnostics: DynamicsDiagnostics, seconds: float, topics: tuple[str, ...],
+         begin: float = BEGIN) -> list[str]:
+    """Let messages of topics come at 100 Hz, none complete; return what is logged."""
+    lines = []
+    for n in range(round(100 * seconds)):
+        now = begin + 0.01 * n
+        for topic in topics:
+            diagnostics.setpoints.heard(topic, now)
+        if diagnostics.due_at_tick(now):
+            lines += logged(diagnostics, now)
+    assert all(level == WARN for level, _ in lines)
+    return [text for _, text in lines]
+
+
+def test_a_topic_that_is_missing_is_warned_of_in_the_log_now_and_then() -> None:
+    diagnostics = begun()
+    lines = come(diagnostics, 3.0, (POSE, TWIST))
+    assert lines == [f'setpoints: no setpoint: {ACCEL} never came']
+    assert len(come(diagnostics, 12.0, (POSE, TWIST), BEGIN + 3.0)) == 2
+    # When setpoints are answered again, all is forgotten.
+    answered(diagnostics, BEGIN + 15.0)
+    assert come(diagnostics, 0.5, (POSE, TWIST), BEGIN + 15.0) == []
+
+
+def test_stamps_that_do_not_meet_are_warned_of_in_the_log() -> None:
+    diagnostics = begun()
+    for n in range(3):  # what waited too long was dropped, which explains nothing
+        diagnostics.rejected(Rejection(POSE, NOT_JOINED), f'stamp {n} ns', BEGIN + n)
+    assert come(diagnostics, 3.0, TOPICS) == [
+        'setpoints: no setpoint: all topics arrive, but none is joined: their stamps differ by '
+        'more than setpoint.sync_tolerance, 0 s']
+
+
+def test_nothing_is_warned_of_in_the_log_where_nobody_sends_or_all_is_answered() -> None:
+    diagnostics = begun()
+    assert come(diagnostics, 20.0, ()) == []
+    for n in range(100):  # a setpoint in a second, and reports in the middle of it
+        now = BEGIN + 20.0 + n
+        for topic in TOPICS[:2]:
+            diagnostics.setpoints.heard(topic, now)
+        assert logged(diagnostics, now) == []
+        answered(diagnostics, now + 0.001)
+        assert logged(diagnostics, now + 0.5) == []
+
+
+def test_rejections_are_not_warned_of_twice() -> None:
+    diagnostics = begun()
+    for n in range(100):
+        now = BEGIN + 0.1 * n
+        diagnostics.setpoints.heard(POSE, now)
+        diagnostics.rejected(Rejection(POSE, NOT_FINITE), 'nan', now)
+        assert logged(diagnostics, now) == []
+
+
+# Rejections and writers
 
 def test_refusals_are_counted_with_their_reason_and_warned_of() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
     for _ in range(3):
-        diagnostics.refused(Refusal(TWIST, NOT_FINITE), '(nan, 0.0)', BEGIN)
-    diagnostics.refused(Refusal(POSE, TWICE), 'stamp 5 ns', BEGIN)
+        diagnostics.rejected(Rejection(TWIST, NOT_FINITE), '(nan, 0.0)', BEGIN)
+    diagnostics.rejected(Rejection(POSE, TWICE), 'stamp 5 ns', BEGIN)
     of = status(diagnostics, 'setpoints', BEGIN + 0.01)
     assert of.level == WARN
     assert of.message == f'{POSE}: {TWICE} (stamp 5 ns)'
-    assert dict(of.values)[f'refused, {TWIST}: {NOT_FINITE}'] == '3'
-    assert dict(of.values)[f'refused, {POSE}: {TWICE}'] == '1'
+    assert dict(of.values)[f'rejected, {TWIST}: {NOT_FINITE}'] == '3'
+    assert dict(of.values)[f'rejected, {POSE}: {TWICE}'] == '1'
     # the warning ends, the count stays
     answered(diagnostics, BEGIN + 5.0)
     of = status(diagnostics, 'setpoints', BEGIN + 5.0)
     assert of.level == OK
-    assert dict(of.values)[f'refused, {TWIST}: {NOT_FINITE}'] == '3'
+    assert dict(of.values)[f'rejected, {TWIST}: {NOT_FINITE}'] == '3'
 
 
 def test_several_writers_of_a_topic_are_an_error() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    diagnostics.writers = {POSE: 1, TWIST: 2, ACCEL: 1}
+    diagnostics.setpoints.found({POSE: 1, TWIST: 2, ACCEL: 1}, {}, '/node', 1)
     of = status(diagnostics, 'setpoints', BEGIN)
     assert (of.level, of.message) == (ERROR, f'{TWIST} has 2 writers')
     assert dict(of.values)[f'{TWIST}: writers'] == '2'
@@ -194,17 +261,17 @@ def test_several_writers_of_a_topic_are_an_error() -> None:
 def test_another_node_of_the_same_name_is_an_error() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    diagnostics.namesakes = '/ns/node', 3
+    diagnostics.setpoints.found({}, {}, '/ns/node', 3)
     of = status(diagnostics, 'setpoints', BEGIN)
     assert (of.level, of.message) == (ERROR, '3 nodes are named /ns/node')
-    diagnostics.namesakes = '/ns/node', 1
+    diagnostics.setpoints.found({}, {}, '/ns/node', 1)
     assert status(diagnostics, 'setpoints', BEGIN).level == OK
 
 
 def test_an_error_is_not_covered_by_silence_and_says_that_too() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
-    diagnostics.writers = dict.fromkeys(TOPICS, 2)
+    diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {}, '/node', 1)
     of = status(diagnostics, 'setpoints', BEGIN + 3.0)
     assert of.level == ERROR
     assert of.message == (
@@ -215,8 +282,8 @@ def test_an_error_is_not_covered_by_silence_and_says_that_too() -> None:
 def test_where_all_is_refused_silence_is_not_said_to_be_of_stamps() -> None:
     diagnostics = begun()
     for topic in TOPICS:
-        diagnostics.heard(topic, BEGIN)
-    diagnostics.refused(Refusal(POSE, NOT_FINITE), 'nan', BEGIN)
+        diagnostics.setpoints.heard(topic, BEGIN)
+    diagnostics.rejected(Rejection(POSE, NOT_FINITE), 'nan', BEGIN)
     of = status(diagnostics, 'setpoints', BEGIN + 0.01)
     assert (of.level, of.message) == (STALE, f'no setpoint: {POSE}: {NOT_FINITE} (nan)')
 
@@ -226,7 +293,7 @@ def test_where_all_is_refused_silence_is_not_said_to_be_of_stamps() -> None:
 def test_processing_times_are_those_of_the_last_seconds() -> None:
     diagnostics = begun()
     assert status(diagnostics, 'timing', BEGIN)[1:] == (
-        OK, 'no setpoint yet', (('passed over', '0'), ('incomplete', '0')))
+        OK, 'no setpoint yet', (('dropped', '0'), ('incomplete', '0')))
     for took in (100e-6, 900e-6, 200e-6):
         answered(diagnostics, BEGIN, took=took)
     of = status(diagnostics, 'timing', BEGIN)
@@ -245,16 +312,16 @@ def test_processing_times_are_those_of_the_last_seconds() -> None:
 def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> None:
     diagnostics = begun()
     for n in range(3):
-        diagnostics.refused(Refusal('setpoint', PASSED_OVER), f'stamp {n} ns', BEGIN)
-    diagnostics.refused(Refusal(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
-    diagnostics.refused(Refusal(POSE, TWICE), 'stamp 4 ns', BEGIN)
+        diagnostics.rejected(Rejection('setpoint', DROPPED), f'stamp {n} ns', BEGIN)
+    diagnostics.rejected(Rejection(POSE, NOT_JOINED), 'stamp 3 ns', BEGIN)
+    diagnostics.rejected(Rejection(POSE, TWICE), 'stamp 4 ns', BEGIN)
     answered(diagnostics, BEGIN + 0.5)
     of = status(diagnostics, 'timing', BEGIN + 0.5)
-    assert (of.level, of.message) == (WARN, f'setpoint: {PASSED_OVER} (stamp 2 ns)')
+    assert (of.level, of.message) == (WARN, f'setpoint: {DROPPED} (stamp 2 ns)')
     answered(diagnostics, BEGIN + 1.5)
     of = status(diagnostics, 'timing', BEGIN + 1.5)
     assert (of.level, of.message) == (OK, 'on time')
-    assert of.values[-2:] == (('passed over', '3'), ('incomplete', '1'))
+    assert of.values[-2:] == (('dropped', '3'), ('incomplete', '1'))
 
 
 def test_what_is_said_of_the_last_setpoint_says_how_old_it_is() -> None:
@@ -282,15 +349,88 @@ def test_a_clear_motion_is_ok() -> None:
     assert values['its leg'] in PARAMETERS['joints']
 
 
-@pytest.mark.parametrize('cause', [Cause.CONDITION, Cause.FORETOLD, Cause.CROSSED])
-def test_a_warning_says_its_cause(cause: Cause) -> None:
+@pytest.mark.parametrize(('cause', 'condition', 'time', 'message'), [
+    (Cause.CONDITION, 30.0, 9.0, 'condition number 30 exceeds singularity.warn_condition, 20'),
+    # The warning ends only below 0.8 of it, and the text is not of the number before.
+    (Cause.CONDITION, 17.5, 9.0, 'condition number 17.5 has exceeded singularity.warn_condition, '
+     '20, and is not yet below 16'),
+    (Cause.PREDICTED, 5.0, 0.25, 'crossing of det(J) = 0 predicted in 0.25 s, '
+     'singularity.warn_time is 0.5 s'),
+    (Cause.PREDICTED, 5.0, 0.6, 'crossing of det(J) = 0 predicted in 0.6 s, '
+     'singularity.warn_time is 0.5 s (the warning ends above 0.625 s)')])
+def test_a_warning_says_its_cause_with_its_own_numbers(
+        cause: Cause, condition: float, time: float, message: str) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, CLEAR._replace(singularity=Singularity(
-        cause=cause, time_to_crossing=0.25, crossings=4)))
+    answered(diagnostics, BEGIN, CLEAR._replace(condition=condition, singularity=Singularity(
+        cause=cause, time_to_crossing=time, crossings=4)))
     of = status(diagnostics, 'singularity', BEGIN)
-    assert (of.level, of.message) == (WARN, cause.value)
-    assert dict(of.values)['time to crossing (s)'] == '0.250'
+    assert (of.level, of.message) == (WARN, message)
+    assert dict(of.values)['time to crossing (s)'] == f'{time:.3f}'
     assert dict(of.values)['crossings'] == '4'
+
+
+def near(condition: float, stamp: int = 0) -> Output:
+    """Return an output inside warn_condition."""
+    return CLEAR._replace(stamp=stamp, condition=condition,
+                          singularity=Singularity(cause=Cause.CONDITION))
+
+
+def test_what_is_past_is_said_with_its_own_number_and_since_when() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN, near(23.5))
+    answered(diagnostics, BEGIN + 0.4, CLEAR._replace(condition=7.42))
+    of = status(diagnostics, 'singularity', BEGIN + 0.4)
+    assert (of.level, of.message) == (
+        WARN, 'condition number 23.5 exceeds singularity.warn_condition, 20 (0.4 s ago)')
+    assert dict(of.values)['condition number'] == '7.42'
+    assert status(diagnostics, 'singularity', BEGIN + 1.0).message.startswith('clear')
+
+
+def test_a_crossing_is_one_line_in_the_log_with_stamp_and_time() -> None:
+    diagnostics = begun()
+    answered(diagnostics, BEGIN, near(23.5, 1_700_000_000_120_000_000)._replace(determinant=0.3))
+    assert [level for level, _ in logged(diagnostics, BEGIN)] == [WARN]
+    crossing = CLEAR._replace(
+        stamp=1_700_000_000_130_000_001, condition=30.0, determinant=-0.1,
+        singularity=Singularity(cause=Cause.CROSSED, crossings=1))
+    assert answered(diagnostics, BEGIN + 0.01, crossing), 'it is reported at once'
+    line = 'det(J) crossed zero 0.0025 s before stamp 1700000000.130000001 s'
+    assert (ERROR, f'singularity: {line}') in logged(diagnostics, BEGIN + 0.01)
+    for n in range(2, 300):
+        now = BEGIN + 0.01 * n
+        answered(diagnostics, now, near(25.0) if n < 50 else CLEAR)
+        of = status(diagnostics, 'singularity', now)
+        assert of.level == (ERROR if now < BEGIN + 1.01 else WARN if now < BEGIN + 1.49 else OK)
+        assert (line in of.message) == (of.level == ERROR)
+        # status asks for a report, whose lines are of the log
+        assert not any('crossed' in text for _, text in logged(diagnostics, now))
+
+
+def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden() -> None:
+    diagnostics = begun()
+    inside = CLEAR._replace(condition=1e4, forces=None, singularity=Singularity(
+        cause=Cause.CONDITION, stopped=True))
+    answered(diagnostics, BEGIN, inside)
+    logged(diagnostics, BEGIN)
+    assert answered(diagnostics, BEGIN + 0.01, inside._replace(
+        stamp=1, singularity=Singularity(cause=Cause.CROSSED, stopped=True)))
+    of = status(diagnostics, 'singularity', BEGIN + 0.01)
+    assert of.level == ERROR
+    assert 'det(J) crossed zero' in of.message
+    assert 'inside stop_condition: forces suppressed' in of.message
+
+
+def test_crossings_by_the_hundred_do_not_bring_a_report_each() -> None:
+    diagnostics = begun()
+    crossing = CLEAR._replace(singularity=Singularity(cause=Cause.CROSSED))
+    reports = lines = 0
+    for n in range(100):
+        now = BEGIN + 0.02 * n
+        if answered(diagnostics, now, crossing._replace(stamp=n)):
+            reports += 1
+            lines += len(logged(diagnostics, now))
+    assert reports == 2
+    assert 51 <= lines <= 100, 'none is forgotten'
 
 
 @pytest.mark.parametrize('setpoint', [QUARTER, FLAT])
@@ -342,17 +482,17 @@ def test_held_limits_are_ok() -> None:
 
 
 @pytest.mark.parametrize(('excess', 'words'), [
-    (Excess('limits.length_min', 0, 0.9, 0.95),
+    (Exceedance('limits.length_min', 0, 0.9, 0.95),
      'leg_1: length 0.9 m is 0.05 m beyond limits.length_min'),
-    (Excess('limits.length_max', 1, 1.75, 1.5),
+    (Exceedance('limits.length_max', 1, 1.75, 1.5),
      'leg_2: length 1.75 m is 0.25 m beyond limits.length_max'),
-    (Excess('limits.velocity_max', 2, -0.75, 0.5),
+    (Exceedance('limits.velocity_max', 2, -0.75, 0.5),
      'leg_3: rate -0.75 m/s is 0.25 m/s beyond limits.velocity_max'),
-    (Excess('limits.force_max', 5, -7000.0, 6000.0),
+    (Exceedance('limits.force_max', 5, -7000.0, 6000.0),
      'leg_6: force -7000 N is 1000 N beyond limits.force_max, clipped')])
-def test_a_broken_limit_is_an_error_that_says_by_how_much(excess: Excess, words: str) -> None:
+def test_a_broken_limit_is_an_error_that_says_by_how_much(excess: Exceedance, words: str) -> None:
     diagnostics = begun()
-    answered(diagnostics, BEGIN, CLEAR._replace(excesses=(excess,)))
+    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
     of = status(diagnostics, 'limits', BEGIN)
     assert (of.level, of.message) == (ERROR, words)
 
@@ -371,59 +511,97 @@ def test_a_clipped_force_is_said_as_the_leg_would_need_it() -> None:
                 'limits.force_max, clipped') in of.message
 
 
+def test_a_limit_hides_no_other() -> None:
+    diagnostics = begun()
+    rate = Exceedance('limits.velocity_max', 2, 0.5001, 0.5)
+    force = Exceedance('limits.force_max', 0, 2.4e6, 6000.0)
+    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(rate, force)))
+    answered(diagnostics, BEGIN + 0.5, CLEAR._replace(exceedances=(rate,)))
+    words = [excess.words(PARAMETERS['joints']) for excess in (rate, force)]
+    of = status(diagnostics, 'limits', BEGIN + 0.5)
+    assert of.message == f'{words[0]}; {words[1]}, clipped (0.5 s ago)'
+    values = dict(of.values)
+    assert values['setpoints that exceed limits.velocity_max'] == '2'
+    assert values['setpoints that exceed limits.force_max'] == '1'
+    assert values['worst since activation, limits.force_max'] == f'{words[1]}, clipped'
+    assert not any('length' in key for key in values if 'limits.' in key)
+
+
+def test_each_kind_of_limit_is_logged_when_it_is_exceeded_and_when_no_longer() -> None:
+    diagnostics = begun()
+    rate = Exceedance('limits.velocity_max', 2, 0.5001, 0.5)
+    force, less = (Exceedance('limits.force_max', 0, value, 6000.0) for value in (2.4e6, 7e3))
+    joints, lines = PARAMETERS['joints'], []
+    for n in range(600):
+        now = BEGIN + 0.01 * n
+        excesses = (rate, less if n % 2 else force) if 100 <= n < 341 else (rate,)
+        answered(diagnostics, now, CLEAR._replace(exceedances=excesses))
+        lines += logged(diagnostics, now)
+    assert lines == [
+        (ERROR, f'limits: {rate.words(joints)}'),
+        (ERROR, f'limits: {force.words(joints)}, clipped'),
+        (OK, 'limits: limits.force_max: no longer exceeded; 241 setpoints since activation, '
+         f'worst: {force.words(joints)}, clipped')]
+
+
+def test_the_largest_force_is_kept_until_the_next_activation() -> None:
+    diagnostics = begun()
+    forces = CLEAR.demanded_forces
+    assert forces is not None
+    key, leg = 'largest force demanded since activation (N)', 'leg of the largest force demanded'
+    for largest, at in ((1e4, 3), (-2.5e4, 5), (2e4, 0)):
+        peak = (*forces[:at], largest, *forces[at + 1:])
+        answered(diagnostics, BEGIN, CLEAR._replace(demanded_forces=peak))
+    for after in (0.0, 100.0):
+        answered(diagnostics, BEGIN + after)
+        values = dict(status(diagnostics, 'limits', BEGIN + after).values)
+        assert (values[key], values[leg]) == ('-25000', 'leg_6')
+    diagnostics = begun()
+    answered(diagnostics, BEGIN, CLEAR._replace(demanded_forces=None))
+    assert key not in dict(status(diagnostics, 'limits', BEGIN).values)
+
+
 # Levels over time
 
 def test_a_level_holds_for_a_second_after_its_cause() -> None:
     diagnostics = begun()
-    excess = Excess('limits.force_max', 0, 2.0, 1.0)
-    answered(diagnostics, BEGIN, CLEAR._replace(excesses=(excess,)))
+    excess = Exceedance('limits.force_max', 0, 2.0, 1.0)
+    answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
     for after in (0.1, 0.5, 0.99):
         answered(diagnostics, BEGIN + after)
         assert status(diagnostics, 'limits', BEGIN + after).level == ERROR
     assert status(diagnostics, 'limits', BEGIN + 1.0).level == OK
-    answered(diagnostics, BEGIN + 3.0, CLEAR._replace(excesses=(excess,)))
-    answered(diagnostics, BEGIN + 3.9, CLEAR._replace(excesses=(excess,)))
+    answered(diagnostics, BEGIN + 3.0, CLEAR._replace(exceedances=(excess,)))
+    answered(diagnostics, BEGIN + 3.9, CLEAR._replace(exceedances=(excess,)))
     assert status(diagnostics, 'limits', BEGIN + 4.8).level == ERROR
 
 
 def test_a_worse_level_is_not_covered_by_a_lesser_one() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, output_of(QUARTER))
-    near = CLEAR._replace(singularity=Singularity(cause=Cause.CONDITION))
     for after in (0.2, 0.9):
-        answered(diagnostics, BEGIN + after, near)
+        answered(diagnostics, BEGIN + after, near(25.0))
         assert status(diagnostics, 'singularity', BEGIN + after).level == ERROR
-    answered(diagnostics, BEGIN + 1.1, near)
+    answered(diagnostics, BEGIN + 1.1, near(25.0))
     assert status(diagnostics, 'singularity', BEGIN + 1.1).level == WARN
-
-
-def test_a_crossing_is_said_for_a_second_whatever_comes_after_it() -> None:
-    diagnostics = begun()
-    for n, cause in enumerate((Cause.FORETOLD, Cause.CROSSED, Cause.CONDITION, Cause.CONDITION)):
-        answered(diagnostics, BEGIN + 0.001 * n, CLEAR._replace(singularity=Singularity(cause)))
-    for after, message in ((0.9, Cause.CROSSED.value), (1.1, Cause.CONDITION.value)):
-        answered(diagnostics, BEGIN + after,
-                 CLEAR._replace(singularity=Singularity(Cause.CONDITION)))
-        of = status(diagnostics, 'singularity', BEGIN + after)
-        assert (of.level, of.message) == (WARN, message)
 
 
 def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
     diagnostics = begun()
-    diagnostics.report(BEGIN)
-    assert not diagnostics.level_changed(BEGIN)
+    diagnostics.report.make(BEGIN)
+    assert not diagnostics.report.level_changed(BEGIN)
     assert answered(diagnostics, BEGIN)  # from stale to ok
-    assert diagnostics.level_changed(BEGIN)
-    diagnostics.report(BEGIN)
+    assert diagnostics.report.level_changed(BEGIN)
+    diagnostics.report.make(BEGIN)
     assert not answered(diagnostics, BEGIN + 0.01)
-    diagnostics.refused(Refusal(POSE, TWICE), '', BEGIN + 0.01)
-    assert diagnostics.level_changed(BEGIN + 0.01)
-    diagnostics.report(BEGIN + 0.01)
+    diagnostics.rejected(Rejection(POSE, TWICE), '', BEGIN + 0.01)
+    assert diagnostics.report.level_changed(BEGIN + 0.01)
+    diagnostics.report.make(BEGIN + 0.01)
     assert not answered(diagnostics, BEGIN + 0.02)
     assert answered(diagnostics, BEGIN + 0.03, output_of(QUARTER))
-    diagnostics.report(BEGIN + 0.03)
-    assert not diagnostics.level_changed(BEGIN + 0.04)
-    assert diagnostics.level_changed(BEGIN + 0.14)  # stale
+    diagnostics.report.make(BEGIN + 0.03)
+    assert not diagnostics.report.level_changed(BEGIN + 0.04)
+    assert diagnostics.report.level_changed(BEGIN + 0.14)  # stale
 
 
 # Every value
@@ -431,12 +609,14 @@ def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
 UNIT = re.compile(r'\((m|m/s|N|s|us|s ago|Hz|m\^3|m\^3/s)\)$')
 PLAIN = re.compile(
     r'setpoints answered|crossings|condition number|worst condition number of the last second'
-    r'|largest leg force under a unit load|its leg|refused, .*|.*: (?:writers|readers)|passed over'
+    r'|largest leg force under a unit load|its leg|rejected, .*|.*: (?:writers|readers)|dropped'
+    r'|worst condition number since activation|leg of the largest force demanded'
+    r'|setpoints that exceed limits\.\w+|worst since activation, limits\.\w+'
     r'|incomplete')
 
 
-def _check_values(diagnostics: Diagnostics, now: float) -> None:
-    for of in diagnostics.report(now):
+def _check_values(diagnostics: DynamicsDiagnostics, now: float) -> None:
+    for of in report(diagnostics, now):
         assert of.level in (OK, WARN, ERROR, STALE)
         assert of.message
         keys = [key for key, _ in of.values]
@@ -463,12 +643,11 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
         now += pause
         output = step(Setpoint(0, (*position, *rotation, *rates)), state)
         if output is None:
-            diagnostics.refused(Refusal('setpoint', 'out of range'), '', now)
+            diagnostics.rejected(Rejection('setpoint', 'out of range'), '', now)
         else:
             answered(diagnostics, now, output)
             state = output.singularity
-        diagnostics.writers = {POSE: 2}
-        diagnostics.readers = {'leg_states': 1}
+        diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '/node', 1)
         _check_values(diagnostics, now)
 
 

@@ -74,10 +74,10 @@ def test_efforts_are_what_rosbags_wrote(data: st.DataObject) -> None:
             effort = data.draw(st.lists(numbers, min_size=len(names), max_size=len(names)))
             messages.append(joint_state(stamp, names, effort, frame, *counts, little))
             expected.append((stamp, [effort[names.index(joint)] for joint in JOINTS]))
-    stamps, efforts, refused = Efforts(JOINTS).read(*joined(messages))
+    stamps, efforts, rejected = Efforts(JOINTS).read(*joined(messages))
     assert stamps.tolist() == [stamp for stamp, _ in expected]
     assert efforts.tolist() == [effort for _, effort in expected]
-    assert refused == {}
+    assert rejected == {}
 
 
 def test_many_layouts_in_many_calls_keep_their_order() -> None:
@@ -87,18 +87,18 @@ def test_many_layouts_in_many_calls_keep_their_order() -> None:
         messages = [joint_state(call * 100 + n, [*JOINTS, 'x' * (n % 12)], [float(n)] * 7)
                     for n in range(60)]
         buffer, starts, sizes = joined(messages)
-        stamps, read, refused = efforts.read(
+        stamps, read, rejected = efforts.read(
             np.frombuffer(buffer, dtype=np.uint8), np.array(starts), np.array(sizes))
         assert stamps.tolist() == [call * 100 + n for n in range(60)]
         assert read[:, 0].tolist() == [float(n) for n in range(60)]
-        assert refused == {}
+        assert rejected == {}
 
 
-def test_what_is_no_effort_is_refused_and_counted() -> None:
+def test_what_is_no_effort_is_rejected_and_counted() -> None:
     good = joint_state(7, JOINTS, range(6))
     bad = {
         'without effort': [joint_state(1, JOINTS, [], positions=6)] * 2,
-        'not as many efforts as names': [joint_state(1, JOINTS, range(5)),
+        'not as many numbers as names': [joint_state(1, JOINTS, range(5)),
                                          joint_state(1, JOINTS, range(7)),
                                          joint_state(1, [*JOINTS, 'more'], range(6))],
         'not finite': [joint_state(1, JOINTS, [0, 1, 2, value, 4, 5])
@@ -113,17 +113,17 @@ def test_what_is_no_effort_is_refused_and_counted() -> None:
     for each in bad.values():
         messages += [*each, good]
     for turn in (1, -1):
-        stamps, efforts, refused = Efforts(JOINTS).read(*joined(messages[::turn]))
+        stamps, efforts, rejected = Efforts(JOINTS).read(*joined(messages[::turn]))
         assert stamps.tolist() == [7] * 6
         assert efforts.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] * 6
-        assert refused == {reason: len(each) for reason, each in bad.items()}
+        assert rejected == {reason: len(each) for reason, each in bad.items()}
 
 
 def test_numbers_of_joints_that_are_not_asked_for_may_be_anything() -> None:
     message = joint_state(7, ['gripper', *JOINTS], [math.nan, *range(6)])
-    _, efforts, refused = Efforts(JOINTS).read(*joined([message]))
+    _, efforts, rejected = Efforts(JOINTS).read(*joined([message]))
     assert efforts.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]]
-    assert refused == {}
+    assert rejected == {}
 
 
 def test_what_stands_in_the_gaps_between_fields_does_not_count() -> None:
@@ -144,8 +144,8 @@ def test_what_stands_in_the_gaps_between_fields_does_not_count() -> None:
             continue
         if same:
             gaps += 1
-            _, numbers, refused = efforts.read(*joined([spoiled]))
-            assert numbers.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] and not refused
+            _, numbers, rejected = efforts.read(*joined([spoiled]))
+            assert numbers.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] and not rejected
     assert gaps > 6
 
 
@@ -160,8 +160,8 @@ def test_spoiled_bytes_never_break_it() -> None:
         messages.append(bytes(message[:random.integers(0, len(good) + 1)]
                               if random.random() < 0.3 else message))
     # the good one first: else it could be that none has all the joints
-    stamps, efforts, refused = Efforts(JOINTS).read(*joined([good, *messages]))
-    assert len(stamps) + sum(refused.values()) == 2001
+    stamps, efforts, rejected = Efforts(JOINTS).read(*joined([good, *messages]))
+    assert len(stamps) + sum(rejected.values()) == 2001
     assert np.isfinite(efforts).all()
     assert stamps[0] == 7
 
@@ -169,8 +169,8 @@ def test_spoiled_bytes_never_break_it() -> None:
 def test_a_joint_that_no_message_has_is_named() -> None:
     names = ['leg_1', 'leg_2', 'leg_3', 'leg_4', 'leg_5', 'cylinder_6']
     efforts = Efforts(JOINTS)
-    stamps, _, refused = efforts.read(*joined([joint_state(1, names, range(6))]))
-    assert not len(stamps) and refused == {'lacks one of the joints': 1}
+    stamps, _, rejected = efforts.read(*joined([joint_state(1, names, range(6))]))
+    assert not len(stamps) and rejected == {'lacks one of the joints': 1}
     with pytest.raises(BagError, match='no message has leg_6; there are leg_1, .*, cylinder_6:'):
         efforts.check()
     # many of them are said at once
@@ -190,6 +190,6 @@ def test_another_publishers_joints_are_no_mistake() -> None:
 
 def test_no_messages_give_nothing() -> None:
     efforts = Efforts(JOINTS)
-    stamps, values, refused = efforts.read(b'', [], [])
-    assert stamps.shape == (0,) and values.shape == (0, 6) and refused == {}
+    stamps, values, rejected = efforts.read(b'', [], [])
+    assert stamps.shape == (0,) and values.shape == (0, 6) and rejected == {}
     efforts.check()

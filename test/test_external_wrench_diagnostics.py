@@ -23,11 +23,13 @@ from test_external_wrench import (
     BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, UNFILTERED)
 
 from stewart_dynamics import Motion
-from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.messages.joint_state import MISSING_JOINTS
+from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.runtime.diagnostics.external_wrench import ExternalWrenchDiagnostics
+from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench
-from stewart_dynamics.runtime.external_wrench_diagnostics import WrenchDiagnostics
-from stewart_dynamics.runtime.measured_legs import LACKING, MEASURED_LEGS
-from stewart_dynamics.runtime.setpoints import Refusal
+from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
+from stewart_dynamics.runtime.rejections import Rejection
 
 TARGET = tuple(HOME.rows.tolist())
 
@@ -45,41 +47,40 @@ CLEAR = found()
 OVER = found(force_max=300.0, moment_max=100.0)
 
 
-def felt(diagnostics: WrenchDiagnostics, now: float, estimate: Estimate = CLEAR) -> bool:
+def felt(diagnostics: ExternalWrenchDiagnostics, now: float, estimate: Estimate = CLEAR) -> bool:
     diagnostics.heard(now)
     return diagnostics.estimated(estimate, TARGET, now)
 
 
-def status(diagnostics: WrenchDiagnostics, now: float) -> Status:
-    only, = diagnostics.report(now)
+def status(diagnostics: ExternalWrenchDiagnostics, now: float) -> Status:
+    only = diagnostics.status(now)
+    assert only is not None
     assert only.name == 'external wrench'
     assert only.level == diagnostics.level(now)
     return only
 
 
 def test_there_is_none_before_a_measurement_has_come() -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
-    assert diagnostics.report(5.0) == ()
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+    assert diagnostics.status(5.0) is None
     assert diagnostics.level(1e9) == OK
     diagnostics.heard(6.0)
-    assert len(diagnostics.report(6.0)) == 1
+    assert diagnostics.status(6.0) is not None
 
 
 def test_it_comes_behind_the_others() -> None:
-    wrench = WrenchDiagnostics(MACHINE)
-    diagnostics = Diagnostics(MACHINE, (), 0.0, [wrench])
-    assert [each.name for each in diagnostics.report(0.0)] == [
-        'setpoints', 'singularity', 'limits', 'timing']
-    assert not diagnostics.level_changed(0.0)
-    felt(wrench, 0.1, OVER)
-    assert diagnostics.level_changed(0.1)
-    assert [each.name for each in diagnostics.report(0.1)] == [
-        'setpoints', 'singularity', 'limits', 'timing', 'external wrench']
-    assert not diagnostics.level_changed(0.1)
+    diagnostics = DynamicsDiagnostics(MACHINE, ('setpoint/pose',), 0.0)
+    names = ['setpoints', 'singularity', 'limits', 'timing']
+    assert [each.name for each in diagnostics.report.make(0.0)[0]] == names
+    assert not diagnostics.report.level_changed(0.0)
+    felt(diagnostics.external_wrench, 0.1, OVER)
+    assert diagnostics.report.level_changed(0.1)
+    assert [each.name for each in diagnostics.report.make(0.1)[0]] == [*names, 'external wrench']
+    assert not diagnostics.report.level_changed(0.1)
 
 
 def test_its_keys_are_what_is_felt() -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
     felt(diagnostics, 1.0)
     now = status(diagnostics, 1.05)
     assert (now.level, now.message) == (OK, 'no overload')
@@ -102,7 +103,7 @@ def test_its_keys_are_what_is_felt() -> None:
 
 @pytest.mark.parametrize('angle', [1e-9, 1e-3, 1.0, 3.0])
 def test_how_far_it_is_from_the_setpoint(angle: float) -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
     target = Motion([0.003, 0.0, 1.104], rotation_about(axis, angle))
     diagnostics.heard(1.0)
@@ -115,16 +116,16 @@ def test_how_far_it_is_from_the_setpoint(angle: float) -> None:
 
 
 def test_an_overload_is_an_error_and_held_for_a_second() -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
     assert not felt(diagnostics, 1.0)
     assert status(diagnostics, 1.0).level == OK
     assert felt(diagnostics, 1.01, OVER)
     now = status(diagnostics, 1.01)
     assert now.level == ERROR
     assert now.message == (
-        f'force {OVER.force:.6g} N is {OVER.force - 300.0:.6g} N beyond '
+        f'force {OVER.force:.6g} N is {OVER.force - 300.0:.6g} N above '
         f'external_wrench.force_max, moment {OVER.moment:.6g} N m is '
-        f'{OVER.moment - 100.0:.6g} N m beyond external_wrench.moment_max')
+        f'{OVER.moment - 100.0:.6g} N m above external_wrench.moment_max')
     assert not felt(diagnostics, 1.5)
     assert status(diagnostics, 1.5).level == ERROR
     assert felt(diagnostics, 2.02)
@@ -132,7 +133,7 @@ def test_an_overload_is_an_error_and_held_for_a_second() -> None:
 
 
 def test_silence_is_stale() -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
     felt(diagnostics, 1.0)
     assert status(diagnostics, 1.09).level == OK
     now = status(diagnostics, 3.5)
@@ -142,7 +143,7 @@ def test_silence_is_stale() -> None:
 
 
 def test_measurements_that_are_too_far_apart_are_stale() -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
     for now in (1.0, 1.5, 2.0):
         felt(diagnostics, now, FIRST)
     of = status(diagnostics, 2.0)
@@ -152,18 +153,20 @@ def test_measurements_that_are_too_far_apart_are_stale() -> None:
     assert 'distance from the last setpoint (m)' in dict(of.values)
 
 
-def test_a_refusal_is_told_and_counted() -> None:
-    diagnostics = WrenchDiagnostics(MACHINE)
+def test_a_rejection_is_told_and_counted() -> None:
+    diagnostics = ExternalWrenchDiagnostics(MACHINE)
     felt(diagnostics, 1.0)
-    diagnostics.refused(Refusal(MEASURED_LEGS, LACKING), 'leg_6', 1.01)
+    diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.01)
     now = status(diagnostics, 1.02)
     assert (now.level, now.message) == (
         WARN, 'measured_legs: lacks one of the joints (leg_6)')
-    assert dict(now.values)['refused, measured_legs: lacks one of the joints'] == '1'
+    assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '1'
+    assert [(level, text) for level, text, _ in diagnostics.log_lines(1.02)] == [
+        (WARN, 'external wrench: measured_legs: lacks one of the joints (leg_6)')]
     for n in range(10):
         diagnostics.heard(1.1 + 0.1 * n)
-        diagnostics.refused(Refusal(MEASURED_LEGS, LACKING), 'leg_6', 1.1 + 0.1 * n)
+        diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.1 + 0.1 * n)
     now = status(diagnostics, 2.0)
     assert (now.level, now.message) == (
         STALE, 'no wrench: measured_legs: lacks one of the joints (leg_6)')
-    assert dict(now.values)['refused, measured_legs: lacks one of the joints'] == '11'
+    assert dict(now.values)['rejected, measured_legs: lacks one of the joints'] == '11'

@@ -116,7 +116,7 @@ def test_the_residual_wrench_is_the_negative_of_the_load_that_touched(seed: int)
     assert np.array_equal(computed, case.outputs.demanded_forces)
     assert np.max(np.abs(wrench + load)) < 1e-9 * np.max(np.abs(forces))
     # by the library's matrix
-    j_inv = StewartPlatform(case.parameters).jacobian(case.motion.position, case.motion.rotation)
+    j_inv = StewartPlatform(case.parameters).inverse_jacobian(case.motion)
     assert np.allclose(wrench, np.einsum('nij,ni->nj', j_inv, measured - computed),
                        rtol=0.0, atol=1e-9 * np.max(np.abs(forces)))
 

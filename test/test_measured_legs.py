@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages on ~/measured_legs: any layout, any order of names, and every reason of refusal."""
+"""Messages on ~/measured_legs: any layout, any order of names, and every reason of rejection."""
 
 from __future__ import annotations
 
@@ -28,13 +28,14 @@ import pytest
 from test_external_wrench import (
     BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, six, swing)
 
-from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
 from stewart_dynamics.runtime.measured_legs import (
-    LACKING, MEASURED_LEGS, MeasuredLegs, NO_POSE, SINGULAR, UNEVEN, UNSTAMPED, WITHOUT)
-from stewart_dynamics.runtime.setpoints import (
-    MALFORMED, NOT_FINITE, OUT_OF_RANGE, Refusal, TOO_OLD, TWICE)
+    MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
+from stewart_dynamics.runtime.rejections import (
+    MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
 
 KIND = 'sensor_msgs/msg/JointState'
 JOINTS = list(MACHINE['joints'])
@@ -61,22 +62,23 @@ class Followed:
     """Measured legs, and what was said of them."""
 
     def __init__(self, parameters: Parameters = MACHINE) -> None:
-        self.refused: list[tuple[Refusal, str]] = []
+        self.rejected: list[tuple[Rejection, str]] = []
         self.noticed: list[str] = []
         self._legs = MeasuredLegs(
             parameters, ExternalWrench(parameters),
-            lambda refusal, details: self.refused.append((refusal, details)), self.noticed.append)
+            lambda rejection, details: self.rejected.append((rejection, details)),
+            self.noticed.append)
 
     def take(self, data: bytes) -> Estimate | None:
         return self._legs.take(data, NO_WRENCH, TARGET)
 
-    def refuses(self, data: bytes, reason: str, details: str) -> None:
-        """Check that a message is refused, for which reason and with which details."""
-        many = len(self.refused)
+    def rejects(self, data: bytes, reason: str, details: str) -> None:
+        """Check that a message is rejected, for which reason and with which details."""
+        many = len(self.rejected)
         assert self.take(data) is None
-        assert len(self.refused) == many + 1
-        refusal, said = self.refused[-1]
-        assert refusal == (MEASURED_LEGS, reason)
+        assert len(self.rejected) == many + 1
+        rejection, said = self.rejected[-1]
+        assert rejection == (MEASURED_LEGS, reason)
         assert details in said
         assert '\n' not in said
 
@@ -90,7 +92,7 @@ EXPECTED = estimates(ExternalWrench(MACHINE), [
 def test_what_comes_of_messages_is_what_the_step_makes_of_their_numbers() -> None:
     followed = Followed()
     assert [followed.take(message_of(each)) for each in REST] == EXPECTED
-    assert not followed.refused
+    assert not followed.rejected
     assert not followed.noticed
 
 
@@ -113,7 +115,7 @@ def test_any_order_of_names_with_others_among_them(data: st.DataObject) -> None:
             arrays.append([of.get(name, math.nan) for name in names])
         assert followed.take(joint_state(
             at.stamp, names, *arrays, frame=frame, little_endian=little_endian)) == EXPECTED[n]
-    assert not followed.refused
+    assert not followed.rejected
 
 
 def test_bytes_that_only_fill_are_not_looked_at() -> None:
@@ -122,10 +124,10 @@ def test_bytes_that_only_fill_are_not_looked_at() -> None:
     for at, filling in zip(REST[:8], (b'', b'\0', b'\0', b'\xff\xff\xff', b'', b'\1', b'\2', b''),
                            strict=True):
         assert followed.take(message_of(at, frame='abc') + filling) is not None
-    assert not followed.refused
+    assert not followed.rejected
 
 
-# Refusals
+# Rejections
 
 def changed(**fields: Any) -> Callable[[Measurement], bytes]:
     """Return what makes a message with other fields of a measurement."""
@@ -137,11 +139,11 @@ def changed(**fields: Any) -> Callable[[Measurement], bytes]:
 
 
 @pytest.mark.parametrize(('make', 'reason', 'details'), [
-    (changed(names=[*JOINTS[:5], 'elbow']), LACKING,
+    (changed(names=[*JOINTS[:5], 'elbow']), MISSING_JOINTS,
      'leg_6; there are leg_1, leg_2, leg_3, leg_4, leg_5, elbow'),
-    (changed(names=[], position=[], velocity=[], effort=[]), LACKING, 'there are none'),
-    (changed(position=[]), WITHOUT, 'no position'),
-    (changed(velocity=[], effort=[]), WITHOUT, 'no velocity and no effort'),
+    (changed(names=[], position=[], velocity=[], effort=[]), MISSING_JOINTS, 'there are none'),
+    (changed(position=[]), 'without position', '6 names'),
+    (changed(velocity=[], effort=[]), 'without velocity and effort', '6 names'),
     (changed(effort=[1.0] * 5), UNEVEN, '6 names, 5 of effort'),
     (changed(names=[*JOINTS, 'elbow']), UNEVEN,
      '7 names, 6 of position, 6 of velocity, 6 of effort'),
@@ -149,9 +151,9 @@ def changed(**fields: Any) -> Callable[[Measurement], bytes]:
     (changed(velocity=[0.0] * 5 + [math.inf]), NOT_FINITE, 'inf'),
     (changed(effort=[-math.inf] + [0.0] * 5), NOT_FINITE, '-inf'),
     (changed(velocity=[1e308] * 6), OUT_OF_RANGE, f'stamp {BEGIN + MILLISECOND} ns'),
-    (changed(position=[9.0, 0.3, 0.3, 0.3, 0.3, 0.3]), NO_POSE,
-     'lengths [9.95, 1.25, 1.25, 1.25, 1.25, 1.25] m: after '),
-    (changed(position=[-3.0] * 6), NO_POSE, ' m off'),
+    (changed(position=[9.0, 0.3, 0.3, 0.3, 0.3, 0.3]), NOT_CONVERGED,
+     'lengths [9.95, 1.25, 1.25, 1.25, 1.25, 1.25] m: did not converge: residual '),
+    (changed(position=[-3.0] * 6), NOT_CONVERGED, ' iterations'),
     (lambda at: message_of(at._replace(stamp=0)), UNSTAMPED, 'the time between'),
     (lambda at: message_of(at)[:-9], MALFORMED, ' bytes: '),
     (lambda at: b'', MALFORMED, '0 bytes'),
@@ -163,23 +165,23 @@ def changed(**fields: Any) -> Callable[[Measurement], bytes]:
     (lambda at: message_of(at._replace(stamp=BEGIN - 2 * MILLISECOND)), TOO_OLD,
      'is 0.002 s older than the last used'),
 ])
-def test_what_is_refused_is_as_if_it_never_came(
+def test_what_is_rejected_is_as_if_it_never_came(
         make: Callable[[Measurement], bytes], reason: str, details: str) -> None:
     followed = Followed()
     assert followed.take(message_of(REST[0])) == EXPECTED[0]
-    followed.refuses(make(REST[1]), reason, details)
+    followed.rejects(make(REST[1]), reason, details)
     assert followed.take(message_of(REST[2])) == estimates(
         ExternalWrench(MACHINE), [REST[0], REST[2]])[1]
-    assert len(followed.refused) == 1
+    assert len(followed.rejected) == 1
 
 
-def test_a_machine_that_is_singular_everywhere_is_refused() -> None:
+def test_a_machine_that_is_singular_everywhere_is_rejected() -> None:
     """Base and platform are similar hexagons."""
     similar = MACHINE.replaced({
         'geometry.base_joints': (1.5 * MACHINE['geometry.platform_joints']).ravel()})
     followed = Followed(similar)
-    lengths = StewartPlatform(similar).inverse_kinematics([0.0, 0.0, 1.1], np.eye(3))
-    followed.refuses(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
+    lengths = StewartPlatform(similar).inverse_kinematics(Pose([0.0, 0.0, 1.1], np.eye(3)))
+    followed.rejects(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
 
 
 @settings(derandomize=True, deadline=None, max_examples=200)
@@ -204,7 +206,7 @@ def test_a_jump_back_is_a_restart() -> None:
     assert [followed.take(message_of(each)) for each in REST] == EXPECTED
     assert followed.noticed == [
         'measured_legs: stamps jumped back by 1000 s: followed as a restart']
-    assert not followed.refused
+    assert not followed.rejected
 
 
 def test_after_a_gap_it_begins_anew() -> None:
@@ -212,7 +214,7 @@ def test_after_a_gap_it_begins_anew() -> None:
     for at in REST[:3]:
         followed.take(message_of(at._replace(stamp=at.stamp - 10 ** 12)))
     assert [followed.take(message_of(each)) for each in REST] == EXPECTED
-    assert not followed.refused
+    assert not followed.rejected
 
 
 def test_where_no_pose_is_found_for_long_the_setpoint_is_asked() -> None:
@@ -221,8 +223,8 @@ def test_where_no_pose_is_found_for_long_the_setpoint_is_asked() -> None:
     assert followed.take(message_of(REST[0])) is not None
     away = StewartPlatform(MACHINE).inverse_dynamics(swing(0.9))
     for n in range(1, 4):
-        followed.refuses(changed(position=[5.0, 0.3, 0.3, 0.3, 0.3, 0.3])(
-            REST[0]._replace(stamp=BEGIN + n * 30 * MILLISECOND)), NO_POSE, ' m off')
+        followed.rejects(changed(position=[5.0, 0.3, 0.3, 0.3, 0.3, 0.3])(
+            REST[0]._replace(stamp=BEGIN + n * 30 * MILLISECOND)), NOT_CONVERGED, ' iterations')
     found = followed.take(changed(position=away.lengths - ZERO_LENGTHS)(
         REST[0]._replace(stamp=BEGIN + 120 * MILLISECOND)))
     assert found is not None

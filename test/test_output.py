@@ -45,7 +45,8 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.step import Batch, OUTPUT_TYPES, Outputs, Step
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
     {'singularity.action': 'suppress_forces'})
@@ -72,7 +73,7 @@ def times_of(number: int, first: int = 0) -> NDArray[np.int64]:
 
 
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:
-    bag = OutputBag(folder, NODE, STEP)
+    bag = OutputBag(folder, NODE, OutputMessages(PARAMETERS))
     for times, outputs in blocks:
         bag.write(times, outputs)
     bag.close()

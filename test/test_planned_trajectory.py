@@ -31,12 +31,12 @@ import pytest
 from referees import rng, ROOT
 from scipy.interpolate import CubicHermiteSpline
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
-from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LENGTHS, RATES
 from stewart_dynamics.runtime import planned_trajectory as planned
 from stewart_dynamics.runtime.planned_trajectory import Outcome
@@ -88,7 +88,7 @@ def motion_of(rows: Array) -> Motion:
 
 def sampled(name: str, step: int) -> tuple[list[int], Array]:
     """Return times [ns] and rows of a motion in config/."""
-    motion = TrajectoryParameters.from_yaml(ROOT / 'config' / f'trajectory_{name}.yaml')
+    motion = ReferenceMotionParameters.from_yaml(ROOT / 'config' / f'trajectory_{name}.yaml')
     times = np.arange(0, 10 * SECOND + 1, step)
     return times.tolist(), rows_of(motion_at(motion, times * 1e-9))
 
@@ -97,7 +97,7 @@ def some(points: int) -> tuple[list[int], Array]:
     """Return a smooth motion whose points are at uneven times."""
     random = rng()
     times = np.cumsum(random.integers(1_000_000, 20_000_000, points))
-    motion = TrajectoryParameters({
+    motion = ReferenceMotionParameters({
         'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
         'motion.amplitude': (0.03, 0.03, 0.04, 0.04, 0.04, 0.06),
         'motion.frequency': (0.25, 0.5, 0.25, 0.5, 0.25, 0.25)})
@@ -474,7 +474,7 @@ def test_where_the_legs_fold_up_on_a_wide_way_is_found() -> None:
 def test_a_machine_on_its_stops_may_go_away_from_them() -> None:
     platform = StewartPlatform(PARAMETERS)
     parked = platform.forward_kinematics(
-        PARAMETERS['limits.length_min'], ([0.0, 0.0, 0.8], np.eye(3)))
+        PARAMETERS['limits.length_min'], Pose([0.0, 0.0, 0.8], np.eye(3)))
     for digits, answered in ((12, True), (3, False)):  # 1e-3: beyond by more than rounding
         position = [*parked.position.round(15).tolist()[:2],
                     math.floor(parked.position[2] * 10.0 ** digits) / 10.0 ** digits]
@@ -504,7 +504,7 @@ def test_where_the_legs_lead_the_platform_to_a_singularity_is_found() -> None:
     squares = cubic_between(times, rows)[1] ** 2
     apart = np.abs(squares[:, ::2].sum(axis=1) - squares[:, 1::2].sum(axis=1))
     limit = StewartPlatform(UNBOUND).inverse_kinematics(
-        [0.0, 0.0, 0.8], from_euler([0.0, 0.0, np.pi / 2.0])) ** 2
+        Pose.from_euler([0.0, 0.0, 0.8], [0.0, 0.0, np.pi / 2.0])) ** 2
     assert apart.max() > abs(limit[::2].sum() - limit[1::2].sum())
     outcome = outcome_of(messages.trajectory(STAMP, times, rows), UNBOUND)
     assert outcome.reason == planned.SINGULAR

@@ -12,39 +12,58 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status of planned motions, within the node's diagnostics."""
+"""The status of planned trajectories, within the node's diagnostics."""
 
 from __future__ import annotations
 
 from referees import ROOT
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.runtime.diagnostics import Diagnostics, ERROR, OK, WARN
-from stewart_dynamics.runtime.planned_trajectory import Outcome
-from stewart_dynamics.runtime.planned_trajectory_diagnostics import PlannedDiagnostics
+from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 BEGIN = 100.0
+ANSWERED = Outcome('answered: 2 points', answer=b'1')
+REJECTED = Outcome('rejected: x', 'why', values=(('points', '3'),))
 
 
-def test_planned_motions_have_a_status_once_there_was_one() -> None:
-    planned = PlannedDiagnostics()
-    diagnostics = Diagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN, [planned])
-    assert [each.name for each in diagnostics.report(BEGIN)][-1] == 'timing'
-    status = planned.done(Outcome('answered: 2 points', answer=b'1'), 0.25)
-    assert diagnostics.report(BEGIN)[-1] == status == ('trajectory', OK, 'answered: 2 points', (
-        ('answered', '1'), ('refused', '0'), ('time it took (s)', '0.250')))
-    assert not diagnostics.level_changed(BEGIN)
-    refusal = Outcome('refused: x', 'why', values=(('points', '3'),))
-    planned.done(refusal, 0.1)
-    assert diagnostics.level_changed(BEGIN)
+def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
+    diagnostics = DynamicsDiagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN)
+    report, planned = diagnostics.report, diagnostics.planned_trajectory
+    assert [each.name for each in report.make(BEGIN)[0]][-1] == 'timing'
+    planned.done(ANSWERED, 0.25)
+    assert report.make(BEGIN)[0][-1] == ('planned trajectory', OK, 'answered: 2 points', (
+        ('answered', '1'), ('rejected', '0'), ('time it took (s)', '0.250')))
+    assert not report.level_changed(BEGIN)
+    planned.done(REJECTED, 0.1)
+    assert report.level_changed(BEGIN)
     # It lasts until the next.
     for now in (BEGIN, BEGIN + 100.0):
-        status = diagnostics.report(now)[-1]
-        assert status.name == 'trajectory'
+        status = report.make(now)[0][-1]
+        assert status.name == 'planned trajectory'
         assert status.level == ERROR
         assert dict(status.values) == {
-            'answered': '1', 'refused': '1', 'refused: why': '1', 'points': '3',
+            'answered': '1', 'rejected': '1', 'rejected: why': '1', 'points': '3',
             'time it took (s)': '0.100'}
-    planned.done(Outcome('answered', answer=b'1', warning=True), 0.1)
-    assert diagnostics.report(BEGIN)[-1].level == WARN
+    planned.done(ANSWERED._replace(warning=True), 0.1)
+    assert report.make(BEGIN)[0][-1].level == WARN
+
+
+def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:
+    planned = DynamicsDiagnostics(
+        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN).planned_trajectory
+    planned.done(ANSWERED, 0.1)
+    assert planned.log_lines(BEGIN) == []
+    for _ in range(2):
+        planned.done(REJECTED, 0.1)
+    assert planned.log_lines(BEGIN) == 2 * [
+        LogLine(ERROR, 'planned trajectory rejected: x', 'why')]
+    assert planned.log_lines(BEGIN) == []
+    for outcome in (ANSWERED, ANSWERED, ANSWERED._replace(warning=True), REJECTED):
+        planned.done(outcome, 0.1)
+    assert planned.log_lines(BEGIN) == [
+        LogLine(OK, 'planned trajectory: answered: 2 points'),
+        LogLine(WARN, 'planned trajectory: answered: 2 points'),
+        LogLine(ERROR, 'planned trajectory rejected: x', 'why')]

@@ -27,7 +27,7 @@ from referees import (
     energies, friction, printed_compiled_and_not, random_parameters, relative, rng, ROOT,
     rotation_about, size_of, smooth_motion)
 
-from stewart_dynamics import Motion, ParameterError, StewartPlatform
+from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.parameters import Parameters
@@ -254,8 +254,8 @@ def test_end_stops_hold_a_machine_that_falls_on_them() -> None:
     stiffness = carried * (2.0 * math.pi * 30.0) ** 2
     # At rest the springs carry the machine, as its gravity vector has it without them.
     motion = motion_of(state)
-    held = np.linalg.solve(platform.jacobian(motion.position, motion.rotation).T,
-                           platform.gravity_vector(motion.position, motion.rotation))
+    held = np.linalg.solve(platform.inverse_jacobian(motion).T,
+                           platform.gravity_vector(motion))
     assert relative(stiffness * (0.95 - np.array(state.lengths)), held) < 1e-9
     # No leg went deeper than all that fell would have pressed its spring together.
     assert 0.0 < deepest < math.sqrt(2.0 * (fallen - energy_of(plant)) / stiffness)
@@ -271,8 +271,8 @@ def test_end_stops_hold_against_actuators_that_push_out_and_then_let_go() -> Non
     assert np.all(too_long > 0.0)
     motion = motion_of(state)
     held = np.linalg.solve(
-        StewartPlatform(plant.parameters).jacobian(motion.position, motion.rotation).T,
-        StewartPlatform(plant.parameters).gravity_vector(motion.position, motion.rotation))
+        StewartPlatform(plant.parameters).inverse_jacobian(motion).T,
+        StewartPlatform(plant.parameters).gravity_vector(motion))
     assert relative(6000.0 - stiffness * too_long, held) < 1e-6
     for _ in range(100):
         state = plant.advance(ZERO, ZERO)
@@ -322,9 +322,9 @@ def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
         for _ in range(50):
             position = size_of(p) * random.uniform([-1, -1, 0.2], [1, 1, 2], 3)
             turn = rotation_about(np.array([0.6, 0.0, 0.8]), random.uniform(-1.0, 1.0))
-            jacobian = platform.jacobian(position, turn)
-            mobility = jacobian @ np.linalg.solve(
-                platform.mass_matrix(position, turn), jacobian.T)
+            pose = Pose(position, turn)
+            jacobian = platform.inverse_jacobian(pose)
+            mobility = jacobian @ np.linalg.solve(platform.mass_matrix(pose), jacobian.T)
             root = np.sqrt(has)
             worst = max(worst, float(np.linalg.eigvalsh(root[:, None] * mobility * root)[-1]))
         assert worst <= bound * (1.0 + 1e-12)
@@ -360,7 +360,8 @@ def test_of_a_stiff_machine_let_loose_the_energy_never_rises(seed: int) -> None:
     """Friction from none to far too much, stops from soft to hard, with reflected mass or none."""
     random = rng(seed)
     p = random_simulated(seed)
-    lengths = StewartPlatform(p).inverse_kinematics(p['initial_pose'][:3], np.eye(3))
+    lengths = StewartPlatform(p).inverse_kinematics(
+        Pose(p['initial_pose'][:3], np.eye(3)))
     plant = Plant(random_simulated(
         seed, rate=1000.0, limits__length_min=(lengths * random.uniform(0.8, 0.99)).tolist(),
         limits__length_max=(lengths * random.uniform(1.01, 1.3)).tolist(),
@@ -421,8 +422,7 @@ def test_numbers_that_overflow_hold_it_at_rest(commands: Six) -> None:
     assert plant.advance((400.0,) * 6, ZERO) is state
     platform = StewartPlatform(plant.parameters)
     motion = motion_of(state)
-    assert relative(state.lengths, platform.inverse_kinematics(
-        motion.position, motion.rotation)) < 1e-13
+    assert relative(state.lengths, platform.inverse_kinematics(motion)) < 1e-13
 
 
 def test_a_load_that_overflows_holds_it_at_rest() -> None:
@@ -454,7 +454,7 @@ def test_through_a_singularity_it_falls_as_any_body_does() -> None:
     platform = StewartPlatform(plant.parameters)
     for _ in range(600):
         motion = motion_of(plant.advance(ZERO, ZERO))
-        dets.append(np.linalg.det(platform.jacobian(motion.position, motion.rotation)))
+        dets.append(np.linalg.det(platform.inverse_jacobian(motion)))
     assert not plant.fault
     assert min(dets) < 0.0 < max(dets)
 

@@ -26,7 +26,9 @@ import numpy as np
 import pytest
 
 from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.runtime import planned_trajectory, plant, setpoints, step
+from stewart_dynamics.runtime import input_topics, output_messages
+from stewart_dynamics.runtime import planned_trajectory as planned
+from stewart_dynamics.runtime import plant
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
@@ -64,10 +66,10 @@ def test_a_table_without_its_comments_is_an_error(tables: ModuleType) -> None:
 
 
 def test_topics_are_those_of_the_code() -> None:
-    node = {**setpoints.INPUT_TYPES, **step.OUTPUT_TYPES,
+    node = {**input_topics.INPUT_TYPES, **output_messages.OUTPUT_TYPES,
             'markers': 'visualization_msgs/msg/MarkerArray',
-            planned_trajectory.INPUT: planned_trajectory.INPUT_TYPE,
-            planned_trajectory.OUTPUT: planned_trajectory.OUTPUT_TYPE}
+            planned.INPUT: planned.INPUT_TYPE,
+            planned.OUTPUT: planned.OUTPUT_TYPE}
     for pages, topics in ((('README.md', 'docs/node.md'), node),
                           (('docs/simulator.md',), {**plant.INPUT_TYPES, **plant.OUTPUT_TYPES})):
         for page in pages:

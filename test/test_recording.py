@@ -48,7 +48,7 @@ from stewart_dynamics import BagError, Parameters
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one import BAD_INPUT, DONE, NODE, Options, PARTLY_READ, replay
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.setpoints import ACCEL, INPUT_TYPES, POSE, TWIST
+from stewart_dynamics.runtime.input_topics import ACCEL, INPUT_TYPES, POSE, TWIST
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)

@@ -49,15 +49,14 @@ from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one import (
     BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ, replay, Replayed)
-from stewart_dynamics.runtime.setpoints import (
-    ACCEL, COMBINED, INPUT_TYPES, MALFORMED, NOT_FINITE, NOT_JOINED, POSE, TOO_OLD, TWICE, TWIST,
-    WRENCH)
-from stewart_dynamics.runtime.step import OUTPUT_TYPES
+from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
+from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -990,7 +989,7 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
         assert abs(found['force_peak_n']) == np.max(np.abs(forces))
         lengths = [float(row[f'{leg} length (m)']) for row in rows]
         assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
-    assert set(summary['causes']['leg_1']) == set(CAUSES)
+    assert set(summary['causes']['leg_1']) == set(SOURCES)
     assert summary['parameters']['platform.mass'] == 150.0
 
 

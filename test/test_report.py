@@ -34,9 +34,9 @@ from numpy.typing import NDArray
 import pytest
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.report import Report
@@ -70,7 +70,7 @@ class Given:
         self.setpoints = Batch(
             stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps)
         self.outputs: Outputs = Step(parameters).many(self.setpoints, None)
-        self.causes = ForceCauses(parameters)(motions, self.setpoints.wrenches)
+        self.causes = ForceBreakdownRows(parameters)(motions, self.setpoints.wrenches)
 
     def summary(self, **changes: Any) -> dict[str, Any]:
         """Return what summary.json would hold."""
@@ -99,7 +99,7 @@ class Given:
 
 def trajectory(name: str, parameters: Parameters = PARAMETERS) -> Given:
     """Return a motion of config/, as it is recorded in bags/."""
-    p = TrajectoryParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
+    p = ReferenceMotionParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
     seconds = sample_times(p) * 1e-9
     return Given(seconds, motion_at(p, seconds).rows, parameters)
 
@@ -200,7 +200,7 @@ def test_what_is_drawn_are_the_samples_and_every_peak(tmp_path: Path) -> None:
                           ('rates', 'rate_peak_m_s')):
             _, values = curve_of(data, plot, n)
             assert np.abs(values).max() == abs(np.float32(leg[key]))
-        parts = sum(curve_of(data, 'causes', 1 + c, n)[1] for c in range(len(CAUSES)))
+        parts = sum(curve_of(data, 'causes', 1 + c, n)[1] for c in range(len(SOURCES)))
         whole = curve_of(data, 'causes', 0, n)[1]
         assert np.abs(parts - whole).max() <= 1e-6 * np.abs(whole).max()
 

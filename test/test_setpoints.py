@@ -36,9 +36,12 @@ from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.runtime.setpoints import (
-    ACCEL, COMBINED, MALFORMED, Messages, NOT_FINITE, NOT_JOINED, NOT_UNIT, POSE, Refusal,
-    Setpoints, TOO_OLD, TWICE, TWIST, WAITING, WRENCH, WRONG_FRAME)
+from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
+from stewart_dynamics.runtime.joining import WAITING
+from stewart_dynamics.runtime.rejections import (
+    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, TOO_OLD, TWICE, WRONG_FRAME)
+from stewart_dynamics.runtime.samples import SampleReader
+from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Setpoint
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
@@ -58,12 +61,12 @@ class Feed:
     """Setpoints with given parameters; what it is given and what it says is kept."""
 
     def __init__(self, **given: object) -> None:
-        self.said: list[tuple[Refusal, str]] = []
+        self.said: list[tuple[Rejection, str]] = []
         self.notices: list[str] = []
         self.given: Counter[str] = Counter()
         self.setpoints = Setpoints(
             PARAMETERS.replaced({f'setpoint.{name}': value for name, value in given.items()}),
-            lambda refusal, details: self.said.append((refusal, details)), self.notices.append)
+            lambda rejection, details: self.said.append((rejection, details)), self.notices.append)
 
     def __call__(self, topic: str, data: bytes) -> Setpoint | None:
         """Take one message."""
@@ -83,9 +86,9 @@ class Feed:
 
     @property
     def counts(self) -> dict[tuple[str, str], int]:
-        """What is refused; the callback must have heard of each."""
-        assert Counter(refusal for refusal, _ in self.said) == self.setpoints.counts
-        return {tuple(refusal): n for refusal, n in self.setpoints.counts.items()}
+        """What is rejected; the callback must have heard of each."""
+        assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
+        return {tuple(rejection): n for rejection, n in self.setpoints.counts.items()}
 
 
 # Joining
@@ -202,7 +205,7 @@ def test_a_pose_alone_stands_still() -> None:
                         NO_WRENCH, False)
 
 
-# Refusing
+# Rejecting
 
 def _spoilt() -> list[tuple[str, bytes, str, str]]:
     found = []
@@ -233,7 +236,7 @@ def _spoilt() -> list[tuple[str, bytes, str, str]]:
 
 
 @pytest.mark.parametrize(('topic', 'data', 'reason', 'words'), _spoilt())
-def test_a_bad_message_is_refused_and_the_good_one_used(
+def test_a_bad_message_is_rejected_and_the_good_one_used(
         topic: str, data: bytes, reason: str, words: str) -> None:
     feed = Feed(source='combined' if topic == COMBINED else 'separate')
     if topic == WRENCH:
@@ -265,9 +268,9 @@ def test_the_base_frame_and_an_empty_one_are_accepted(topic: str, frame: str) ->
 def test_another_base_frame_is_the_only_one() -> None:
     setpoints = Setpoints(
         PARAMETERS.replaced({'base_frame': 'sol élevé', 'setpoint.source': 'pose'}),
-        lambda refusal, details: None, lambda text: None)
+        lambda rejection, details: None, lambda text: None)
     assert setpoints.take(POSE, messages.pose(SECOND, frame='base'), lambda: NOW) is None
-    assert setpoints.counts == {Refusal(POSE, WRONG_FRAME): 1}
+    assert setpoints.counts == {Rejection(POSE, WRONG_FRAME): 1}
     assert setpoints.take(POSE, messages.pose(SECOND, frame='sol élevé'), lambda: NOW)
 
 
@@ -282,7 +285,7 @@ def test_a_wrench_holds_until_the_next() -> None:
 
 @pytest.mark.parametrize('topic', TOPICS)
 @pytest.mark.parametrize('ago', [1, 10 * MS, 100 * MS - 1, 100 * MS])
-def test_what_is_older_than_the_last_used_is_refused(topic: str, ago: int) -> None:
+def test_what_is_older_than_the_last_used_is_rejected(topic: str, ago: int) -> None:
     feed = Feed()
     assert feed.whole(SECOND)
     assert feed.sample(topic, SECOND - ago) is None
@@ -307,7 +310,7 @@ def test_of_the_same_stamp_twice_the_first_is_used() -> None:
     assert feed.whole(SECOND + MS)
 
 
-def test_a_stamp_that_one_topic_lacks_is_passed_over() -> None:
+def test_a_stamp_that_one_topic_lacks_is_dropped() -> None:
     feed = Feed()
     feed.sample(POSE, SECOND)
     feed.sample(TWIST, SECOND)
@@ -358,7 +361,7 @@ def test_a_stray_old_sample_of_one_topic_resets_nothing(topic: str) -> None:
     assert feed.counts[POSE, TOO_OLD] == 1
 
 
-def test_a_restart_gives_up_what_waits_from_before_it() -> None:
+def test_a_restart_drops_what_waits_from_before_it() -> None:
     feed = Feed()
     assert feed.whole(10 * SECOND)
     feed.sample(POSE, 10 * SECOND + 10 * MS)
@@ -416,7 +419,7 @@ def test_a_topic_that_speaks_earlier_is_not_joined_late(order: Sequence[str]) ->
 
 @pytest.mark.parametrize(('spoilt', 'arrives'), [
     (POSE, False), (TWIST, False), (ACCEL, False), (POSE, True), (TWIST, True), (ACCEL, True)])
-def test_a_lost_or_refused_sample_without_a_stamp_costs_its_setpoint_and_no_other(
+def test_a_lost_or_rejected_sample_without_a_stamp_costs_its_setpoint_and_no_other(
         spoilt: str, arrives: bool) -> None:
     feed = Feed()
     used = []
@@ -504,7 +507,7 @@ def test_what_waits_is_bounded(silent: str) -> None:
             if topic != silent:
                 feed.sample(topic, n * MS, float(n))
     assert feed.counts == {(topic, NOT_JOINED): 50 for topic in TOPICS if topic != silent}
-    # the oldest are given up, the newest are still there
+    # the oldest are dropped, the newest are still there
     answers = [feed.sample(silent, n * MS) for n in range(1, many + 1)]
     used = [answer.motion[0 if silent != POSE else 12] for answer in answers if answer]
     assert used == [float(n) for n in range(51, many + 1)]
@@ -512,7 +515,7 @@ def test_what_waits_is_bounded(silent: str) -> None:
 
 @pytest.mark.parametrize('stamped', [True, False])
 def test_memory_does_not_grow_while_a_topic_is_silent(stamped: bool) -> None:
-    setpoints = Setpoints(PARAMETERS, lambda refusal, details: None, lambda text: None)
+    setpoints = Setpoints(PARAMETERS, lambda rejection, details: None, lambda text: None)
 
     def feed(first: int, end: int) -> None:
         for n in range(first, end):
@@ -592,7 +595,7 @@ samples = st.lists(st.tuples(
 
 
 def _drained(feed: Feed, answers: list[Setpoint]) -> None:
-    """Bring what waits to an end: used, or given up."""
+    """Bring what waits to an end: used, or dropped."""
     far = 2 ** 31 * SECOND - 1
     final = [answer for topic in TOPICS if (answer := feed.sample(topic, far))]
     assert len(final) == 1
@@ -621,8 +624,8 @@ def test_every_message_is_accounted_for(
     assert sum('zero' in notice for notice in feed.notices) <= 1
     _drained(feed, answers)
     for topic in TOPICS:
-        refused = sum(n for (of, _), n in feed.counts.items() if of == topic)
-        assert feed.given[topic] == len(answers) + refused
+        rejected = sum(n for (of, _), n in feed.counts.items() if of == topic)
+        assert feed.given[topic] == len(answers) + rejected
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
@@ -652,7 +655,7 @@ def test_no_bytes_raise(sequence: list[tuple[str, bytes]]) -> None:
 
 def test_wrenches_of_any_bytes_never_raise() -> None:
     random = rng()
-    setpoints = Setpoints(PARAMETERS, lambda refusal, details: None, lambda text: None)
+    setpoints = Setpoints(PARAMETERS, lambda rejection, details: None, lambda text: None)
     good = messages.wrench(SECOND, (1, 2, 3, 4, 5, 6))
     for _ in range(500):
         setpoints.take_wrench(_garbage(random, good))
@@ -732,7 +735,7 @@ def test_many_in_order_are_what_they_are_one_by_one(cuts: Sequence[int]) -> None
 def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     feed = Feed()
     monkeypatch.delattr(Setpoints, 'take')
-    monkeypatch.delattr(Setpoints, 'take_wrench')
+    monkeypatch.delattr(SampleReader, 'read')
     given = stream(50)
     for part in (given[:61], given[61:]):
         feed.setpoints.take_many(together(part))
@@ -743,7 +746,7 @@ def test_many_of_one_topic_may_come_before_the_others() -> None:
     given = [(topic, data) for of in TOPICS for topic, data in stream(3 * WAITING // 2)
              if topic == of]
     for cuts in ((), (10, 700, 1600, 3100)):
-        # beyond WAITING the oldest are given up
+        # beyond WAITING the oldest are dropped
         assert check_many(given, cuts) == WAITING
     assert check_many([(topic, data) for of in TOPICS for topic, data in stream(WAITING)
                        if topic == of], ()) == WAITING

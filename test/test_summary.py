@@ -34,7 +34,7 @@ from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME
 from stewart_dynamics.replay.summary import Summary, TOLD
@@ -216,7 +216,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'rate_margin_m_s': fastest - max(map(abs, rate)),
             'force_margin_n': None if none else strongest - abs(peak[0])}
         causes[name] = {}
-        for n, cause in enumerate(CAUSES):
+        for n, cause in enumerate(SOURCES):
             of_cause = s.causes[:, n, leg].tolist()
             causes[name][cause] = {
                 'peak_n': first_peak(of_cause, t)[0],
@@ -350,7 +350,7 @@ def test_it_sums_up_what_the_step_answers() -> None:
     outputs = Step(p).many(setpoints, None)
     summary = Summary(p)
     summary.add(np.arange(200) * 1.0, setpoints, outputs,
-                ForceCauses(p)(setpoints.motions, setpoints.wrenches))
+                ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches))
     found = summary.values()
     assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
                                               axis=0).sum()
@@ -363,7 +363,7 @@ def test_it_sums_up_what_the_step_answers() -> None:
         assert of_leg['force_rms_n'] == pytest.approx(
             math.sqrt((forces ** 2)[1:-1].sum() / 199.0
                       + 0.5 * (forces[0] ** 2 + forces[-1] ** 2) / 199.0), rel=1e-12)
-        assert set(found['causes'][name]) == set(CAUSES)
+        assert set(found['causes'][name]) == set(SOURCES)
     assert found['singularity']['condition_max'] == outputs.conditions.max()
 
 
@@ -401,14 +401,14 @@ def test_every_key_is_documented() -> None:
     for leg in parameters['joints']:
         found = {key.replace(f'legs.{leg}.', 'legs.NAME.').replace(
             f'causes.{leg}.', 'causes.NAME.') for key in found}
-    for cause in CAUSES:
+    for cause in SOURCES:
         found = {key.replace(f'.{cause}.', '.CAUSE.') for key in found}
     text = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
     documented = set(re.findall(r'^\| `([^`]+)` \|', text, flags=re.MULTILINE))
     assert found <= documented
     parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'causes.')
     assert {key for key in documented if key.startswith(parts)} == found - {'limit_met'}
-    assert set(CAUSES) <= documented
+    assert set(SOURCES) <= documented
 
 
 # Energy

@@ -13,10 +13,11 @@
 # limitations under the License.
 
 """
-Motion between points: the platform's by pose, twist and acceleration, a leg's by length and rate.
+The platform's motion between points given by pose, twist and acceleration.
 
-Position and rotation vector are polynomials of fifth degree in time (quintic Hermite). With
-R = exp(skew(r)) R_0 the twist and acceleration of a rotation vector r are
+Position and rotation vector are polynomials of fifth degree in time (quintic Hermite
+interpolation). With R = exp(skew(r)) R_0 the angular velocity and acceleration of a rotation
+vector r are
 
     omega = J r'            alpha = J r'' + J' r'
 
@@ -28,14 +29,16 @@ estimation in robotics, 2018, arXiv:1812.01537, equation 145).
 from __future__ import annotations
 
 from math import comb, factorial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.mechanics.rows import MOTION
+from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY,
+    MOTION, POSITION, ROTATION, TWIST)
 
 # a, b and their derivatives (da/dt = a' (r . r'), likewise b) in powers of -|r|^2, for angles up
 # to one, where the closed forms lose digits.
@@ -48,50 +51,58 @@ _SERIES = [np.array([sign * factor(n) / factorial(2 * n + k) for n in _POWERS.to
 
 class Interpolation:
     """
-    The motion between N + 1 points one after the other.
+    The motion between N + 1 points in order.
 
     Parameters
     ----------
     durations : (N,)
         From each point to the next [s], more than 0.
     motions : (N + 1, MOTION)
-        The points.
-    quaternions : (N + 1, 4)
-        Unit quaternions x y z w of their rotations. Between two points the platform turns the
-        short way.
+        The points. Between two of them the platform takes the shorter rotation.
 
     """
 
-    def __init__(self, durations: Array, motions: Array, quaternions: Array) -> None:
-        self._durations, self._motions, self._quaternions = durations, motions, quaternions
+    def __init__(self, durations: Array, motions: Array) -> None:
+        self._durations, self._motions = durations, motions
+        self._quaternions = to_quaternion(motions[:, ROTATION].reshape(-1, 3, 3))
         h = durations[:, None]
-        turn = _rotation_vector(quaternions[:-1], quaternions[1:])
-        # At its beginning the rotation vector is zero: J = 1, and J' r' = r' x r' / 2 = 0.
-        start = [np.concatenate([motions[:-1, 0:3], np.zeros_like(turn)], axis=1),
-                 motions[:-1, 12:18], motions[:-1, 18:24]]
+        begin, end = motions[:-1], motions[1:]
+        turn = _rotation_vector(self._quaternions[:-1], self._quaternions[1:])
+        # At the beginning the rotation vector is zero: J = 1, and J' r' = r' x r' / 2 = 0.
+        value = np.concatenate([begin[:, POSITION], np.zeros_like(turn)], axis=1)
+        rate, acceleration = begin[:, TWIST], begin[:, ACCELERATION]
         turn_rate, turn_acceleration = _rates_of_vector(
-            turn, motions[1:, 15:18], motions[1:, 21:24])
-        end = [np.concatenate([motions[1:, 0:3], turn], axis=1),
-               np.concatenate([motions[1:, 12:15], turn_rate], axis=1),
-               np.concatenate([motions[1:, 18:21], turn_acceleration], axis=1)]
-        # Control points of Bezier's form (N, 6, 6): of position and rotation vector.
+            turn, end[:, ANGULAR_VELOCITY], end[:, ANGULAR_ACCELERATION])
+        end_value = np.concatenate([end[:, POSITION], turn], axis=1)
+        end_rate = np.concatenate([end[:, LINEAR_VELOCITY], turn_rate], axis=1)
+        end_acceleration = np.concatenate(
+            [end[:, LINEAR_ACCELERATION], turn_acceleration], axis=1)
+        # Bezier control points (N, 6, 6): of position and rotation vector.
         self._control = np.stack([
-            start[0], start[0] + h / 5.0 * start[1],
-            start[0] + 2.0 * h / 5.0 * start[1] + h * h / 20.0 * start[2],
-            end[0] - 2.0 * h / 5.0 * end[1] + h * h / 20.0 * end[2],
-            end[0] - h / 5.0 * end[1], end[0]], axis=1)
+            value, value + h / 5.0 * rate,
+            value + 2.0 * h / 5.0 * rate + h * h / 20.0 * acceleration,
+            end_value - 2.0 * h / 5.0 * end_rate + h * h / 20.0 * end_acceleration,
+            end_value - h / 5.0 * end_rate, end_value], axis=1)
 
-    def reach(self, arm: float) -> Array:
-        """Return how far, at most, a point of the platform at this distance [m] goes (N,) [m]."""
-        way: Array = _length(np.diff(self._control, axis=1), arm).sum(axis=1)
-        return way
-
-    def bend(self, arm: float) -> Array:
+    def path_bound(self, arm: float) -> Array:
         """
-        Return how far, at most, the acceleration of such a point is from a straight line.
+        Return a bound of the path length (N,) [m] of a point of the platform.
 
-        (N,) [m/s^2]: from what its values at the two points, joined by a line, would have it;
-        without the terms of the angular velocity.
+        Parameters
+        ----------
+        arm : float
+            Distance of the point from the platform's origin [m].
+
+        """
+        length: Array = _length(np.diff(self._control, axis=1), arm).sum(axis=1)
+        return length
+
+    def bend_bound(self, arm: float) -> Array:
+        """
+        Return a bound of how far the acceleration of such a point is from linear (N,) [m/s^2].
+
+        From the straight line, in time, between its values at the two points; without the terms
+        of the angular velocity.
         """
         h = self._durations[:, None, None]
         acceleration = 20.0 * np.diff(self._control, n=2, axis=1) / (h * h)
@@ -99,22 +110,22 @@ class Interpolation:
         bend: Array = _length(acceleration[:, 1:3] - line, arm).max(axis=1)
         return bend
 
-    def at(self, which: Integers, part: NDArray[np.floating[Any]]) -> Array:
+    def at(self, which: Integers, fraction: NDArray[np.floating[Any]]) -> Array:
         """
         Return rows of motion (M, MOTION).
 
         Parameters
         ----------
         which : (M,)
-            Behind which of the first N points.
-        part : (M,)
-            How much of the way to the next one is done, 0 to 1; at 0 and 1 the points themselves.
+            After which of the first N points.
+        fraction : (M,)
+            Of the time to the next one, 0 to 1; at 0 and 1 the points themselves.
 
         """
         h = self._durations[which][:, None]
         control = self._control[which]
         value, rate, acceleration = (
-            np.einsum('mk,mkc->mc', _bernstein(degree, part), np.diff(
+            np.einsum('mk,mkc->mc', _bernstein(degree, fraction), np.diff(
                 control, n=5 - degree, axis=1)) for degree in (5, 4, 3))
         rate *= 5.0 / h
         acceleration *= 20.0 / (h * h)
@@ -122,94 +133,20 @@ class Interpolation:
         a, b, a_rate, b_rate = _coefficients(turn, turn_rate)
         once = _cross(turn, turn_rate)
         twice = _cross(turn, once)
-        omega = turn_rate + a * once + b * twice
-        alpha = (_jacobian(turn, a, b, acceleration[:, 3:])
-                 + a_rate * once + b_rate * twice + b * _cross(turn_rate, once))
-        rows = np.empty((len(part), MOTION))
-        rows[:, 0:3] = value[:, :3]
-        rows[:, 3:12] = np.stack(
+        rows = np.empty((len(fraction), MOTION))
+        rows[:, POSITION] = value[:, :3]
+        rows[:, ROTATION] = np.stack(
             from_quaternion(*_turned(self._quaternions[which], turn).T), axis=1)
-        rows[:, 12:15], rows[:, 15:18] = rate[:, :3], omega
-        rows[:, 18:21], rows[:, 21:24] = acceleration[:, :3], alpha
+        rows[:, LINEAR_VELOCITY] = rate[:, :3]
+        rows[:, ANGULAR_VELOCITY] = turn_rate + a * once + b * twice
+        rows[:, LINEAR_ACCELERATION] = acceleration[:, :3]
+        rows[:, ANGULAR_ACCELERATION] = (
+            _jacobian(turn, a, b, acceleration[:, 3:])
+            + a_rate * once + b_rate * twice + b * _cross(turn_rate, once))
         for end in (0, 1):
-            there = part == end
+            there = fraction == end
             rows[there] = self._motions[which[there] + end]
         return rows
-
-
-class Cubics(NamedTuple):
-    """Polynomials of third degree of a part, 0 to 1, in Hermite's form; each array (N, ...)."""
-
-    start: Array
-    end: Array
-    start_rate: Array
-    end_rate: Array
-
-    @classmethod
-    def between(cls, values: Array, rates: Array, durations: Array) -> Cubics:
-        """Return those that join values and rates (N + 1, ...)."""
-        return cls(values[:-1], values[1:], rates[:-1] * durations, rates[1:] * durations)
-
-    def chosen(self, which: Any) -> Cubics:
-        """Return some of them: an index, or an array of such."""
-        return Cubics._make(each[which] for each in self)
-
-    def hull(self) -> tuple[Array, Array]:
-        """Return bounds: the least and the largest of the control points of Bezier's form."""
-        inner = self.start + self.start_rate / 3.0, self.end - self.end_rate / 3.0
-        low: Array = np.minimum(np.minimum(self.start, self.end), np.minimum(*inner))
-        high: Array = np.maximum(np.maximum(self.start, self.end), np.maximum(*inner))
-        return low, high
-
-    def middle_rate(self) -> Array:
-        """Return the control point between the rates at both ends, with them a bound of all."""
-        return 3.0 * (self.end - self.start) - self.start_rate - self.end_rate
-
-    def at(self, part: Array) -> Array:
-        """Return the values at a part."""
-        _, second, third = self._powers()
-        return self.start + part * (self.start_rate + part * (second + part * third))
-
-    def rate_at(self, part: Array) -> Array:
-        """Return the derivatives at a part."""
-        _, second, third = self._powers()
-        return self.start_rate + part * (2.0 * second + part * 3.0 * third)
-
-    def extremes(self) -> tuple[Array, Array]:
-        """Return where they are least or largest within; nan where they are not."""
-        first, second, third = self._powers()
-        with np.errstate(all='ignore'):
-            # the roots of first + 2 second u + 3 third u^2, without a difference of like numbers
-            root = np.sqrt(second * second - 3.0 * third * first)
-            s = -(second + np.copysign(root, second))
-            return _inside(s / (3.0 * third)), _inside(first / s)
-
-    def fastest(self) -> Array:
-        """Return where the derivatives are least or largest within; nan where they are not."""
-        _, second, third = self._powers()
-        with np.errstate(all='ignore'):
-            return _inside(-second / (3.0 * third))
-
-    def zero(self) -> float:
-        """Return where one of them that changes its sign is zero."""
-        low, high = 0.0, 1.0
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            if float(self.at(np.array(middle))) > 0.0:
-                low = middle
-            else:
-                high = middle
-        return low
-
-    def _powers(self) -> tuple[Array, Array, Array]:
-        way = self.end - self.start
-        return (self.start_rate, 3.0 * way - 2.0 * self.start_rate - self.end_rate,
-                self.start_rate + self.end_rate - 2.0 * way)
-
-
-def _inside(part: Array) -> Array:
-    inside: Array = np.where((part > 0.0) & (part < 1.0), part, np.nan)
-    return inside
 
 
 _THIRDS = np.array([[1.0 / 3.0], [2.0 / 3.0]])
@@ -217,23 +154,23 @@ _BINOMIAL = {degree: np.array([comb(degree, n) for n in range(degree + 1)], dtyp
              for degree in (3, 4, 5)}
 
 
-def _bernstein(degree: int, part: NDArray[np.floating[Any]]) -> Array:
-    """Return Bernstein's polynomials (M, degree + 1)."""
+def _bernstein(degree: int, fraction: NDArray[np.floating[Any]]) -> Array:
+    """Return the Bernstein polynomials (M, degree + 1)."""
     power = np.arange(degree + 1)
-    basis: Array = (_BINOMIAL[degree] * part[:, None] ** power
-                    * (1.0 - part[:, None]) ** power[::-1])
+    basis: Array = (_BINOMIAL[degree] * fraction[:, None] ** power
+                    * (1.0 - fraction[:, None]) ** power[::-1])
     return basis
 
 
-def _length(ways: Array, arm: float) -> Array:
-    """Return how far a point at a distance goes by ways (..., 6) of position and turn."""
-    length: Array = np.sqrt((ways[..., :3] ** 2).sum(axis=-1)) + arm * np.sqrt(
-        (ways[..., 3:] ** 2).sum(axis=-1))
+def _length(steps: Array, arm: float) -> Array:
+    """Return a bound of how far a point at a distance moves by position and rotation (..., 6)."""
+    length: Array = np.sqrt((steps[..., :3] ** 2).sum(axis=-1)) + arm * np.sqrt(
+        (steps[..., 3:] ** 2).sum(axis=-1))
     return length
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Return a x b of rows (N, 3); numpy's own takes ten times as long."""
+    """Return a x b of rows (N, 3); numpy.cross takes ten times as long."""
     c = np.empty_like(a)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         c[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
@@ -241,10 +178,10 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _coefficients(turn: Array, rate: Array | None = None) -> tuple[Array, Array, Array, Array]:
-    """Return a, b of rotation vectors (N, 3) and their rates, each (N, 1); see above."""
+    """Return a, b of rotation vectors (N, 3) and their rates, each (N, 1): see the module."""
     square = (turn * turn).sum(axis=1, keepdims=True)
     along = 1.0 if rate is None else (turn * rate).sum(axis=1, keepdims=True)
-    # where it is not used the argument is any that gives numbers
+    # Where a branch is not used, its argument is any that gives finite numbers.
     near = np.minimum(square, 1.0)
     powers = (-near) ** _POWERS
     series = [powers @ each[:, None] for each in _SERIES]
@@ -266,7 +203,7 @@ def _jacobian(turn: Array, a: Array, b: Array, vector: Array) -> Array:
 
 
 def _rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Array]:
-    """Return r' and r'' of rotation vectors (N, 3) that turn with this; angles at most pi."""
+    """Return r' and r'' of rotation vectors (N, 3) of angles up to pi, given omega and alpha."""
     a, _, per_angle, _ = _coefficients(turn)
     c = -per_angle / (2.0 * a)  # J^-1 = 1 - skew(r) / 2 + c skew(r)^2
     rate = _jacobian(turn, np.full_like(a, -0.5), c, omega)
@@ -277,7 +214,7 @@ def _rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Ar
 
 
 def _rotation_vector(start: Array, end: Array) -> Array:
-    """Return axis times angle (N, 3) [rad] from one orientation to the other, the short way."""
+    """Return axis times angle (N, 3) [rad] of the shorter rotation between two."""
     vector = (end[:, :3] * start[:, 3:] - start[:, :3] * end[:, 3:]
               - _cross(end[:, :3], start[:, :3]))
     cosine = (end * start).sum(axis=1, keepdims=True)
@@ -288,7 +225,7 @@ def _rotation_vector(start: Array, end: Array) -> Array:
 
 
 def _turned(quaternions: Array, turn: Array) -> Array:
-    """Return quaternions (N, 4) turned by rotation vectors (N, 3), base axes."""
+    """Return quaternions (N, 4) rotated by rotation vectors (N, 3), base axes."""
     angle = np.sqrt((turn * turn).sum(axis=1, keepdims=True))
     vector = 0.5 * np.sinc(angle / (2.0 * np.pi)) * turn
     cosine = np.cos(0.5 * angle)

@@ -19,12 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Six
 from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, RATES
 from stewart_dynamics.parameters import Parameters
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = LIMITS = (
@@ -59,6 +60,11 @@ class Limits:
     """
     The limits of the legs of a hexapod.
 
+    Parameters
+    ----------
+    parameters : Parameters
+        Those that are not given are never exceeded.
+
     Attributes
     ----------
     bounds : dict of str to (6,)
@@ -77,28 +83,42 @@ class Limits:
             if name not in self.bounds else self.bounds[name] * (
                 1.0 - TOLERANCE if name == LENGTH_MIN else 1.0 + TOLERANCE) for name in LIMITS])
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
+        self._of_samples = [
+            (name, self.bounds[name].tolist(), self.thresholds[n].tolist())
+            for n, name in enumerate(LIMITS) if name in self.bounds]
 
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
-        threshold = self.thresholds[LIMITS.index(limit)]
-        exceeding: Flags = (values < threshold if limit == LENGTH_MIN
-                            else np.abs(values) > threshold)
+        exceeding: Flags = _exceeds(limit, values, self.thresholds[LIMITS.index(limit)])
         return exceeding
 
     def exceeded(self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Exceedance, ...]:
         """Return all limits that one sample exceeds; forces may be unknown."""
         found = []
-        for limit, bounds in self.bounds.items():
+        for limit, bounds, thresholds in self._of_samples:
             values = (rates if limit == VELOCITY_MAX else forces if limit == FORCE_MAX
                       else lengths)
-            if values is not None:
-                found += [Exceedance(limit, leg, values[leg], float(bounds[leg]))
-                          for leg in np.flatnonzero(self.exceeds(limit, np.array(values)))]
+            if values is None:
+                continue
+            for leg, value in enumerate(values):
+                if _exceeds(limit, value, thresholds[leg]):
+                    found.append(Exceedance(limit, leg, value, bounds[leg]))
         return tuple(found)
 
 
+def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
+    """Return whether a number, or where an array, passes the threshold of a limit."""
+    return value < threshold if limit == LENGTH_MIN else abs(value) > threshold
+
+
 @inlined
-def any_exceeded(thresholds: Array, leg: int, length: float, rate: float, force: float) -> bool:
-    """Return whether a leg exceeds one of the thresholds (24,), flat; an unknown force is nan."""
-    return bool(length < thresholds[leg] or length > thresholds[6 + leg]
-                or abs(rate) > thresholds[12 + leg] or abs(force) > thresholds[18 + leg])
+def any_exceeded(thresholds: Array, result: Array) -> bool:
+    """Return whether a row of a result exceeds one of the thresholds (24,); nan never does."""
+    exceeded = False
+    for leg in range(6):
+        if (result[LENGTHS.start + leg] < thresholds[leg]
+                or result[LENGTHS.start + leg] > thresholds[6 + leg]
+                or abs(result[RATES.start + leg]) > thresholds[12 + leg]
+                or abs(result[FORCES.start + leg]) > thresholds[18 + leg]):
+            exceeded = True
+    return exceeded

@@ -24,10 +24,10 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 
-def sample_times(parameters: TrajectoryParameters) -> Integers:
+def sample_times(parameters: ReferenceMotionParameters) -> Integers:
     """
     Return the times of one way of the motion (N,) [ns], 0 and on at the rate.
 
@@ -37,7 +37,7 @@ def sample_times(parameters: TrajectoryParameters) -> Integers:
     return sample_time(parameters, np.arange(sample_count(parameters)))
 
 
-def sample_count(parameters: TrajectoryParameters) -> int:
+def sample_count(parameters: ReferenceMotionParameters) -> int:
     """Return how many times ``sample_times`` has."""
     exact: float = parameters['motion.duration'] * parameters['rate']
     near = round(exact)
@@ -45,14 +45,14 @@ def sample_count(parameters: TrajectoryParameters) -> int:
     return 1 + (near if is_near else math.ceil(exact))
 
 
-def sample_time(parameters: TrajectoryParameters, index: ArrayLike) -> Integers:
+def sample_time(parameters: ReferenceMotionParameters, index: ArrayLike) -> Integers:
     """Return the times of samples by their index (...) [ns]; errors of rounding do not add up."""
     times: Integers = np.rint(
         np.asarray(index) * 1e9 / parameters['rate']).astype(np.int64)
     return times
 
 
-def motion_at(parameters: TrajectoryParameters, times: ArrayLike) -> Motion:
+def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion:
     """
     Return the motion at times (...) [s] from its start; all derivatives are exact.
 
@@ -100,7 +100,7 @@ def _euler_motion(pose: Array, rate: Array, acceleration: Array) -> Motion:
                              acceleration[..., :3], acceleration[..., 3:])
 
 
-def _progress(parameters: TrajectoryParameters, time: Array) -> tuple[Array, Array, Array]:
+def _progress(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
     """Return the part of the way that is done and its time derivatives [1, 1/s, 1/s^2]."""
     duration = parameters['motion.duration']
     u = time / duration

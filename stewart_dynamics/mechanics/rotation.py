@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,6 +67,20 @@ def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
 
 
 Number = TypeVar('Number', float, Array)
+
+# The length of a quaternion that is given may be this far from one; it is divided by it.
+QUATERNION_TOLERANCE = 1e-3
+
+
+def quaternion_length(x: Number, y: Number, z: Number, w: Number) -> Number:
+    """Return the length of a quaternion, or of arrays of them; the same bits either way."""
+    square = x * x + y * y + z * z + w * w
+    return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
+
+
+def is_unit(length: Any) -> Any:
+    """Return whether a quaternion's length, or each of an array, is one within the tolerance."""
+    return abs(length - 1.0) <= QUATERNION_TOLERANCE
 
 
 def from_quaternion(

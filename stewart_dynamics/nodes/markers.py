@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The picture of an answer for RViz and Foxglove: base, platform and legs coloured by their force.
+The markers of an answer for RViz and Foxglove: base, platform and legs coloured by force.
 
-It is one visualization_msgs/MarkerArray in bytes (CDR), made once for a machine; for an answer
-only stamp, poses, lengths, colours and the text are written into it.
+They are one visualization_msgs/MarkerArray in bytes (CDR), made once for a set of parameters; for
+an answer only stamp, poses, lengths, colours and the text are written into it.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ from collections.abc import Sequence
 from struct import pack, Struct
 
 import numpy as np
+from visualization_msgs.msg import Marker
 
 from stewart_dynamics.arrays import Array, Six
-from stewart_dynamics.mechanics.plausibility import level_axes
+from stewart_dynamics.mechanics.home_pose import level_axes
 from stewart_dynamics.mechanics.rotation import quaternion_of
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics import ERROR, OK, singularity_level, WARN
+from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, WARN
+from stewart_dynamics.runtime.diagnostics.singularity import singularity_state
 from stewart_dynamics.runtime.step import Output
 
 Color = tuple[float, float, float, float]
-
-# Of visualization_msgs/Marker.
-_CYLINDER, _LINE_LIST, _SPHERE_LIST, _TEXT, _TRIANGLE_LIST = 3, 5, 7, 9, 11
 
 # Okabe and Ito's blue, vermillion and yellow, which the colour-blind can tell apart. A leg without
 # load is nearly white, so that the darker one is the more loaded one, whichever way.
@@ -49,17 +48,19 @@ PLATFORM: dict[int, Color] = {
     OK: (0.62, 0.7, 0.76, 1.0), WARN: (0.941, 0.894, 0.259, 1.0), ERROR: PUSH}
 _BASE: Color = (0.3, 0.32, 0.35, 1.0)
 _JOINT: Color = (0.12, 0.12, 0.12, 1.0)
+_CENTER_OF_MASS: Color = (0.8, 0.475, 0.655, 1.0)  # Okabe and Ito's reddish purple
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 _AXES: list[Color] = [(0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.3, 0.9, 1.0)]
 
 # In terms of the platform's size, the mean distance of its joints from their center.
 _BARREL, _ROD, _BALL, _PLATE, _AXIS, _LINE = 0.1, 0.055, 0.14, 0.05, 1.2, 0.02
+_HEAVY = 0.2  # the ball at the centre of mass
 _TEXT_SIZE, _TEXT_ABOVE = 0.11, 1.4
 _NAME_OUTSIDE = 0.15  # in terms of the base's
 # The barrel's length, in terms of limits.length_min, or without it of the leg's length.
 _OF_SHORTEST, _OF_LENGTH = 0.9, 0.5
 
-# A picture stays so long [s]: setpoints that are sent by hand come once in a second. Where the
+# Markers stay so long [s]: setpoints that are sent by hand come once in a second. Where the
 # rate is lower it is two periods, a day at most: a Duration holds no more than 68 years.
 STAYS = 2.0
 _LONGEST = 86400.0
@@ -75,24 +76,27 @@ _BEHIND_TEXT = 8 + 8 + 5
 
 class Markers:
     """
-    Writes the markers of a machine.
+    Writes the markers of a hexapod.
 
     A leg is a piston, from joint to joint, in a cylinder that begins at the base joint. Their
     colour goes from white to vermillion as the leg pushes with up to ``limits.force_max``, to blue
     as it pulls; where there is no such limit, with up to the largest of the six forces. They are
-    grey where no forces are published. The platform is grey blue, yellow inside the warning of a
-    singularity, and vermillion inside ``singularity.stop_condition``.
+    grey where no forces are published. The platform is grey blue, yellow while the singularity
+    warning is on, and vermillion inside ``singularity.stop_condition`` and at a crossing. A purple
+    ball is the platform's centre of mass.
 
     Parameters
     ----------
     parameters : Parameters
-        Geometry, limits, names and ``visualization_rate``.
+        Geometry, centre of mass, limits, thresholds, names and ``visualization_rate``. Some of
+        them may change while the node is active: other parameters need other ``Markers``.
 
     """
 
     # Near the end of what a double holds sizes overflow: nothing is answered there, nor drawn.
     @np.errstate(all='ignore')
     def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
         self._names = parameters['joints']
         self._base = parameters['geometry.base_joints']
         self._platform = parameters['geometry.platform_joints']
@@ -114,20 +118,24 @@ class Markers:
         self._stamps: list[int] = []
         self._body = bytearray(LITTLE_ENDIAN)
         self._put(4, 'I', 0)  # how many there are
-        self._marker('base', 0, _TRIANGLE_LIST, _BASE, points=_plate(self._base, thickness))
-        self._marker('base', 1, _SPHERE_LIST, _JOINT, ball, self._base)
+        self._marker('base', 0, Marker.TRIANGLE_LIST, _BASE, points=_plate(self._base, thickness))
+        self._marker('base', 1, Marker.SPHERE_LIST, _JOINT, ball, self._base)
         outside = self._base + _NAME_OUTSIDE * (self._base - self._base.mean(axis=0))
         for n, name in enumerate(self._names):
-            self._marker('names', n, _TEXT, _WHITE, text_size, position=outside[n], text=name)
-        self._plate = self._marker('platform', 0, _TRIANGLE_LIST, PLATFORM[OK],
+            self._marker('names', n, Marker.TEXT_VIEW_FACING, _WHITE, text_size,
+                         position=outside[n], text=name)
+        self._plate = self._marker('platform', 0, Marker.TRIANGLE_LIST, PLATFORM[OK],
                                    points=_plate(self._platform, thickness))
         self._with_platform = [
-            self._plate, self._marker('platform', 1, _SPHERE_LIST, _JOINT, ball, self._platform),
-            self._marker('platform', 2, _LINE_LIST, _WHITE, line, axes,
-                         [color for color in _AXES for _ in range(2)])]
-        self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, _CYLINDER,
+            self._plate,
+            self._marker('platform', 1, Marker.SPHERE_LIST, _JOINT, ball, self._platform),
+            self._marker('platform', 2, Marker.LINE_LIST, _WHITE, line, axes,
+                         [color for color in _AXES for _ in range(2)]),
+            self._marker('platform', 3, Marker.SPHERE_LIST, _CENTER_OF_MASS, (_HEAVY * size,) * 3,
+                         parameters['platform.center_of_mass'][None])]
+        self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, Marker.CYLINDER,
                                      NO_FORCE) for n in range(12)]
-        self._text = self._marker('singularity', 0, _TEXT, _WHITE, text_size)
+        self._text = self._marker('singularity', 0, Marker.TEXT_VIEW_FACING, _WHITE, text_size)
         _COUNT.pack_into(self._body, len(LITTLE_ENDIAN), len(self._stamps))
         # Its text is of any length: what stands before it is kept, and what behind it.
         self._end = bytes(self._body[-_BEHIND_TEXT:])
@@ -153,7 +161,7 @@ class Markers:
         pose = (*motion[:3], *quaternion_of(motion[3:12]))
         for at in self._with_platform:
             _POSE.pack_into(body, at, *pose)
-        level, message, _ = singularity_level(output)
+        level, message = singularity_state(output, self._parameters)
         _put_color(body, self._plate, PLATFORM[level])
 
         vectors = motion[:3] + self._platform @ rotation.T - self._base
@@ -191,7 +199,7 @@ class Markers:
         return rows
 
     def _full(self, forces: Six) -> Sequence[float]:
-        """Return the force of each leg at which its colour is full."""
+        """Return the force of each leg at which its colour is saturated."""
         if self._bounds is not None:
             bounds: list[float] = self._bounds.tolist()
             return bounds
@@ -207,13 +215,13 @@ class Markers:
         lines = [f'det(J) {output.determinant:.4g} m^3, condition number {output.condition:.4g}']
         if message:
             lines.insert(0, message)
-        legs = sorted({excess.leg for excess in output.excesses})
+        legs = sorted({exceedance.leg for exceedance in output.exceedances})
         if legs:
-            lines.append('beyond their limits: ' + ', '.join(self._names[leg] for leg in legs))
+            lines.append('limits exceeded: ' + ', '.join(self._names[leg] for leg in legs))
         if output.forces is not None:
             full = self._full(output.forces)
             force = 'limits.force_max' if len(set(full)) > 1 else f'{full[0]:.4g} N'
-            lines.append(f'vermillion pushes, blue pulls, full colour at {force}')
+            lines.append(f'vermillion: push, blue: pull, saturated at {force}')
         return '\n'.join(lines)
 
     # -- the message that is made once ------------------------------------------------------

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The simulator: the plant as a node, in real time or one period for each command."""
+"""The simulator node: the plant in real time, or one period for each command."""
 
 from __future__ import annotations
 
@@ -32,14 +32,17 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.plausibility import doubts
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.messages.cdr import finite, MalformedError
+from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.nodes.run import declare_parameters, run
-from stewart_dynamics.runtime.plant import INPUT_TYPES, OUTPUT_TYPES, Plant
+from stewart_dynamics.nodes.simulator_messages import INPUT_TYPES, OUTPUT_TYPES, StateMessages
+from stewart_dynamics.runtime.plant import Plant
+from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.runtime.repeated_events import Series
-from stewart_dynamics.runtime.setpoints import MALFORMED, NOT_FINITE, Refusal, Setpoints
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.runtime.wrench_input import WrenchInput
 
 _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/PoseStamped': PoseStamped,
@@ -62,11 +65,11 @@ NOT_SIX = 'not six numbers'
 
 class SimulatorNode(Node):
     """
-    Moves the machine under the forces that are commanded, and publishes how it moves.
+    Moves the hexapod under the commanded forces, and publishes its state.
 
-    In real time it takes the periods that are due by a steady clock, several where it is late,
-    and lets time go where it is later than 0.1 s. With ``use_sim_time`` each command is one period
-    and nothing else moves time.
+    In real time it takes the periods that are due by a steady clock, several where it is late;
+    what is later than 0.1 s is skipped. With ``use_sim_time`` each command is one period, and
+    nothing else advances time.
 
     Raises ParameterError where the parameters break a rule.
     """
@@ -82,10 +85,11 @@ class SimulatorNode(Node):
             self.get_logger().warning(compiled.HINT)
         begun = time.monotonic()
         self._plant = Plant(self._settings)
-        for doubt in doubts(self._settings):
-            self.get_logger().warning(doubt)
-        # What it knows of messages on ~/wrench, and the counting of what is refused.
-        self._loads = Setpoints(self._settings, self._on_refusal, self.get_logger().warning)
+        self._state_messages = StateMessages(self._settings)
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
+        self._rejections = Rejections(self._on_rejection)
+        self._wrench_input = WrenchInput(self._settings, self._rejections)
         self._commands: Six | None = None
         self._stamp = _BEGIN
         self._index = 0
@@ -94,13 +98,13 @@ class SimulatorNode(Node):
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
                          for topic, kind in OUTPUT_TYPES.items()}
         for topic, take in (('commands', self._on_commands),
-                            ('wrench', self._loads.take_wrench)):
+                            ('wrench', self._wrench_input.take)):
             self.create_subscription(_TYPES[INPUT_TYPES[topic]], f'~/{topic}',
                                      until_shutdown(self, take), qos, raw=True)
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
-            + f', {self._rate:g} periods in a second, steps in each: {self._plant.steps}')
+            + f', {self._rate:g} periods per second of {self._plant.steps} steps each')
         if self._stepped:
             self._clock_output = self.create_publisher(Clock, '/clock', qos)
             self._messages = self._messages_now()
@@ -109,26 +113,26 @@ class SimulatorNode(Node):
             self._start: int | None = None
             self._timer(1.0 / self._rate, self._on_time)
         self._timer(_WATCH_SECONDS, self._on_watch)
-        # What is there now stays: see DynamicsNode.
+        # What exists now stays: see DynamicsNode.
         gc.collect()
         gc.freeze()
 
     def _timer(self, seconds: float, callback: Any) -> Any:
-        # A steady clock: ROS time stands still until it is moved here, or jumps.
+        # A steady clock: ROS time stands still until it is advanced here, or jumps.
         return self.create_timer(seconds, until_shutdown(self, callback),
                                  clock=RosClock(clock_type=ClockType.STEADY_TIME))
 
     def _on_commands(self, data: bytes) -> None:
         try:
-            values = cdr.float64_values(data)
-        except cdr.MalformedError as exc:
-            self._loads.refuse('commands', MALFORMED, str(exc))
+            values = float64_values(data)
+        except MalformedError as exc:
+            self._rejections.reject('commands', MALFORMED, str(exc))
             return
         if len(values) != 6:
-            self._loads.refuse('commands', NOT_SIX, f'{len(values)} of them')
+            self._rejections.reject('commands', NOT_SIX, f'{len(values)} numbers')
             return
-        if not cdr.finite(values):
-            self._loads.refuse('commands', NOT_FINITE, str(values))
+        if not finite(values):
+            self._rejections.reject('commands', NOT_FINITE, str(values))
             return
         first, second, third, fourth, fifth, sixth = values
         self._commands = first, second, third, fourth, fifth, sixth
@@ -143,10 +147,10 @@ class SimulatorNode(Node):
             self._start, self._stamp = now, self.get_clock().now().nanoseconds
         late = now - self._start - self._time_of(self._index + 1)
         if late > _BACKLOG:
-            # Stamps go on with the clock, the machine where it is.
+            # Stamps go on with the clock, the motion where it was.
             self._start += late
             self._stamp += late
-            self._say('late', f'fell behind by {late / 1e9:.3f} s: that time is let go')
+            self._say('late', f'fell behind by {late / 1e9:.3f} s: that time is skipped')
         while self._time_of(self._index + 1) <= now - self._start:
             self._advance()
 
@@ -158,23 +162,24 @@ class SimulatorNode(Node):
         """Take one period, with the brakes on until there is a command."""
         self._index += 1
         if self._commands is not None and not self._plant.fault:
-            state = self._plant.advance(self._commands, self._loads.wrench)
+            state = self._plant.advance(self._commands, self._wrench_input.wrench)
             if self._plant.fault:
                 self.get_logger().error(self._plant.fault)
             elif state.forces != self._commands:
-                self._tell_saturated(self._commands, state.forces)
+                self._log_saturated(self._commands, state.forces)
         self._messages = self._messages_now()
         self._publish()
 
     def _messages_now(self) -> list[tuple[str, bytes]]:
-        return list(self._plant.messages(self._stamp + self._time_of(self._index)))
+        return list(self._state_messages.write(
+            self._stamp + self._time_of(self._index), self._plant.measured()))
 
     def _announce(self) -> None:
-        """Say again what is not answered: all of it at first, when not all may be heard yet."""
+        """Publish again what is not answered: all messages until the first command."""
         if self._commands is None:
             self._publish()
         else:
-            self._publish_clock()  # those who follow it do so best effort
+            self._publish_clock()  # its subscribers are best effort and may have lost it
 
     def _publish(self) -> None:
         for topic, message in self._messages:
@@ -183,19 +188,19 @@ class SimulatorNode(Node):
             self._publish_clock()
 
     def _publish_clock(self) -> None:
-        self._clock_output.publish(cdr.clock(self._stamp + self._time_of(self._index)))
+        self._clock_output.publish(clock(self._stamp + self._time_of(self._index)))
 
-    # -- words ----------------------------------------------------------------------------
+    # -- logging --------------------------------------------------------------------------
 
-    def _tell_saturated(self, commands: Six, forces: Six) -> None:
+    def _log_saturated(self, commands: Six, forces: Six) -> None:
         joint, command, force = max(
             zip(self._settings['joints'], commands, forces, strict=True),
             key=lambda leg: abs(leg[1] - leg[2]))
-        self._say('saturated', f'commands: {joint}: {command:.6g} N is beyond limits.force_max, '
+        self._say('saturated', f'commands: {joint}: {command:.6g} N exceeds limits.force_max, '
                   f'clipped to {force:.6g} N')
 
-    def _on_refusal(self, refusal: Refusal, details: str) -> None:
-        self._say(refusal, f'{refusal.topic} refused: {refusal.reason}: {details}')
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
+        self._say(rejection, rejection.words(details))
 
     def _say(self, kind: Hashable, text: str) -> None:
         if (line := self._series.add(kind, text, time.monotonic())) is not None:

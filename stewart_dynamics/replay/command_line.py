@@ -28,7 +28,7 @@ from tqdm import tqdm
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, folders_of_results
 from stewart_dynamics.replay.fleet import replay_fleet
@@ -133,8 +133,8 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     bags = folders_of_results(given.bags, given.output)
     if compiled.HINT:
         print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
-    for doubt in doubts(parameters):
-        print(f'stewart_replay: {doubt}', file=sys.stderr)
+    for mistake in likely_mistakes(parameters):
+        print(f'stewart_replay: {mistake}', file=sys.stderr)
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(

@@ -75,7 +75,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
-from stewart_dynamics.mechanics.kernel import COULOMB_RATE
+from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.step import Batch, Outputs
 

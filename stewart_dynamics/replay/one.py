@@ -38,7 +38,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import BagError, StewartError
-from stewart_dynamics.mechanics.force_breakdown import ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.differentiate import Differentiator
@@ -48,8 +48,10 @@ from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Ta
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.summary import Summary
-from stewart_dynamics.runtime import setpoints as inputs
-from stewart_dynamics.runtime.setpoints import Messages, Refusal, Setpoints
+from stewart_dynamics.runtime import input_topics as inputs
+from stewart_dynamics.runtime.output_messages import OutputMessages
+from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
+from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
 
 DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
@@ -170,7 +172,7 @@ class _Run:
         self._more = 0
         if parameters['setpoint.source'] == 'pose' and options.cutoff is None:
             self.notices.append('setpoint.source is pose: the forces are those at rest')
-        self._firsts: dict[Refusal, str] = {}
+        self._firsts: dict[Rejection, str] = {}
         self._setpoints = Setpoints(parameters, self._refused, self._notice)
         self._step = Step(parameters)
         self._state: Singularity | None = None
@@ -187,8 +189,8 @@ class _Run:
         self._causes = None
         if options.report:
             self.report = Report(parameters, measured=options.measured is not None)
-            self._causes = ForceCauses(parameters)
-        self._bag = OutputBag(folder / 'bag', options.node, self._step)
+            self._causes = ForceBreakdownRows(parameters)
+        self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters))
         stack.callback(self._bag.abandon)
         table = ParquetTable if options.parquet else CsvTable
         self._table: Table = table(folder, parameters['joints'])
@@ -212,7 +214,7 @@ class _Run:
         if self._differentiator is not None:
             self._answer(self._differentiator.finish())
             for reason, number in self._differentiator.left_out.items():
-                self._setpoints.refuse(inputs.POSE, reason, '', number)
+                self._setpoints.reject(inputs.POSE, reason, '', number)
             for notice in self._differentiator.notices():
                 self._notice(notice)
         if self._comparison is not None:
@@ -266,7 +268,7 @@ class _Run:
             lines += _compared_lines(summary['measured'])
         return '\n'.join(lines)
 
-    def _refused(self, refusal: Refusal, details: str) -> None:
+    def _refused(self, refusal: Rejection, details: str) -> None:
         self._firsts.setdefault(refusal, details)
 
     def _notice(self, text: str) -> None:
@@ -286,7 +288,7 @@ class _Run:
         restarts_answered = restarts[outputs.answered]
         refused = len(setpoints.stamps) - len(outputs.stamps)
         if refused:
-            self._setpoints.refuse('setpoint', inputs.OUT_OF_RANGE, '', refused)
+            self._setpoints.reject('setpoint', OUT_OF_RANGE, '', refused)
             # A restart holds for the next that is answered.
             setpoints = setpoints.chosen(outputs.answered)._replace(
                 restarts=np.diff(restarts_answered, prepend=0) > 0)
@@ -322,7 +324,7 @@ class _Run:
         stamps, efforts, refused = self._efforts.read(
             messages.data, messages.starts[which], messages.sizes[which])
         for reason, number in refused.items():
-            self._setpoints.refuse(MEASURED, reason, '', number)
+            self._setpoints.reject(MEASURED, reason, '', number)
         self._compared(self._comparison.add_measured(stamps, efforts))
 
     def _compared(self, compared: Any) -> None:

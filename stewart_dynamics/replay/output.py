@@ -35,9 +35,10 @@ import yaml  # type: ignore[import-untyped]
 
 from stewart_dynamics.arrays import Bytes, Stamps
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.messages.cdr import at_any_byte
+from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.mcap_file import MAGIC
-from stewart_dynamics.runtime.step import OUTPUT_TYPES, Outputs, Step
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.runtime.step import Outputs
 
 _LIBRARY = 'stewart_dynamics'
 # Of a message record: opcode, length, channel, sequence, when it was logged and published.
@@ -58,14 +59,14 @@ class OutputBag:
         Made; named as bags are.
     node : str
         Name before the topics.
-    step : Step
-        It makes the messages.
+    messages : OutputMessages
+        It writes the messages.
 
     """
 
-    def __init__(self, folder: Path, node: str, step: Step) -> None:
+    def __init__(self, folder: Path, node: str, messages: OutputMessages) -> None:
         self._folder = folder
-        self._step = step
+        self._messages = messages
         folder.mkdir()
         self._file = (folder / f'{folder.name}.mcap').open('wb')
         self._counts: Counter[int] = Counter()
@@ -90,7 +91,7 @@ class OutputBag:
         """Write a chunk: what each setpoint gave, recorded at these times (N,) [ns]."""
         if not len(times):
             return
-        groups = [group for group in self._step.messages_of(outputs) if len(group[1])]
+        groups = [group for group in self._messages.of_outputs(outputs) if len(group[1])]
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
         for n, (_, which, messages) in enumerate(groups):
             sizes[which, n] = _HEAD + messages.dtype.itemsize

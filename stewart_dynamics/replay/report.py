@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.curves import Curves, Frames
 from stewart_dynamics.replay.report_tables import bag_name, parameter_table, Tables
@@ -55,8 +55,8 @@ _BLACK = '#222222'
 # Where the channels of a sample begin, in the order in which ``Report.add`` puts them.
 _POSITION, _ANGLES, _VELOCITY, _OMEGA, _ACCELERATION, _ALPHA = range(0, 18, 3)
 _LENGTHS, _RATES, _FORCES, _POWERS = range(18, 42, 6)
-_DETERMINANT, _CONDITION, _CAUSES = 42, 43, 44
-_CHANNELS = _CAUSES + 6 * len(CAUSES)
+_DETERMINANT, _CONDITION, _SOURCES = 42, 43, 44
+_CHANNELS = _SOURCES + 6 * len(SOURCES)
 
 # And of a comparison with what was measured.
 _MEASURED, _COMPUTED, _RESIDUAL, _WRENCH = range(0, 24, 6)
@@ -136,7 +136,7 @@ class Report:
         outputs : Outputs
             Theirs.
         causes : (N, 6, 6)
-            The demanded forces split: sample, cause as in CAUSES, leg [N].
+            The demanded forces split: sample, cause as in SOURCES, leg [N].
 
         """
         motions, forces = setpoints.motions, outputs.demanded_forces
@@ -154,7 +154,7 @@ class Report:
             rows[_POWERS:_POWERS + 6] = (forces * outputs.rates).T
         rows[_DETERMINANT] = outputs.determinants
         rows[_CONDITION] = outputs.conditions
-        rows[_CAUSES:] = causes.reshape(len(seconds), -1).T
+        rows[_SOURCES:] = causes.reshape(len(seconds), -1).T
         self._curves.add(seconds, rows)
         self._frames.add(seconds, np.concatenate(
             [motions[:, :12], outputs.lengths, forces], axis=1))
@@ -291,8 +291,8 @@ class Report:
                  'demanded force times rate; + drives, − brakes', spikes=True),
             Plot('causes', '', 'Leg force by cause', 'N', {
                 leg: [Curve('sum', '#a3abb6', _FORCES + n, width=4.5),
-                      *(Curve(cause, color, _CAUSES + 6 * c + n) for c, (cause, color) in
-                        enumerate(zip(CAUSES, _COLORS, strict=True)))]
+                      *(Curve(cause, color, _SOURCES + 6 * c + n) for c, (cause, color) in
+                        enumerate(zip(SOURCES, _COLORS, strict=True)))]
                 for n, leg in enumerate(self._legs)}, 'the parts of the demanded force',
                 spikes=True),
         ]

@@ -28,7 +28,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import PARAMETERS, Parameters
 
 # So many of the times of one kind are told, the first.
@@ -256,7 +256,7 @@ class Tables:
         if not split:
             return ''
         rows = []
-        for cause in CAUSES:
+        for cause in SOURCES:
             cells = [escape(cause.capitalize())]
             for leg in split.values():
                 cells.append(f'{_number(leg[cause]["rms_n"], 1)} '

@@ -30,9 +30,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.limits import LIMITS
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.step import Batch, LIMITS, Outputs
+from stewart_dynamics.runtime.step import Batch, Outputs
 
 # So many crossings and warnings are told one by one; all of them are counted.
 TOLD = 100
@@ -226,8 +227,8 @@ class Summary:
         self._crossings = _Crossings()
         self._warnings = _Warnings()
         # a cause at a time: numpy seeks along many columns at once far more slowly
-        self._cause_peaks = [_Extreme(6, np.abs) for _ in CAUSES]
-        self._cause_squares = _Integral(6 * len(CAUSES))
+        self._cause_peaks = [_Extreme(6, np.abs) for _ in SOURCES]
+        self._cause_squares = _Integral(6 * len(SOURCES))
         self._has_causes = False
 
     def add(self, seconds: Array, setpoints: Batch, outputs: Outputs,
@@ -245,7 +246,7 @@ class Summary:
         outputs : Outputs
             The answers.
         causes : (N, 6, 6), optional
-            The forces by cause, as ForceCauses gives them [N].
+            The forces by cause, as ForceBreakdownRows gives them [N].
 
         """
         if not len(seconds):
@@ -399,7 +400,7 @@ class Summary:
         rms = np.sqrt(self._cause_squares.mean).reshape(-1, 6)
         return {name: {cause: {'peak_n': _number(self._cause_peaks[n].values[leg]),
                                'rms_n': _number(rms[n, leg])}
-                       for n, cause in enumerate(CAUSES)}
+                       for n, cause in enumerate(SOURCES)}
                 for leg, name in enumerate(self._legs)}
 
     def table(self) -> str:

@@ -13,26 +13,26 @@
 # limitations under the License.
 
 """
-What the legs feel: the load that touches the platform, from measured lengths, rates and forces.
+The external wrench: the load on the platform that measured lengths, rates and forces show.
 
-The machine obeys ``M X'' + C X' + G = J_inv^T f + w + w_touch`` with the leg forces f that were
-measured, the load w that ``~/wrench`` says, which is known and not external, and what touches the
-platform besides. The inverse path gives the forces f_model of the same motion without a touch, so
+The hexapod obeys ``M X'' + C X' + G = J_inv^T f + w + w_ext`` with the measured leg forces f, the
+load w that ``~/wrench`` says, which is known, and the external wrench w_ext. The inverse dynamics
+give the forces f_model of the same motion without it, so
 
-    w_touch = J_inv^T (f_model - f)
+    w_ext = J_inv^T (f_model - f)
 
 with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
-base axes, the negative of the residual wrench in ``replay.measured``. All that the model does not
-have is in it: a wrong payload or friction, a brake, an end stop.
+base axes. Whatever the model does not have is in it: a wrong payload or friction, a brake, an end
+stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.
 
-Pose and twist come from lengths and rates (``forward_kinematics``); the acceleration is the
-difference of two twists by the time between them, its mean over that time. The forces are those
-that acted in that time, as a controller holds them, and all else is the mean of what it is at both
-ends (the trapezoidal rule, an error of second order). The difference quotient is rough, and passes
-through a low-pass filter of the first order, ``r' = 2 pi cutoff (w_touch - r)``, solved exactly
-for any time dt between two samples, over which w_touch is constant; it begins at zero. That is the
-generalized momentum observer of De Luca et al. (Collision detection and safe reaction with the
-DLR-III lightweight manipulator arm, IROS 2006, doi:10.1109/IROS.2006.282053) with the gain K =
+Online, pose and twist come from lengths and rates (``forward_kinematics``); the acceleration is
+the difference of two twists by the time between them, its mean over that time. The forces are
+those that acted in that time, as a controller holds them, and all else is the mean of what it is
+at both ends (the trapezoidal rule, an error of second order). The difference quotient is rough,
+and passes through a low-pass filter of the first order, ``r' = 2 pi cutoff (w_ext - r)``, solved
+exactly for any time dt between two samples, over which w_ext is constant; it begins at zero. That
+is the generalized momentum observer of De Luca et al. (Collision detection and safe reaction with
+the DLR-III lightweight manipulator arm, IROS 2006, doi:10.1109/IROS.2006.282053) with the gain K =
 2 pi cutoff: of r' = K (p' - u - r), p the momentum, it takes the integral, r = K (p -
 integral(u + r)), and here the same equation is solved step by step. So noise is no worse than
 there: white noise of deviation s in a twist comes out as M K s at most, however short dt is, while
@@ -52,12 +52,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.home_pose import homes
 from stewart_dynamics.mechanics.jit import entry_point, inlined
-from stewart_dynamics.mechanics.plausibility import homes
-from stewart_dynamics.mechanics.rows import FORCES, MOTION, RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import consecutive, FORCES, MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
-from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
 
 # Under the node's name.
@@ -66,28 +66,15 @@ EXTERNAL_WRENCH = 'external_wrench'
 # What became of a measurement, beside what forward_kinematics says of its pose.
 _OUT_OF_RANGE = 3
 
-# One measurement in numbers: machine, lengths, rates, forces, known load, filter before, gain of
-# the filter, time since the last one (0: there is none), motion of the last one or guess; then,
-# written, motion (behind the last one: two rows for solve), filter after, measured - model forces,
-# steps and residual of the pose, code.
-_LENGTHS = kernel.MACHINE
-_RATES = _LENGTHS + 6
-_FORCES = _RATES + 6
-_KNOWN = _FORCES + 6
-_BEFORE = _KNOWN + WRENCH
-_GAIN = _BEFORE + 6
-_INTERVAL = _GAIN + 1
-_MOTION = _INTERVAL + 1
-_RESULT = _MOTION + MOTION
-_MOTION_AFTER = _RESULT
-_AFTER = _MOTION_AFTER + MOTION
-_DIFFERENCES = _AFTER + 6
-_STEPS = _DIFFERENCES + 6
-_RESIDUAL = _STEPS + 1
-_CODE = _RESIDUAL + 1
-_NUMBERS = _CODE + 1
-_GIVEN = Struct(f'{_RESULT - _LENGTHS}d')
-_GIVES = Struct(f'{_NUMBERS - _RESULT}d')
+# One measurement as numbers, since an array costs time to pass: what is given, what is written.
+# Motion before (or the guess where there is none) and after lie side by side: two rows.
+_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
+    MOTION, WRENCH, 6, 1, 1, 1)
+(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION,
+ _WRITTEN) = consecutive(CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, _CODE.stop)
+_MOTIONS = slice(_MOTION.start, _MOTION.start + 2 * MOTION)
+_GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
+_GIVES = Struct(f'{_CODE.stop}d')
 
 
 class Measurement(NamedTuple):
@@ -104,7 +91,7 @@ class Measurement(NamedTuple):
 
 
 class Overload(NamedTuple):
-    """A threshold that the external wrench is beyond."""
+    """A threshold that the external wrench exceeds."""
 
     limit: str
     value: float
@@ -112,13 +99,13 @@ class Overload(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """What a measurement tells of platform and surroundings."""
+    """The platform's motion and the external wrench at a measurement."""
 
     stamp: int
     motion: tuple[float, ...]
     """A row of motion: pose, twist, and the acceleration since the last measurement."""
     wrench: Six | None
-    """The load that touches the platform, filtered; none of the first measurement [N, N m]."""
+    """The external wrench, filtered; none of the first measurement [N, N m]."""
     differences: Six | None
     """Measured - model, not filtered (6) [N]; none of the first measurement."""
     overloads: tuple[Overload, ...] = ()
@@ -135,57 +122,96 @@ class Estimate(NamedTuple):
 
 
 @inlined
-def _add_end(numbers: Array, machine: Array, motion: Array, result: Array) -> None:
-    """Add what one end of the interval has of the wrench and of the differences: half of each."""
+def _add_external_wrench(machine: Array, motion: Array, model_forces: Array,
+                         measured_forces: Array, weight: float, wrench: Array) -> None:
+    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, without making J_inv."""
     position = motion[0], motion[1], motion[2]
     rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
                 motion[10], motion[11])
     for leg in range(6):
         a, _length, _inverse_length, s = kernel.leg_line(machine, leg, position, rotation)
         m = cross(a, s)
-        half = 0.5 * (numbers[_FORCES + leg] - result[FORCES.start + leg])
-        numbers[_DIFFERENCES + leg] += half
+        force = weight * (model_forces[leg] - measured_forces[leg])
         for n in range(3):
-            numbers[_AFTER + n] -= half * s[n]
-            numbers[_AFTER + 3 + n] -= half * m[n]
+            wrench[n] += force * s[n]
+            wrench[3 + n] += force * m[n]
+
+
+@entry_point
+def _many(machine: Array, motions: Array, model_forces: Array, measured_forces: Array,
+          wrenches: Array) -> None:
+    for n in range(len(motions)):
+        wrenches[n] = 0.0
+        _add_external_wrench(
+            machine, motions[n], model_forces[n], measured_forces[n], 1.0, wrenches[n])
+
+
+def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: Array,
+                      measured_forces: Array) -> Array:
+    """
+    Return the external wrench of many samples, each alone: nothing is filtered.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        Its geometry is used.
+    motions : (N, 12) or (N, MOTION)
+        Rows of motion, of which only the poses are used.
+    model_forces, measured_forces : (N, 6)
+        Of the inverse dynamics, and of the actuators [N], + pushes.
+
+    Returns
+    -------
+    (N, 6)
+        Force [N] and moment [N m] at the platform's origin, base axes, the sign of ``~/wrench``.
+
+    """
+    wrenches = np.empty((len(motions), WRENCH))
+    motions, model_forces, measured_forces = map(
+        np.ascontiguousarray, (motions, model_forces, measured_forces))
+    _many(platform.constants, motions, model_forces, measured_forces, wrenches)
+    return wrenches
 
 
 @entry_point
 def _one(numbers: Array) -> None:
-    """Write what one measurement gives; an array costs time to pass."""
-    machine = numbers[:kernel.MACHINE]
-    motion = numbers[_MOTION_AFTER:_MOTION_AFTER + MOTION]
-    motion[:] = numbers[_MOTION:_MOTION + MOTION]
-    code, numbers[_STEPS], numbers[_RESIDUAL] = forward_kinematics.pose(
-        machine, numbers[_LENGTHS:_LENGTHS + 6], motion)
-    numbers[_CODE] = code
+    """Write what one measurement gives."""
+    machine, written = numbers[_PLATFORM], numbers[_WRITTEN]
+    before, motion, wrench, differences = (
+        numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
+    motion[:] = before
+    code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
+        machine, numbers[_LENGTHS], motion)
+    written[_CODE.start] = code
     if code != forward_kinematics.FOUND:
         return
-    forward_kinematics.twist(machine, numbers[_RATES:_RATES + 6], motion)
-    dt = numbers[_INTERVAL]
+    forward_kinematics.twist(machine, numbers[_RATES], motion)
+    dt = numbers[_INTERVAL.start]
     for n in range(6):
-        motion[18 + n] = (motion[12 + n] - numbers[_MOTION + 12 + n]) / dt if dt > 0.0 else 0.0
-        numbers[_MOTION + 18 + n] = motion[18 + n]
-        numbers[_AFTER + n] = 0.0
-        numbers[_DIFFERENCES + n] = 0.0
+        motion[18 + n] = (motion[12 + n] - before[12 + n]) / dt if dt > 0.0 else 0.0
+        before[18 + n] = motion[18 + n]
+        wrench[n] = 0.0
+        differences[n] = 0.0
     if dt > 0.0:
-        motions = numbers[_MOTION:_MOTION_AFTER + MOTION].reshape(2, MOTION)
-        results = np.empty((2, RESULT))
-        kernel.solve(machine, motions, numbers[_KNOWN:_KNOWN + WRENCH].reshape(
-            1, WRENCH), results)
-        for end in range(2):
-            _add_end(numbers, machine, motions[end], results[end])
+        motions = numbers[_MOTIONS].reshape(2, MOTION)
+        forces, results = numbers[_FORCES], np.empty((2, RESULT))
+        kernel.solve(machine, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
+        for end in range(2):  # the mean of both ends
+            model_forces = results[end, FORCES]
+            _add_external_wrench(machine, motions[end], model_forces, forces, 0.5, wrench)
+            for n in range(6):
+                differences[n] += 0.5 * (forces[n] - model_forces[n])
         for n in range(6):
-            before = numbers[_BEFORE + n]
-            numbers[_AFTER + n] = before + numbers[_GAIN] * (numbers[_AFTER + n] - before)
-    for n in range(_RESULT, _STEPS):
-        if not math.isfinite(numbers[n]):
-            numbers[_CODE] = _OUT_OF_RANGE
+            filtered = numbers[_BEFORE.start + n]
+            wrench[n] = filtered + numbers[_GAIN.start] * (wrench[n] - filtered)
+    for n in range(_STEPS.start):
+        if not math.isfinite(written[n]):
+            written[_CODE.start] = _OUT_OF_RANGE
 
 
 class ExternalWrench:
     """
-    The step from a measurement to the external wrench, for a machine with given parameters.
+    The step from a measurement to the external wrench, for a hexapod with given parameters.
 
     Parameters
     ----------
@@ -197,14 +223,13 @@ class ExternalWrench:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._numbers = np.zeros(_NUMBERS)
+        self._numbers = np.zeros(_WRITTEN.stop)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[:kernel.MACHINE] = StewartPlatform(parameters).machine
+        self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
         self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
         self._most_force, self._most_moment = (
             parameters[f'{EXTERNAL_WRENCH}.{limit}'] for limit in ('force_max', 'moment_max'))
-        self._message = cdr.Numbers(parameters['base_frame'], 6)
 
     def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,
                  target: Sequence[float] | None) -> Estimate:
@@ -226,8 +251,8 @@ class ExternalWrench:
         Raises
         ------
         PoseError, SingularityError
-            The lengths belong to no pose near the last one. Where there is none so far, or not
-            since ``setpoint.timeout``, near the target and at home neither.
+            The forward kinematics did not converge from the last pose. Where there is none so
+            far, or none since ``setpoint.timeout``, from the target and from home neither.
         MotionError
             Numbers overflow.
 
@@ -240,31 +265,28 @@ class ExternalWrench:
         else:
             for guess in self._guesses(before, target):
                 result = self._solve(given, NO_WRENCH, 0.0, guess)
-                if result[_CODE - _RESULT] == forward_kinematics.FOUND:
+                if result[_CODE.start] == forward_kinematics.FOUND:
                     break
-        if result[_CODE - _RESULT] != forward_kinematics.FOUND:
+        if result[_CODE.start] != forward_kinematics.FOUND:
             raise _error(measurement, result)
-        motion = result[:MOTION]
+        motion = result[_MOTION_AFTER]
         if not 0 < interval <= self._longest_gap:
             return Estimate(measurement.stamp, motion, None, None)
-        fx, fy, fz, tx, ty, tz = result[_AFTER - _RESULT:_DIFFERENCES - _RESULT]
-        d0, d1, d2, d3, d4, d5 = result[_DIFFERENCES - _RESULT:_STEPS - _RESULT]
+        fx, fy, fz, tx, ty, tz = result[_AFTER]
+        d0, d1, d2, d3, d4, d5 = result[_DIFFERENCES]
         estimate = Estimate(measurement.stamp, motion, (fx, fy, fz, tx, ty, tz),
                             (d0, d1, d2, d3, d4, d5))
         overloads = tuple(self._overloads(estimate))
         return estimate._replace(overloads=overloads) if overloads else estimate
 
-    def message(self, estimate: Estimate) -> bytes:
-        """Return the geometry_msgs/WrenchStamped of an estimate that has a wrench."""
-        return self._message.write(estimate.stamp, estimate.wrench or NO_WRENCH)
-
     def _solve(self, given: tuple[float, ...], before: Six, interval: float,
                motion: Sequence[float]) -> tuple[float, ...]:
         # Computed here: compiled code has an expm1 of its own.
         gain = -math.expm1(-self._rate * interval)
-        _GIVEN.pack_into(self._memory, 8 * _LENGTHS, *given, *before, gain, interval, *motion)
+        _GIVEN.pack_into(
+            self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion)
         _one(self._numbers)
-        return _GIVES.unpack_from(self._memory, 8 * _RESULT)
+        return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
 
     def _guesses(self, before: Estimate | None, target: Sequence[float] | None,
                  ) -> Iterator[Sequence[float]]:
@@ -289,10 +311,11 @@ class ExternalWrench:
 
 def _error(measurement: Measurement, result: tuple[float, ...],
            ) -> PoseError | SingularityError | MotionError:
-    code, lengths = result[_CODE - _RESULT], ', '.join(f'{x:.6g}' for x in measurement.lengths)
+    code, lengths = result[_CODE.start], ', '.join(f'{x:.6g}' for x in measurement.lengths)
     if code == _OUT_OF_RANGE:
         return MotionError(f'stamp {measurement.stamp} ns')
     if code == forward_kinematics.SINGULAR:
         return SingularityError(f'lengths [{lengths}] m')
-    return PoseError(f'lengths [{lengths}] m: after {result[_STEPS - _RESULT]:.0f} steps a length '
-                     f'is {result[_RESIDUAL - _RESULT]:.3g} m off')
+    residual, steps = result[_RESIDUAL.start], result[_STEPS.start]
+    return PoseError(f'lengths [{lengths}] m: did not converge: residual {residual:.3g} m after '
+                     f'{steps:.0f} iterations')

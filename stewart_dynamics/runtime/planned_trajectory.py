@@ -13,260 +13,271 @@
 # limitations under the License.
 
 """
-Planned motions: a trajectory of the platform in, the legs' trajectory out, or why not.
+Planned trajectories: motion of the platform in, lengths, rates and forces of the legs out.
 
-A motion is refused as a whole where it breaks a limit or meets a singularity, at its points or
-between them, in what the platform is meant to do there (``interpolation``) and in what the legs
-do that a joint_trajectory_controller moves: it joins positions and velocities of a leg by
-polynomials of third degree in time, efforts by straight lines.
+A trajectory is rejected as a whole where it exceeds a limit or meets a singularity, at its points
+or between them, in what the platform is to do there (``interpolation``) and in what the legs do
+that a joint_trajectory_controller moves: it joins positions and velocities of a leg by cubics in
+time, efforts by straight lines.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Flags, Integers, Six
+from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import forward_kinematics
-from stewart_dynamics.mechanics.interpolation import Cubics, Interpolation
+from stewart_dynamics.mechanics.arguments import as_array, optional_array
+from stewart_dynamics.mechanics.cubics import Cubics
+from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.jit import COMPILED
-from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, MOTION, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.setpoints import (
-    frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, OUT_OF_RANGE, QUATERNION_TOLERANCE,
-    unit_details, WRONG_FRAME)
-from stewart_dynamics.runtime.step import Excess, LIMITS
+from stewart_dynamics.runtime.planned_trajectory_checks import Checks, Violation
 
-INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
-OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
-
-MOST_POINTS = 100_000
-# Points and samples between them that a motion may need.
+# Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
-# So many ways between points or samples at most are worked on between two yields: about a
-# millisecond's work. Uncompiled, one takes a millisecond.
+# At most so many intervals between points or samples are worked on between two yields: about half
+# a millisecond of work. Uncompiled, one takes a millisecond.
 PIECE = 256 if COMPILED else 1
+# Where nothing waits meanwhile, larger pieces take less time in all.
+_LARGE_PIECE = 16 * PIECE
+# A time_from_start holds less [s].
+_TIMES_END = 2 ** 31
 
-# Between two samples a point of the platform that is the characteristic length from its origin
-# goes no farther than this part of that length, and its acceleration is no farther from a
-# straight line than this [m/s^2], a hundredth of gravity.
-_WAY = 0.01
+# Between two samples, a point of the platform at the characteristic length from its origin moves
+# by at most this part of that length, and its acceleration deviates from a straight line by at
+# most this [m/s^2], a hundredth of gravity.
+_STEP = 0.01
 _BEND = 0.1
-# So much beyond a limit of length is none [m]: a machine that stands on its stop, its pose in
-# doubles or in a message of fewer digits, may go away from it.
-_LENGTH_TOLERANCE = 1e-9
-# |det(J)| that falls between two samples below this part of what it is there is looked at more
-# closely, in so many parts, down to this part of the way between two points.
-_DIP = 0.9
+# Closer samples part an interval in so many, down to this part of the interval of two points.
 _PARTS = 16
 _CLOSEST = 1e-6
 
-TIMES = 'time_from_start does not rise'
-TOO_FAR = 'too far between points'
-LIMIT = 'a limit is broken'
-SINGULAR = 'a singularity is met'
-TOO_MANY = 'more than can wait'
+NOT_INCREASING = 'time_from_start is not strictly increasing'
+TOO_FAR = 'points too far apart'
 
-
-class Outcome(NamedTuple):
-    """What has become of a trajectory."""
-
-    message: str
-    """In words, for people."""
-    reason: str = ''
-    """Why it was refused, a constant of this module or of ``setpoints``; empty: it was not."""
-    answer: bytes = b''
-    """A trajectory_msgs/JointTrajectory; empty where refused."""
-    warning: bool = False
-    """It comes within warn_condition."""
-    values: tuple[tuple[str, str], ...] = ()
-    """Keys with their units, and values."""
-
-
-# Behind which points of a block samples are (M,), and how much of the way is done there (M,).
+_LENGTHS, _RATES, _FORCES = consecutive(6, 6, 6)
+# After which points of a block samples are (M,), and at which fraction of the interval (M,).
 _Samples = tuple[Integers, Array]
 
 
-class _Refused(Exception):
-
-    def __init__(self, reason: str, words: str, values: tuple[tuple[str, str], ...] = ()) -> None:
-        super().__init__(reason, words, values)
-        self.outcome = Outcome(f'refused: {words}', reason, values=values)
+def _no_legs() -> Array:
+    return np.empty((0, 6))
 
 
-def compile_ahead(parameters: Parameters) -> None:
-    """Compile what the work on a trajectory calls: setpoints shall not wait for the first one."""
-    platform, rows = StewartPlatform(parameters), np.zeros((1, MOTION))
-    platform.solve(rows)
-    forward_kinematics.twists(platform.machine, np.zeros((1, 6)), rows)
-    codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
-    forward_kinematics.poses(
-        platform.machine, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
+@dataclass(frozen=True, eq=False)
+class PlannedTrajectory:
+    """The result of the check of a planned trajectory."""
+
+    accepted: bool
+    message: str
+    """In words: 'accepted: 201 points over 2 s' or 'rejected: at 0.055 s leg_3: rate ...'."""
+    points: int
+    duration: float
+    """From the first point to the last [s]."""
+    reason: str = ''
+    """Why it is rejected, a constant of this module or ``planned_trajectory_checks``."""
+    time: float = math.nan
+    """When it would first do what it is rejected for [s]."""
+    leg: int | None = None
+    """Which leg would, 0 to 5; None where no leg is concerned."""
+    limit: str = ''
+    """The limit that is exceeded, 'limits.velocity_max'; empty where none is."""
+    lengths: Array = field(default_factory=_no_legs, repr=False)
+    """At the points (N, 6) [m]; (0, 6) where rejected."""
+    rates: Array = field(default_factory=_no_legs, repr=False)
+    """At the points (N, 6) [m/s], + extends; (0, 6) where rejected."""
+    forces: Array = field(default_factory=_no_legs, repr=False)
+    """Of the actuators at the points (N, 6) [N], + pushes; (0, 6) where rejected."""
+    warning: bool = False
+    """Accepted, but the condition number reaches singularity.warn_condition."""
+    condition_number: float = math.nan
+    """The largest, at points and between them; nan where rejected."""
+    condition_time: float = math.nan
+    """When that is [s]."""
+    force: float = math.nan
+    """The largest absolute force, at points and between them [N]; nan where rejected."""
+    force_leg: int | None = None
+    """Of which leg, 0 to 5."""
+    load: float = math.nan
+    """The largest absolute force as a part of limits.force_max; 0 without that limit."""
 
 
-def refused(reason: str, details: str) -> Outcome:
-    """Return the outcome of a trajectory that is not worked on."""
-    return _Refused(reason, f'{reason}: {details}').outcome
-
-
-def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome | None]:
+def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion: Motion,
+                             wrench: ArrayLike | None = None) -> PlannedTrajectory:
     """
-    Yield None after each piece of the work, and at the end what has become of it.
+    Check a planned trajectory against limits and singularities, and compute what the legs do.
+
+    The node does the same for ``~/platform_trajectory``. At the points lengths, rates and forces
+    are those of ``inverse_dynamics``, to the last bit. Between two points the platform is taken to
+    move by quintic polynomials of position and rotation vector through pose, twist and
+    acceleration of both; and the legs by cubics through their lengths and rates, as
+    joint_trajectory_controller moves them. Both are checked.
 
     Parameters
     ----------
-    parameters : Parameters
-        They hold for all of it.
-    wrench : (6,)
-        Load on the platform at its origin, base axes [N, N m].
-    data : bytes
-        A trajectory_msgs/MultiDOFJointTrajectory as it came.
+    platform : StewartPlatform
+        Its parameters have the limits and the thresholds of the condition number.
+    times : (N,)
+        When the points are [s], from 0 and strictly increasing; taken to the nanosecond.
+    motion : Motion of shape (N,)
+        Pose, twist and acceleration of the platform at the points.
+    wrench : (6,), optional
+        Force [N] and moment [N m] that act on the platform at its origin all the time, base axes;
+        None by default.
+
+    Returns
+    -------
+    PlannedTrajectory
+        Lengths, rates and forces of the legs, or why the trajectory is rejected.
+
+    Raises
+    ------
+    MotionError
+        Shapes do not fit, numbers are not finite or times not strictly increasing.
 
     """
+    if len(motion.shape) != 1 or not motion.shape[0]:
+        raise MotionError(f'motion: shape {motion.shape}: must be (N,), of N points')
+    seconds = as_array('times', times, motion.shape)
+    if seconds.shape != motion.shape:
+        raise MotionError(f'times: shape {seconds.shape}: must be {motion.shape}')
+    outside = (seconds < 0.0) | (seconds >= _TIMES_END)
+    if outside.any():
+        n = int(np.argmax(outside))
+        raise MotionError(f'times[{n}]: {seconds[n]} s: must be 0 to {_TIMES_END} s')
+    stamps = np.rint(seconds * 1e9).astype(np.int64)
+    if (stuck := first_not_increasing(stamps)) is not None:
+        raise MotionError(f'times[{stuck}]: {seconds[stuck]} s after {seconds[stuck - 1]} s: must '
+                          'be strictly increasing, by at least a nanosecond')
+    load = optional_array('wrench', wrench, (WRENCH,))
+    if load.shape != (WRENCH,):
+        raise MotionError(f'wrench: shape {load.shape}: must be ({WRENCH},)')
+    *_, result = check_in_pieces(platform, stamps, motion.rows, load, _LARGE_PIECE)
+    assert result is not None  # the last one
+    return result
+
+
+def check_in_pieces(platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
+                    piece: int = PIECE) -> Iterator[PlannedTrajectory | None]:
+    """
+    Yield None after each piece of the work, and the result at the end.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        Its parameters hold for all of the work.
+    times : (N,)
+        [ns], strictly increasing.
+    rows : (N, MOTION)
+        Rows of motion, finite, their rotations checked.
+    wrench : (6,)
+        External wrench at the platform's origin, base axes [N, N m].
+    piece : int
+        At most so many intervals are worked on between two yields.
+
+    """
+    work = _Work(platform, times, rows, wrench, piece)
     try:
-        work = _Work(parameters, wrench, data)
-        yield from work.read()
-        yield from work.solve()
-        yield work.outcome()
-    except cdr.MalformedError as exc:
-        yield refused(MALFORMED, str(exc))
-    except _Refused as exc:
-        yield exc.outcome
+        yield from work.check()
+    except _RejectedError as exc:
+        yield work.rejected(exc.violation)
+    else:
+        yield work.accepted()
 
 
-class _Trouble(NamedTuple):
-    """Where a motion must not go."""
+def first_not_increasing(times: Stamps, before: int = -1) -> int | None:
+    """Return the index of the first time [ns] that is not after the one before it."""
+    stuck = np.diff(times, prepend=before) <= 0
+    return int(np.argmax(stuck)) if stuck.any() else None
 
-    time: float
-    leg: int
-    reason: str
-    words: str
+
+def compile_ahead(parameters: Parameters) -> None:
+    """Compile what a check calls, so that setpoints do not wait for the first trajectory."""
+    platform, rows = StewartPlatform(parameters), np.zeros((1, MOTION))
+    platform.solve(rows)
+    forward_kinematics.twists(platform.constants, np.zeros((1, 6)), rows)
+    codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
+    forward_kinematics.poses(
+        platform.constants, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
+
+
+class _RejectedError(Exception):
+
+    def __init__(self, violation: Violation) -> None:
+        super().__init__(violation)
+        self.violation = violation
 
 
 class _Work:
-    """The work on one trajectory."""
+    """The work on one trajectory; see ``check_in_pieces``."""
 
-    def __init__(self, parameters: Parameters, wrench: Six, data: bytes) -> None:
-        self._message = cdr.PlatformTrajectory(data)
-        frame, base_frame = self._message.frame, parameters['base_frame'].encode()
-        if frame not in (b'', base_frame):
-            raise _Refused(WRONG_FRAME, f'{WRONG_FRAME}: {frame_details(frame, base_frame)}')
-        many = self._message.size
-        if not 1 <= many <= MOST_POINTS:
-            raise cdr.MalformedError(f'{many} points: must be 1 to {MOST_POINTS}')
-        self._parameters = parameters
-        self._platform = StewartPlatform(parameters)
-        self._wrench = np.array([wrench])
-        self._answer = cdr.LegTrajectory(
-            self._message.stamp, parameters['joints'], many, parameters['trajectory.effort'])
-        self._checks = _Checks(parameters)
-        self._legs_checks = _Checks(parameters)
-        self._times = np.empty(many, dtype=np.int64)  # [ns]
-        self._motions = np.empty((many, MOTION))
-        self._quaternions = np.empty((many, 4))
+    def __init__(self, platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
+                 piece: int) -> None:
+        self._platform, self._times, self._motions = platform, times, rows
+        self._parameters = platform.parameters
+        self._wrench = wrench[None]
+        self._piece = piece
+        self._legs = np.empty((len(times), 18))
+        self._checks = Checks(self._parameters)
+        self._legs_checks = Checks(self._parameters)
         self._samples = 0
 
-    def read(self) -> Iterator[None]:
-        """Read the points, and refuse those that are none."""
-        for first in range(0, len(self._times), PIECE):
-            end = min(first + PIECE, len(self._times))
-            points = self._message.points(first, end)
-            self._read_times(first, end, points)
-            numbers = np.column_stack([points['pose'], points['twist'], points['accel']])
-            if not (finite := np.isfinite(numbers).all(axis=1)).all():
-                n = int(np.argmin(finite))
-                raise _Refused(NOT_FINITE, f'{NOT_FINITE}: points[{first + n}]: '
-                               f'{tuple(numbers[n].tolist())}')
-            # The same arithmetic as for setpoints, so that the bits are the same.
-            x, y, z, w = numbers[:, 3:7].T
-            with np.errstate(over='ignore'):
-                length = np.sqrt(x * x + y * y + z * z + w * w)
-            if not (unit := np.abs(length - 1.0) <= QUATERNION_TOLERANCE).all():
-                n = int(np.argmin(unit))
-                raise _Refused(NOT_UNIT, f'{NOT_UNIT}: points[{first + n}]: '
-                               f'{unit_details(float(length[n]))}')
-            quaternions = x / length, y / length, z / length, w / length
-            self._quaternions[first:end] = np.column_stack(quaternions)
-            self._motions[first:end] = np.column_stack([
-                numbers[:, :3], *from_quaternion(*quaternions), numbers[:, 7:]])
-            yield
-
-    def _read_times(self, first: int, end: int, points: NDArray[np.void]) -> None:
-        if (late := points['nanosec'] >= 1_000_000_000).any():
-            n = int(np.argmax(late))
-            raise cdr.MalformedError(
-                f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
-                'under 1000000000')
-        times = self._times[first:end]
-        times[:] = points['sec'] * np.int64(1_000_000_000) + points['nanosec']
-        before = self._times[first - 1] if first else -1
-        if (stuck := np.diff(times, prepend=before) <= 0).any():
-            n = int(np.argmax(stuck))
-            raise _Refused(TIMES, f'{TIMES}: points[{first + n}]: {times[n] * 1e-9:.9g} s, ' + (
-                f'after {self._times[first + n - 1] * 1e-9:.9g} s' if first + n else
-                'must be at least 0'))
-
-    def solve(self) -> Iterator[None]:
-        """Compute what the legs do, and refuse what they must not."""
+    def check(self) -> Iterator[None]:
+        """Compute what the legs do; raise _RejectedError where they must not."""
         last = len(self._times) - 1
-        for first in range(0, max(last, 1), PIECE):
-            end = min(first + PIECE, last)
-            yield from self._solve_block(first, end)
-            if troubles := self._checks.troubles or self._legs_checks.troubles:
-                # Of one time the singularity first: limits are broken because of it.
-                raise self._in_trouble(min(troubles, key=lambda each: (
-                    each.time, each.reason != SINGULAR, each)))
+        for first in range(0, max(last, 1), self._piece):
+            yield from self._check_block(first, min(first + self._piece, last))
+            if violations := self._checks.violations or self._legs_checks.violations:
+                raise _RejectedError(min(violations, key=lambda each: each.order))
 
-    def _solve_block(self, first: int, end: int) -> Iterator[None]:
-        """Do so from one point to another, both among them."""
+    def _check_block(self, first: int, end: int) -> Iterator[None]:
+        """Check from one point to another, both included."""
         block = slice(first, end + 1)
         motions, times = self._motions[block], _seconds(self._times[block])
         results = self._platform.solve(motions, self._wrench)
-        lengths = results[:, LENGTHS]
-        self._answer.put(
-            first, self._message.points(first, end + 1),
-            lengths - self._parameters['geometry.zero_length'],
-            results[:, RATES],
-            results[:, FORCES])
+        for here, there in ((_LENGTHS, LENGTHS), (_RATES, RATES), (_FORCES, FORCES)):
+            self._legs[block, here] = results[:, there]
         durations = _seconds(np.diff(self._times[block]))
         with np.errstate(all='ignore'):
-            between = Interpolation(durations, motions, self._quaternions[block])
-            many = self._samples_between(first, between)
-        legs = Cubics.between(lengths, results[:, RATES],
-                              durations[:, None])
+            between = Interpolation(durations, motions)
+            many = self._parts_between(first, between)
+        legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
         near = many == 1.0
-        dips = self._checks.take(times, durations, results, np.ones_like(near), near)
+        dips = self._checks.check(times, durations, results, np.ones_like(near), near)
         self._count(_PARTS * len(dips))
         closer: deque[_Samples] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
-        coarse = _samples(many)
-        while run := closer.popleft() if closer else next(coarse, None):
+        coarse = _samples(many, self._piece)
+        while samples := closer.popleft() if closer else next(coarse, None):
             yield
-            which, part = run
+            which, fraction = samples
             with np.errstate(all='ignore'):
-                rows = between.at(which, part)
+                rows = between.at(which, fraction)
             joined = which[1:] == which[:-1]
-            way = np.diff(part)
-            at, after = times[which] + part * durations[which], way * durations[which[1:]]
-            self._take_legs_way(at, after, legs.chosen(which), part, durations[which], rows)
-            for n in self._checks.take(
+            step = np.diff(fraction)
+            at, after = times[which] + fraction * durations[which], step * durations[which[1:]]
+            self._check_legs_path(
+                at, after, legs.selected(which), fraction, durations[which], rows)
+            for n in self._checks.check(
                     at, after, self._platform.solve(rows, self._wrench), joined, joined):
-                if way[n] > _CLOSEST:
+                if step[n] > _CLOSEST:
                     self._count(_PARTS)
-                    closer.append((np.full(_PARTS + 1, which[n]), part[n] + way[n] * _IN_PARTS))
+                    closer.append(
+                        (np.full(_PARTS + 1, which[n]), fraction[n] + step[n] * _IN_PARTS))
         yield
 
-    def _take_legs_way(self, times: Array, after: Array, legs: Cubics, part: Array,
-                       durations: Array, rows: Array) -> None:
+    def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
+                         durations: Array, rows: Array) -> None:
         """
         Check that the platform keeps clear of singularities where the legs' cubics lead it.
 
@@ -274,80 +285,74 @@ class _Work:
         ----------
         times, after : (M,), (M - 1,)
             When samples are, and from each to the next [s].
-        legs, part, durations : Cubics of (M, 6), (M,), (M,)
-            Of the way between points that each is on, how much is done, how long it takes [s].
+        legs, fraction, durations : Cubics of (M, 6), (M,), (M,)
+            Of the interval of points that each is in, where in it, and how long it is [s].
         rows : (M, MOTION)
-            Where the platform is meant to be.
+            Where the platform is to be.
 
         """
         poses, many = rows.copy(), len(rows)
         codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
-        machine = self._platform.machine
+        machine = self._platform.constants
         forward_kinematics.poses(
-            machine, legs.at(part[:, None]), poses, codes, steps, np.empty(many))
+            machine, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
         lost = np.flatnonzero(codes != forward_kinematics.FOUND)
         found = int(lost[0]) if len(lost) else many
         if found < many:
-            self._legs_checks.lose(float(times[found]))
+            self._legs_checks.no_pose(float(times[found]))
         if found:
             poses = poses[:found]
             forward_kinematics.twists(
-                machine, legs.rate_at(part[:, None])[:found] / durations[:found, None], poses)
-            self._legs_checks.take_singularities(
+                machine, legs.rate_at(fraction[:, None])[:found] / durations[:found, None], poses)
+            self._legs_checks.check_singularities(
                 times[:found], after[:found - 1], self._platform.solve(poses),
                 after[:found - 1] > 0.0)
 
-    def _samples_between(self, first: int, between: Interpolation) -> Array:
-        """Return in how many parts the way from each point to the next is looked at."""
+    def _parts_between(self, first: int, between: Interpolation) -> Array:
+        """Return in how many parts each interval of points is sampled."""
         arm = self._parameters['singularity.characteristic_length']
         many: Array = np.ceil(np.maximum(
-            between.reach(arm) / (_WAY * arm), np.sqrt(between.bend(arm) / _BEND)))
+            between.path_bound(arm) / (_STEP * arm), np.sqrt(between.bend_bound(arm) / _BEND)))
         many = np.maximum(many, 1.0, dtype=float)
         if not (bounded := many <= MOST_SAMPLES).all():
             n = first + int(np.argmin(bounded))
-            raise _Refused(TOO_FAR, f'{TOO_FAR}: points[{n}] and the next: more than '
-                           f'{MOST_SAMPLES} samples are needed to check what lies between')
+            raise self._too_far(f'{TOO_FAR}: points[{n}] and the next: more', n)
         self._count(int(many.sum()))
         return many
 
     def _count(self, samples: int) -> None:
         self._samples += samples
         if self._samples > MOST_SAMPLES:
-            raise _Refused(TOO_FAR, f'{TOO_FAR}: more than {MOST_SAMPLES} samples are needed to '
-                           'check what lies between')
+            raise self._too_far(f'{TOO_FAR}: more', None)
 
-    def outcome(self) -> Outcome:
-        """Return the outcome of a trajectory that is not refused."""
-        checks, joints = self._checks, self._parameters['joints']
-        message = f'answered: {self._what()}'
+    def _too_far(self, words: str, point: int | None) -> _RejectedError:
+        time = math.nan if point is None else float(self._times[point]) * 1e-9
+        return _RejectedError(Violation(
+            time, TOO_FAR, f'{words} than {MOST_SAMPLES} samples are needed to check what lies '
+            'between'))
+
+    def accepted(self) -> PlannedTrajectory:
+        """Return the result of a trajectory without violations."""
+        checks, points = self._checks, len(self._times)
+        message = f'accepted: {points} point{"s" * (points > 1)} over {self._duration:.6g} s'
         warn = self._parameters['singularity.warn_condition']
-        warning = checks.condition >= warn
-        if warning:
-            message += (f', condition number {checks.condition:.4g} at '
+        if warning := checks.condition_number >= warn:
+            message += (f', condition number {checks.condition_number:.4g} at '
                         f'{checks.condition_time:.3f} s is not below '
                         f'singularity.warn_condition, {warn:g}')
-        values = [*self._values(),
-                  ('worst condition number', f'{checks.condition:.6g}'),
-                  ('its time (s)', f'{checks.condition_time:.3f}'),
-                  ('largest force (N)', f'{checks.force:.6g}'),
-                  ('its leg', joints[checks.force_leg])]
-        if self._parameters['limits.force_max'] is not None:
-            values.append(('largest force, of limits.force_max', f'{checks.load:.4g}'))
-        return Outcome(message, answer=self._answer.message(), warning=warning,
-                       values=tuple(values))
+        return PlannedTrajectory(
+            True, message, points, self._duration,
+            lengths=self._legs[:, _LENGTHS], rates=self._legs[:, _RATES],
+            forces=self._legs[:, _FORCES], warning=warning,
+            condition_number=checks.condition_number, condition_time=checks.condition_time,
+            force=checks.force, force_leg=checks.force_leg, load=checks.load)
 
-    def _in_trouble(self, trouble: _Trouble) -> _Refused:
-        return _Refused(
-            trouble.reason, f'at {trouble.time:.3f} s{trouble.words}',
-            (*self._values(), ('refused at (s)', f'{trouble.time:.6g}'),
-             *[('leg', self._parameters['joints'][trouble.leg])][:trouble.leg + 1]))
-
-    def _what(self) -> str:
-        points = len(self._times)
-        return f'{points} point{"s" * (points > 1)} over {self._duration:.6g} s'
-
-    def _values(self) -> tuple[tuple[str, str], ...]:
-        return (('points', str(len(self._times))), ('duration (s)', f'{self._duration:.9g}'))
+    def rejected(self, violation: Violation) -> PlannedTrajectory:
+        """Return the result of a trajectory with a violation."""
+        when = '' if violation.reason == TOO_FAR else f'at {violation.time:.3f} s'
+        return PlannedTrajectory(
+            False, f'rejected: {when}{violation.words}', len(self._times), self._duration,
+            violation.reason, violation.time, violation.leg, violation.limit)
 
     @property
     def _duration(self) -> float:
@@ -355,178 +360,25 @@ class _Work:
         return float(self._times[-1] - self._times[0]) * 1e-9
 
 
-def _seconds(nanoseconds: Integers) -> Array:
+def _seconds(nanoseconds: Stamps) -> Array:
     return np.multiply(nanoseconds, 1e-9, dtype=float)
 
 
-def _samples(many: Array) -> Iterator[_Samples]:
+def _samples(many: Array, piece: int) -> Iterator[_Samples]:
     """
-    Yield pieces of the samples that part the way from each point to the next (N,) in so many.
+    Yield pieces of the samples that part the intervals of points (N,) in so many.
 
-    Both points are among them, where there is more than one part: behind which point, and how
-    much of the way is done.
+    Both points are among them, where there is more than one part.
     """
     which = np.flatnonzero(many > 1.0)
     ends = np.cumsum(many[which] + 1.0)
     begins = ends - many[which] - 1.0
     samples = int(ends[-1]) if len(which) else 0
     # The last of a piece is the first of the next one: something lies between two samples.
-    for first in range(0, samples - 1, PIECE):
-        index = np.arange(first, min(first + PIECE + 1, samples), dtype=float)
+    for first in range(0, samples - 1, piece):
+        index = np.arange(first, min(first + piece + 1, samples), dtype=float)
         of = np.searchsorted(ends, index, side='right')
         yield which[of], (index - begins[of]) / many[which[of]]
 
 
 _IN_PARTS: Array = np.linspace(0.0, 1.0, _PARTS + 1, dtype=np.float64)
-
-
-class _Checks:
-    """Finds where samples of a motion, in the order of time, break a limit or are singular."""
-
-    def __init__(self, parameters: Parameters) -> None:
-        self.troubles: list[_Trouble] = []
-        self.condition, self.condition_time = 0.0, 0.0
-        self.force, self.force_leg, self.load = -1.0, 0, 0.0
-        self._joints = parameters['joints']
-        self._shortest, self._longest, self._fastest, self._strongest = (
-            np.full(6, -math.inf if name == 'limits.length_min' else math.inf)
-            if parameters[name] is None else parameters[name] for name in LIMITS)
-        self._low, self._high = (
-            self._shortest - _LENGTH_TOLERANCE, self._longest + _LENGTH_TOLERANCE)
-        self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
-
-    def take(self, times: Array, durations: Array, results: Array, joined: Flags,
-             near: Flags) -> list[int]:
-        """
-        Note what is wrong with samples and between them.
-
-        Parameters
-        ----------
-        times : (M,)
-            [s]
-        durations : (M - 1,)
-            From each to the next [s].
-        results : (M, RESULT)
-            As ``inverse_dynamics`` has them.
-        joined : (M - 1,)
-            The next one follows it in the motion.
-        near : (M - 1,)
-            So near to the next that det(J) between them follows from theirs.
-
-        Returns behind which samples det(J) has to be looked at more closely.
-
-        """
-        finite = np.isfinite(results).all(axis=1)
-        if not finite.all():
-            n = int(np.argmin(finite))
-            self.troubles.append(_Trouble(float(times[n]), -1, OUT_OF_RANGE, f': {OUT_OF_RANGE}'))
-            if n == 0:
-                return []
-            times, results = times[:n], results[:n]
-            durations, joined, near = durations[:n - 1], joined[:n - 1], near[:n - 1]
-        self._take_forces(results)
-        self._take_limits(times, results)
-        self._take_cubics(times, durations, results, joined)
-        return self.take_singularities(times, durations, results, near)
-
-    def lose(self, time: float) -> None:
-        """Note that no pose has the lengths of the legs, clear of singularities."""
-        self.troubles.append(_Trouble(
-            time, -1, SINGULAR, ": the legs' way leads to no pose on this side of a singularity"))
-
-    def take_singularities(self, times: Array, durations: Array, results: Array,
-                           near: Flags) -> list[int]:
-        """Do what ``take`` does, for singularities alone."""
-        self._take_conditions(times, results)
-        return self._take_determinants(times, durations, results, near)
-
-    def _take_conditions(self, times: Array, results: Array) -> None:
-        condition = results[:, CONDITION]
-        n = int(np.argmax(condition))
-        if condition[n] > self.condition:
-            self.condition, self.condition_time = float(condition[n]), float(times[n])
-        if condition[n] >= self._stop:
-            n = int(np.argmax(condition >= self._stop))
-            self._singular(times[n], results[n], f'condition number {condition[n]:.4g} reaches '
-                           f'singularity.stop_condition, {self._stop:g}')
-
-    def _take_forces(self, results: Array) -> None:
-        """Note the largest."""
-        forces = np.abs(results[:, FORCES])
-        largest = float(forces.max())
-        if largest > self.force:
-            self.force, self.force_leg = largest, int(np.argmax(forces)) % 6
-        self.load = max(self.load, float((forces / self._strongest).max()))
-
-    def _take_limits(self, times: Array, results: Array) -> None:
-        """Check the samples themselves."""
-        lengths, rates, forces = (results[:, at] for at in (
-            LENGTHS, RATES, FORCES))
-        for limit, values, bounds, broken in (
-                ('limits.length_min', lengths, self._shortest, lengths < self._low),
-                ('limits.length_max', lengths, self._longest, lengths > self._high),
-                ('limits.velocity_max', rates, self._fastest, np.abs(rates) > self._fastest),
-                ('limits.force_max', forces, self._strongest, np.abs(forces) > self._strongest)):
-            self._take_broken(limit, values, bounds, broken, np.broadcast_to(
-                times[:, None], broken.shape))
-
-    def _take_cubics(self, times: Array, durations: Array, results: Array,
-                     joined: Flags) -> None:
-        """Check polynomials of third degree that have the samples' lengths and rates."""
-        lengths, rates = (results[:, at] for at in (LENGTHS, RATES))
-        cubics = Cubics.between(lengths, rates, durations[:, None])
-        # Most are within their control points, and those within the limits.
-        low, high = cubics.hull()
-        with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
-            middle = np.abs(cubics.middle_rate() / durations[:, None])
-        suspect = np.flatnonzero(joined & ((low < self._low) | (high > self._high)
-                                           | (middle > self._fastest)).any(axis=1))
-        if not len(suspect):
-            return
-        begin, duration = times[suspect, None], durations[suspect, None]
-        cubics = cubics.chosen(suspect)
-        for part in cubics.extremes():
-            values = cubics.at(part)
-            for limit, bounds, broken in (
-                    ('limits.length_min', self._shortest, values < self._low),
-                    ('limits.length_max', self._longest, values > self._high)):
-                self._take_broken(limit, values, bounds, broken, begin + part * duration)
-        part = cubics.fastest()
-        values = cubics.rate_at(part) / duration
-        self._take_broken('limits.velocity_max', values, self._fastest,
-                          np.abs(values) > self._fastest, begin + part * duration)
-
-    def _take_determinants(self, times: Array, durations: Array, results: Array,
-                           near: Flags) -> list[int]:
-        """Check whether det(J) passes zero between samples; return where that is not clear."""
-        determinants = results[:, DETERMINANT]
-        condition = results[:, CONDITION]
-        cubics = Cubics.between(determinants, results[:, DETERMINANT_RATE], durations)
-        cubics = Cubics._make(each * np.sign(determinants[:-1]) for each in cubics)
-        if (crossed := near & (cubics.end < 0.0)).any():
-            n = int(np.argmax(crossed))
-            self._singular(times[n] + cubics.chosen(n).zero() * durations[n], results[n],
-                           'det(J) passes zero')
-        smaller = np.minimum(cubics.start, cubics.end)
-        dips = np.flatnonzero(near & (cubics.end > 0.0) & (cubics.hull()[0] < smaller))
-        cubics, smaller = cubics.chosen(dips), smaller[dips]
-        lowest = np.fmin.reduce([smaller, *map(cubics.at, cubics.extremes())])
-        foretold = np.maximum(condition[dips], condition[dips + 1]) * smaller
-        found: list[int] = dips[(lowest < _DIP * smaller) | (
-            (lowest < smaller) & (foretold >= self._stop * lowest))].tolist()
-        return found
-
-    def _take_broken(self, limit: str, values: Array, bounds: Array, broken: Flags,
-                     times: Array) -> None:
-        """Note the first of the places (M, 6) where a limit is broken."""
-        if not broken.any():
-            return
-        n, leg = np.unravel_index(np.argmin(np.where(broken, times, np.inf)), broken.shape)
-        excess = Excess(limit, int(leg), float(values[n, leg]), float(bounds[leg]))
-        self.troubles.append(_Trouble(
-            float(times[n, leg]), excess.leg, LIMIT, f' {excess.words(self._joints)}'))
-
-    def _singular(self, time: float, result: Array, words: str) -> None:
-        leg = int(np.argmax(result[UNIT_LOAD_FORCES]))
-        self.troubles.append(_Trouble(
-            float(time), leg, SINGULAR, f': {words}, worst for {self._joints[leg]}'))

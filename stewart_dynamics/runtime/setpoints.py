@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-From messages on the setpoint topics to joined setpoints; what is refused is counted.
+From messages on the setpoint topics to joined setpoints; what is rejected is counted.
 
-Node and replay feed it the same bytes in the same order, so both refuse and join alike: the node
+Node and replay feed it the same bytes in the same order, so both reject and join alike: the node
 one message at a time, the replay many at once. ``take`` says what becomes of a message;
 ``take_many`` does the same to many of which none is out of the ordinary, and hands them to
 ``take`` where one is.
@@ -31,45 +31,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Bytes, Integers, NO_WRENCH, Six, Stamps
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.arrays import Bytes, Integers, Six, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.messages import cdr
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.input_topics import SOURCES, WRENCH
+from stewart_dynamics.runtime.joining import join_many, Samples, WAITING, Waiting
+from stewart_dynamics.runtime.rejections import NOT_JOINED, Rejection, Rejections, TOO_OLD, TWICE
+from stewart_dynamics.runtime.samples import SampleReader
 from stewart_dynamics.runtime.step import Batch, Setpoint
-
-# Of each topic under the node's name: type, how it is read.
-POSE = 'setpoint/pose'
-TWIST = 'setpoint/twist'
-ACCEL = 'setpoint/accel'
-COMBINED = 'setpoint/combined'
-WRENCH = 'wrench'
-INPUT_TYPES = {
-    POSE: 'geometry_msgs/msg/PoseStamped',
-    TWIST: 'geometry_msgs/msg/TwistStamped',
-    ACCEL: 'geometry_msgs/msg/AccelStamped',
-    COMBINED: 'trajectory_msgs/msg/MultiDOFJointTrajectory',
-    WRENCH: 'geometry_msgs/msg/WrenchStamped',
-}
-SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}
-_READERS: dict[str, Callable[[bytes], cdr.Stamped]] = {
-    POSE: cdr.pose, TWIST: cdr.twist, ACCEL: cdr.twist, COMBINED: cdr.combined,
-    WRENCH: cdr.wrench}
-
-# A quaternion's length may be this far from one; it is brought to one.
-QUATERNION_TOLERANCE = 1e-3
-# Samples of a topic that wait for those of the others; beyond it the oldest is given up. As many
-# as may wait in the node's middleware: it hands over one topic's after the other's.
-WAITING = 1000
+from stewart_dynamics.runtime.wrench_input import WrenchInput
 
 _STANDSTILL = (0.0,) * 6
-
-
-class Refusal(NamedTuple):
-    """Why a message, or what became of it, is counted and not used."""
-
-    topic: str
-    reason: str
+_NOWHERE = np.empty(0, dtype=np.int64)
+_NO_SAMPLES = Samples(_NOWHERE, np.empty((0, 0)), _NOWHERE)
 
 
 class Messages(NamedTuple):
@@ -101,28 +75,6 @@ class Messages(NamedTuple):
             yield self.topics[topic], time, self.data[start:start + size].tobytes()
 
 
-MALFORMED = 'malformed'
-NOT_FINITE = 'not finite'
-NOT_UNIT = 'quaternion not of unit length'
-WRONG_FRAME = 'wrong frame_id'
-TOO_OLD = 'older than the last used'
-TWICE = 'same stamp twice'
-NOT_JOINED = 'passed over: not all topics had its stamp'
-OUT_OF_RANGE = 'out of range: the numbers overflow'
-NOT_EXCLUSIVE = 'more than one writer'
-PASSED_OVER = 'passed over: more came at once than can be answered'
-
-
-def frame_details(frame: bytes, base_frame: bytes) -> str:
-    """Return what is said of a WRONG_FRAME."""
-    return f'{frame[:60].decode(errors="replace")!r}, must be {base_frame.decode()!r} or empty'
-
-
-def unit_details(length: float) -> str:
-    """Return what is said of a quaternion that is NOT_UNIT."""
-    return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'
-
-
 class Setpoints:
     """
     Joins the topics' samples by stamp.
@@ -131,38 +83,44 @@ class Setpoints:
     ----------
     parameters : Parameters
         Which topics, frame, tolerance and timeout.
-    refused : callable
-        Told of each refusal and its details, beside the counting.
+    rejected : callable
+        Told of each rejection and its details, beside the counting.
     noticed : callable
         Told what a user should hear once: a restart, stamps that are all zero.
 
     """
 
     def __init__(
-            self, parameters: Parameters, refused: Callable[[Refusal, str], None],
+            self, parameters: Parameters, rejected: Callable[[Rejection, str], None],
             noticed: Callable[[str], None]) -> None:
         self.topics = SOURCES[parameters['setpoint.source']]
-        self.counts: Counter[Refusal] = Counter()
-        self.wrench: Six = NO_WRENCH
-        self._frames = {b'', parameters['base_frame'].encode()}
+        self._rejections = Rejections(rejected)
+        self._wrench_input = WrenchInput(parameters, self._rejections)
+        self._readers = {topic: SampleReader(topic, parameters['base_frame'], self._rejections)
+                         for topic in self.topics}
         self._tolerance = round(parameters['setpoint.sync_tolerance'] * 1e9)
         self._timeout = round(parameters['setpoint.timeout'] * 1e9)
-        self._refused = refused
         self._noticed = noticed
         self._last: dict[str, int] = {}
-        self._waiting: dict[str, dict[int, tuple[float, ...]]] = {t: {} for t in self.topics}
+        self._waiting: dict[str, Waiting] = {topic: {} for topic in self.topics}
         self._unstamped: dict[str, tuple[float, ...] | None] = {}
         self._unstamped_said = False
         self._unstamped_first = ''
         self._stamped: set[str] = set()
-        self._layouts: dict[str, cdr.Layout] = {}
+
+    @property
+    def counts(self) -> Counter[Rejection]:
+        """What was rejected so far, and how often."""
+        return self._rejections.counts
+
+    @property
+    def wrench(self) -> Six:
+        """The known load on the platform, as ``~/wrench`` said it last [N, N m]."""
+        return self._wrench_input.wrench
 
     def take_wrench(self, data: bytes) -> None:
         """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
-        sample = self._sound(WRENCH, data)
-        if sample is not None:
-            fx, fy, fz, tx, ty, tz = sample[1]
-            self.wrench = fx, fy, fz, tx, ty, tz
+        self._wrench_input.take(data)
 
     def take(self, topic: str, data: bytes, now: Callable[[], int]) -> Setpoint | None:
         """
@@ -178,7 +136,7 @@ class Setpoints:
             The clock [ns]; asked where a setpoint's own stamps are zero.
 
         """
-        sample = self._sound(topic, data)
+        sample = self._readers[topic].read(data)
         if sample is None:
             if self._unstamped_said and topic not in self._stamped:
                 self._join_unstamped(topic, None, now)  # it keeps its place in the order
@@ -190,7 +148,7 @@ class Setpoints:
             # From now on zero is a time as others are.
             self._stamped.add(topic)
             if self._unstamped.pop(topic, None):
-                self.refuse(topic, NOT_JOINED, 'stamp 0')
+                self.reject(topic, NOT_JOINED, 'stamp 0')
         if not self._in_time(topic, stamp):
             return None
         waiting = self._waiting[topic]
@@ -198,7 +156,7 @@ class Setpoints:
         if len(waiting) > WAITING:
             oldest = next(iter(waiting))
             del waiting[oldest]
-            self.refuse(topic, NOT_JOINED, f'stamp {oldest} ns')
+            self.reject(topic, NOT_JOINED, f'stamp {oldest} ns')
         return self._join(stamp)
 
     def take_many(self, messages: Messages) -> Batch:
@@ -206,7 +164,8 @@ class Setpoints:
         joined = self._join_many(messages)
         if joined is not None:
             return joined
-        self._layouts.clear()
+        for reader in (self._wrench_input.reader, *self._readers.values()):
+            reader.forget_layout()
         setpoints = []
         times = []
         for topic, time, data in messages.each():
@@ -225,68 +184,29 @@ class Setpoints:
             np.array(times, dtype=np.int64))
 
     def end(self, why: str) -> None:
-        """Give up and count what still waits: no more messages come."""
+        """Drop and count what still waits: no more messages come."""
         for topic, waiting in self._waiting.items():
             for stamp in waiting:
-                self.refuse(topic, NOT_JOINED, f'stamp {stamp} ns: {why}')
+                self.reject(topic, NOT_JOINED, f'stamp {stamp} ns: {why}')
             waiting.clear()
-        self._give_up_unstamped()
+        self._drop_unstamped()
 
-    def refuse(self, topic: str, reason: str, details: str, number: int = 1) -> None:
+    def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
         """Count, and tell of, what is not used."""
-        refusal = Refusal(topic, reason)
-        self.counts[refusal] += number
-        self._refused(refusal, details)
-
-    def _sound(self, topic: str, data: bytes) -> tuple[int, tuple[float, ...]] | None:
-        """Return a message's stamp and numbers, a rotation matrix in them, or refuse it."""
-        # Most messages have the layout of the first one, whose frame was right.
-        layout = self._layouts.get(topic)
-        stamp_and_values = layout.read_one(data) if layout else None
-        if stamp_and_values is None:
-            try:
-                stamp, frame, values = _READERS[topic](data)
-            except cdr.MalformedError as exc:
-                self.refuse(topic, MALFORMED, str(exc))
-                return None
-            if frame not in self._frames:
-                self.refuse(topic, WRONG_FRAME, frame_details(frame, max(self._frames)))
-                return None
-            self._learn(topic, data)
-        else:
-            stamp, values = stamp_and_values
-        if not cdr.finite(values):
-            self.refuse(topic, NOT_FINITE, str(values))
-            return None
-        if topic in (POSE, COMBINED):
-            x, y, z, w = values[3:7]
-            length = math.sqrt(x * x + y * y + z * z + w * w)
-            if not abs(length - 1.0) <= QUATERNION_TOLERANCE:
-                self.refuse(topic, NOT_UNIT, unit_details(length))
-                return None
-            values = values[:3] + from_quaternion(
-                x / length, y / length, z / length, w / length) + values[7:]
-        return stamp, values
-
-    def _learn(self, topic: str, data: bytes) -> None:
-        """Keep the layout of a topic's first sound message."""
-        if topic not in self._layouts:
-            layout = cdr.Layout.of(_READERS[topic], data)
-            if layout is not None:
-                self._layouts[topic] = layout
+        self._rejections.reject(topic, reason, details, number)
 
     def _in_time(self, topic: str, stamp: int) -> bool:
-        """Return whether a sample may still be used, or refuse it."""
+        """Return whether a sample may still be used, or reject it."""
         if stamp in self._waiting[topic]:
-            self.refuse(topic, TWICE, f'stamp {stamp} ns')
+            self.reject(topic, TWICE, f'stamp {stamp} ns')
             return False
         last = self._last.get(topic)
         if last is None or not 0 <= last - stamp <= self._timeout:
             return True
         if stamp == last:
-            self.refuse(topic, TWICE, f'stamp {stamp} ns')
+            self.reject(topic, TWICE, f'stamp {stamp} ns')
         else:
-            self.refuse(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
+            self.reject(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
                         f'older than the last used')
         return False
 
@@ -300,7 +220,7 @@ class Setpoints:
             return None
         if not stamps:
             return None
-        restart = self._give_up(stamps)
+        restart = self._drop_passed(stamps)
         values = [self._waiting[other].pop(at) for other, at in stamps.items()]
         return Setpoint(stamps[self.topics[0]], self._motion(values), self.wrench, restart)
 
@@ -318,7 +238,7 @@ class Setpoints:
             at = stamps[self.topics[0]]
         return stamps if max(stamps.values()) - min(stamps.values()) <= self._tolerance else {}
 
-    def _give_up(self, stamps: dict[str, int]) -> bool:
+    def _drop_passed(self, stamps: dict[str, int]) -> bool:
         """
         Drop and count what waits and can no longer be used once these stamps are.
 
@@ -336,7 +256,7 @@ class Setpoints:
                           else math.inf)
                 for other in [other for other in waiting if other < stamp or other > future]:
                     del waiting[other]
-                    self.refuse(topic, NOT_JOINED, f'stamp {other} ns')
+                    self.reject(topic, NOT_JOINED, f'stamp {other} ns')
         self._last = stamps
         return bool(jump > self._timeout)
 
@@ -344,10 +264,10 @@ class Setpoints:
             self, topic: str, values: tuple[float, ...] | None, now: Callable[[], int],
     ) -> Setpoint | None:
         """
-        Join samples without a stamp in their order of arrival; one without values was refused.
+        Join samples without a stamp in their order of arrival; one without values was rejected.
 
         A setpoint begins with the topic that began the first one, and has one sample of each.
-        What is incomplete when the next one begins is given up, all of it: else a lost sample
+        What is incomplete when the next one begins is dropped, all of it: else a lost sample
         would join the following ones wrongly for ever.
         """
         if not self._unstamped_said:
@@ -355,23 +275,23 @@ class Setpoints:
             self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
                           'of arrival and stamped with the clock')
         if topic in self._unstamped or topic == self._unstamped_first:
-            self._give_up_unstamped()
+            self._drop_unstamped()
         self._unstamped[topic] = values
         if len(self._unstamped) < len(self.topics):
             return None
         in_order = [self._unstamped[other] for other in self.topics]
         sound = [each for each in in_order if each is not None]
         if len(sound) < len(in_order):
-            self._give_up_unstamped()
+            self._drop_unstamped()
             return None
         self._unstamped_first = self._unstamped_first or next(iter(self._unstamped))
         self._unstamped.clear()
         return Setpoint(now(), self._motion(sound), self.wrench)
 
-    def _give_up_unstamped(self) -> None:
+    def _drop_unstamped(self) -> None:
         for topic, values in self._unstamped.items():
             if values is not None:
-                self.refuse(topic, NOT_JOINED, 'stamp 0')
+                self.reject(topic, NOT_JOINED, 'stamp 0')
         self._unstamped.clear()
 
     def _motion(self, values: list[tuple[float, ...]]) -> tuple[float, ...]:
@@ -387,125 +307,29 @@ class Setpoints:
         """
         if self._tolerance or self._unstamped_said:
             return None
-        came = {topic: np.flatnonzero(messages.of_topic == n)
-                for n, topic in enumerate(messages.topics)}
-        samples: dict[str, tuple[Stamps, Array]] = {}
-        for topic, at in came.items():
-            of_topic = self._samples(topic, messages, at)
-            if of_topic is None:
+        samples: dict[str, Samples] = dict.fromkeys(self.topics, _NO_SAMPLES)
+        wrenches = _NO_SAMPLES
+        for n, topic in enumerate(messages.topics):
+            places = np.flatnonzero(messages.of_topic == n)
+            if not len(places):
+                continue
+            reader = self._wrench_input.reader if topic == WRENCH else self._readers[topic]
+            read = reader.read_many(messages.data, messages.starts[places], messages.sizes[places])
+            if read is None:
                 return None
-            samples[topic] = of_topic
-        wrench_at, wrenches = came.get(WRENCH, _NOWHERE), samples.pop(WRENCH, (None, None))[1]
-        stamps: dict[str, Stamps] = {}
-        # Where each of a topic's samples came, -1 for those that wait already.
-        places: dict[str, Integers] = {}
-        for topic in self.topics:
-            fresh, places_of = samples.get(topic, _NO_SAMPLES)[0], came.get(topic, _NOWHERE)
-            waiting = np.fromiter(self._waiting[topic], dtype=np.int64)
-            of_topic_all = np.concatenate([waiting, fresh])
-            after = self._last.get(topic)
-            # What waits need not have come in the order of its stamps.
-            if np.any(np.diff(of_topic_all) <= 0) or (len(fresh) and (
-                    fresh[0] <= 0 or (after is not None and of_topic_all[0] <= after))):
-                return None
-            stamps[topic] = of_topic_all
-            places[topic] = np.concatenate([np.full(len(waiting), -1), places_of])
-        # Stamps only rise, so setpoints are complete in the order of their stamps.
-        common = stamps[self.topics[0]]
-        for topic in self.topics[1:]:
-            common = np.intersect1d(common, stamps[topic], assume_unique=True)
-        chosen = {topic: np.searchsorted(stamps[topic], common) for topic in self.topics}
-        complete = np.max([places[topic][chosen[topic]] for topic in self.topics], axis=0)
-        if any(self._overflows(stamps[t], places[t], common, complete) for t in self.topics):
+            if topic == WRENCH:
+                wrenches = Samples(*read, places)
+            else:
+                samples[topic] = Samples(*read, places)
+        joined = join_many(samples, self._waiting, self._last)
+        if joined is None:
             return None
-        values = {topic: self._values(topic, samples) for topic in self.topics}
-        motions = np.zeros((len(common), MOTION))
-        column = 0
-        for topic in self.topics:
-            width = values[topic].shape[1]
-            motions[:, column:column + width] = values[topic][chosen[topic]]
-            column += width
-        loads = np.empty((len(common), 6))
-        loads[:] = self.wrench
-        if wrenches is not None and len(wrenches):
-            latest = np.searchsorted(wrench_at, complete) - 1
-            loads[latest >= 0] = wrenches[latest[latest >= 0]]
-            self.wrench = tuple(wrenches[-1].tolist())
-        self._stamped |= {topic for topic in self.topics if len(came.get(topic, ()))}
-        self._keep_waiting(stamps, values, common)
-        return Batch(common, motions, loads, np.zeros(len(common), dtype=bool),
-                     messages.times[complete])
-
-    def _samples(self, topic: str, messages: Messages, at: Integers,
-                 ) -> tuple[Stamps, Array] | None:
-        """Return stamps and values of a topic's messages; None where one is not ordinary."""
-        if not len(at):
-            return _NO_SAMPLES
-        layout = self._layouts.get(topic)
-        if layout is None:
-            start, size = int(messages.starts[at[0]]), int(messages.sizes[at[0]])
-            first = messages.data[start:start + size].tobytes()
-            try:
-                if _READERS[topic](first).frame not in self._frames:
-                    return None
-            except cdr.MalformedError:
-                return None
-            self._learn(topic, first)
-            layout = self._layouts.get(topic)
-            if layout is None:
-                return None
-        if np.any(messages.sizes[at] != layout.size):
-            return None
-        read = layout.read(messages.data, messages.starts[at])
-        if read is None or not np.isfinite(read[1]).all():
-            return None
-        stamps, values = read
-        if topic not in (POSE, COMBINED):
-            return read
-        # The same arithmetic as in _sound, so that the bits are the same.
-        x, y, z, w = values[:, 3:7].T
-        with np.errstate(over='ignore'):
-            length = np.sqrt(x * x + y * y + z * z + w * w)
-        if not np.all(np.abs(length - 1.0) <= QUATERNION_TOLERANCE):
-            return None
-        rotation = from_quaternion(x / length, y / length, z / length, w / length)
-        return stamps, np.column_stack([values[:, :3], *rotation, values[:, 7:]])
-
-    def _values(self, topic: str, samples: dict[str, tuple[Stamps, Array]]) -> Array:
-        """Return the values of what waits and of what came."""
-        fresh = samples.get(topic, _NO_SAMPLES)[1]
-        waiting = list(self._waiting[topic].values())
-        if not waiting:
-            return fresh
-        return np.concatenate([np.array(waiting), fresh.reshape(-1, len(waiting[0]))])
-
-    @staticmethod
-    def _overflows(stamps: Stamps, places: Integers, common: Stamps,
-                   complete: Integers) -> bool:
-        """Return whether, at any time, more than WAITING samples of a topic wait."""
-        if len(stamps) <= WAITING:
-            return False
-        completed = np.searchsorted(complete, places)  # setpoints, when a sample comes
-        used = np.concatenate([[0], np.searchsorted(stamps, common, side='right')])[completed]
-        return bool(np.any(np.arange(1, len(stamps) + 1) - used > WAITING))
-
-    def _keep_waiting(self, stamps: dict[str, Stamps], values: dict[str, Array],
-                      common: Stamps) -> None:
-        """Keep what came after the last setpoint; count what no setpoint can use any more."""
-        if len(common):
-            self._last = dict.fromkeys(self.topics, int(common[-1]))
-        for topic in self.topics:
-            first = 0
-            if len(common):
-                first = int(np.searchsorted(stamps[topic], common[-1], side='right'))
-                if first > len(common):
-                    for stamp in np.setdiff1d(stamps[topic][:first], common,
-                                              assume_unique=True).tolist():
-                        self.refuse(topic, NOT_JOINED, f'stamp {stamp} ns')
-            self._waiting[topic] = dict(zip(
-                stamps[topic][first:].tolist(), map(tuple, values[topic][first:].tolist()),
-                strict=True))
-
-
-_NOWHERE = np.empty(0, dtype=np.int64)
-_NO_SAMPLES: tuple[Stamps, Array] = (_NOWHERE, np.empty((0, 0)))
+        self._stamped |= {topic for topic in self.topics if len(samples[topic].stamps)}
+        self._waiting = joined.waiting
+        if len(joined.stamps):
+            self._last = dict.fromkeys(self.topics, int(joined.stamps[-1]))
+        for topic, dropped in joined.dropped.items():
+            for stamp in dropped:
+                self.reject(topic, NOT_JOINED, f'stamp {stamp} ns')
+        return Batch(joined.stamps, joined.motions, self._wrench_input.at(wrenches, joined.places),
+                     np.zeros(len(joined.stamps), dtype=bool), messages.times[joined.places])

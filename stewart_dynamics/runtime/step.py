@@ -13,46 +13,34 @@
 # limitations under the License.
 
 """
-The one step from a setpoint to what is published for it; node and replay both take it.
+The one step from a setpoint to legs, forces and the warning; node and replay both take it.
 
-It knows neither ROS nor bags, remembers nothing, and gives the same bits for the same input,
+It knows neither messages nor bags, keeps no state, and gives the same bits for the same input,
 whether setpoints come one at a time or by the thousand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 import math
-from operator import sub
 from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
 from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.jit import entry_point, inlined
+from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
+    CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
     UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity import (
-    advance, CAUSE, LAST, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
+    advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
+    UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.messages import cdr
+from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters import Parameters
-
-_QUANTITIES = {'limits.length_min': ('length', 'm'), 'limits.length_max': ('length', 'm'),
-               'limits.velocity_max': ('rate', 'm/s'), 'limits.force_max': ('force', 'N')}
-
-# Under the node's name, in the order in which they are published.
-OUTPUT_TYPES = {
-    'leg_states': 'sensor_msgs/msg/JointState',
-    'leg_lengths': 'std_msgs/msg/Float64MultiArray',
-    'leg_forces': 'std_msgs/msg/Float64MultiArray',
-    'jacobian_determinant': 'std_msgs/msg/Float64',
-    'singularity_warning': 'std_msgs/msg/Bool',
-}
 
 
 class Setpoint(NamedTuple):
@@ -66,22 +54,6 @@ class Setpoint(NamedTuple):
     """Load on the platform at its origin, base axes [N, N m]."""
     restart: bool = False
     """Time has jumped back before it: what came before says nothing of it."""
-
-
-class Excess(NamedTuple):
-    """A limit that a leg breaks."""
-
-    limit: str
-    leg: int
-    value: float
-    bound: float
-
-    def words(self, joints: Sequence[str]) -> str:
-        """Return what is beyond the limit, and by how much."""
-        quantity, unit = _QUANTITIES[self.limit]
-        beyond = abs(abs(self.value) - self.bound)
-        return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {beyond:.6g} {unit} '
-                f'beyond {self.limit}')
 
 
 class Output(NamedTuple):
@@ -100,7 +72,7 @@ class Output(NamedTuple):
     condition: float
     singularity: Singularity
     warning_changed: bool
-    excesses: tuple[Excess, ...]
+    exceedances: tuple[Exceedance, ...]
 
 
 class Batch(NamedTuple):
@@ -138,7 +110,7 @@ class Outputs(NamedTuple):
     changed: Flags
     """(N,): the singularity warning is another than before."""
     exceeding: Flags
-    """(N,): a limit is broken."""
+    """(N,): a limit is exceeded."""
 
     @property
     def lengths(self) -> Array:
@@ -195,34 +167,21 @@ class Outputs(NamedTuple):
         return Singularity.of(self.states[n].tolist())
 
 
-# The numbers of the settings: thresholds, whether to suppress, and four limits of six legs.
-_SUPPRESS = 3
-_LIMITS = 4
-LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
-_SETTINGS = _LIMITS + 6 * len(LIMITS)
+# The settings as numbers, those of the warning first; whether to suppress, the thresholds of the
+# limits, what forces are clipped to.
+_THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
 
-
-# One setpoint in numbers: machine, settings, motion, wrench, state before, restart, whether the
-# stamp is one; then, written, state after, result, forces, whether it is answered and exceeds.
-_ONE_SETTINGS = kernel.MACHINE
-_ONE_MOTION = _ONE_SETTINGS + _SETTINGS
-_ONE_WRENCH = _ONE_MOTION + MOTION
-_ONE_STATE = _ONE_WRENCH + WRENCH
-_ONE_RESTART = _ONE_STATE + STATE
-_ONE_STAMP = _ONE_RESTART + 1
-_ONE_RESULT = _ONE_STAMP + 1
-_ONE_FORCES = _ONE_RESULT + RESULT
-_ONE_AFTER = _ONE_FORCES + 6
-_ONE_ANSWERED = _ONE_AFTER + STATE
-_ONE_EXCEEDING = _ONE_ANSWERED + 1
-_ONE = _ONE_EXCEEDING + 1
-_GIVEN = Struct(f'{_ONE_RESULT - _ONE_MOTION}d')
-_GIVES = Struct(f'{_ONE - _ONE_RESULT}d')
+# One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
+_RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING = consecutive(RESULT, 6, STATE, 1, 1)
+_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BEFORE, _RESTART, _IS_STAMP, _WRITTEN = consecutive(
+    CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, STATE, 1, 1, _EXCEEDING.stop)
+_GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
+_GIVES = Struct(f'{_EXCEEDING.stop}d')
 
 
 @inlined
-def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result: Array,
-           forces: Array) -> tuple[bool, bool]:
+def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart: bool,
+           result: Array, forces: Array) -> tuple[bool, bool]:
     """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
     finite = is_stamp
     for k in range(RESULT):
@@ -230,55 +189,47 @@ def _watch(settings: Array, is_stamp: bool, state: Array, restart: bool, result:
     if not finite:
         return False, False
     if restart:
-        state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
+        forget(state)
     condition = result[CONDITION]
     advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
     solved = condition < UNSOLVABLE_CONDITION
-    published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS] > 0.0)
-    exceeding = False
+    published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
     for leg in range(6):
-        length, rate = result[LENGTHS.start + leg], result[RATES.start + leg]
-        force = result[FORCES.start + leg]
-        most = settings[_LIMITS + 18 + leg]
         if not solved:
             result[FORCES.start + leg] = np.nan
+        force, most = result[FORCES.start + leg], settings[_FORCE_MAX.start + leg]
         forces[leg] = min(max(force, -most), most) if published else np.nan
-        if (length < settings[_LIMITS + leg] or length > settings[_LIMITS + 6 + leg]
-                or abs(rate) > settings[_LIMITS + 12 + leg] or (solved and abs(force) > most)):
-            exceeding = True
-    return True, exceeding
+    return True, any_exceeded(limits, result)
 
 
 @entry_point
 def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
                 forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
     """Go through results in their order and write what becomes of them, see Outputs."""
-    state = before.copy()
+    state, limits = before.copy(), settings[_LIMITS]
     restart = False
     for n in range(len(results)):
         # One that cannot be answered hands it on.
         restart = restart or restarts[n]
-        is_stamp = -cdr.STAMPS_END <= stamps[n] < cdr.STAMPS_END
+        is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
         answered[n], exceeding[n] = _watch(
-            settings, is_stamp, state, restart, results[n], forces[n])
+            settings, limits, is_stamp, state, restart, results[n], forces[n])
         restart = restart and not answered[n]
         states[n] = state
 
 
 @entry_point
 def _one(numbers: Array) -> None:
-    """Do with one setpoint what solve and watch do with many; an array costs time to pass."""
-    state = numbers[_ONE_AFTER:_ONE_AFTER + STATE]
-    state[:] = numbers[_ONE_STATE:_ONE_STATE + STATE]
-    results = numbers[_ONE_RESULT:_ONE_RESULT + RESULT].reshape(1, RESULT)
-    kernel.solve(
-        numbers[:kernel.MACHINE],
-        numbers[_ONE_MOTION:_ONE_MOTION + MOTION].reshape(1, MOTION),
-        numbers[_ONE_WRENCH:_ONE_WRENCH + WRENCH].reshape(1, WRENCH), results)
-    numbers[_ONE_ANSWERED], numbers[_ONE_EXCEEDING] = _watch(
-        numbers[_ONE_SETTINGS:_ONE_SETTINGS + _SETTINGS], numbers[_ONE_STAMP] > 0.0, state,
-        numbers[_ONE_RESTART] > 0.0, results[0], numbers[_ONE_FORCES:_ONE_FORCES + 6])
+    """Do with one setpoint what solve and watch do with many."""
+    settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
+    state, result = written[_AFTER], written[_RESULT]
+    state[:] = numbers[_BEFORE]
+    kernel.solve(numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
+                 numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
+    written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
+        settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0, state,
+        numbers[_RESTART.start] > 0.0, result, written[_FORCES])
 
 
 _FIRST = Singularity()
@@ -286,7 +237,7 @@ _FIRST = Singularity()
 
 class Step:
     """
-    The step, for a machine with given parameters.
+    The step, for a hexapod with given parameters.
 
     Parameters
     ----------
@@ -299,21 +250,15 @@ class Step:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
-        self._numbers = np.zeros(_ONE)
+        self._limits = Limits(parameters)
+        self._numbers = np.zeros(_WRITTEN.stop)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[:_ONE_SETTINGS] = self._platform.machine
-        self._settings = self._numbers[_ONE_SETTINGS:_ONE_MOTION]
-        self._settings[:_SUPPRESS] = thresholds(parameters)
-        self._settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
-        self._limits = {name: parameters[name].tolist() for name in LIMITS
-                        if parameters[name] is not None}
-        for n, name in enumerate(LIMITS):
-            never = -math.inf if name == 'limits.length_min' else math.inf
-            self._settings[_LIMITS + 6 * n:_LIMITS + 6 * n + 6] = self._limits.get(name, never)
-        self._zero_lengths = parameters['geometry.zero_length'].tolist()
-        self._joint_state = cdr.JointState(parameters['joints'])
-        self._with_effort, self._without_effort = (
-            self._joint_state.layout(effort) for effort in (True, False))
+        self._numbers[_PLATFORM] = self._platform.constants
+        self._settings = settings = self._numbers[_SETTINGS]
+        settings[_THRESHOLDS] = thresholds(parameters)
+        settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
+        settings[_LIMITS] = self._limits.thresholds.ravel()
+        settings[_FORCE_MAX] = self._limits.force_max
 
     def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
         """
@@ -329,25 +274,23 @@ class Step:
         """
         stamp = setpoint.stamp
         _GIVEN.pack_into(
-            self._memory, 8 * _ONE_MOTION, *setpoint.motion, *setpoint.wrench,
-            *(before or _FIRST).numbers, setpoint.restart,
-            -cdr.STAMPS_END <= stamp < cdr.STAMPS_END)
+            self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
+            *(before or _FIRST).numbers, setpoint.restart, -STAMPS_END <= stamp < STAMPS_END)
         _one(self._numbers)
-        result = _GIVES.unpack_from(self._memory, 8 * _ONE_RESULT)
-        if not result[_ONE_ANSWERED - _ONE_RESULT]:
+        written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
+        if not written[_ANSWERED.start]:
             return None
-        lengths, rates, demanded = result[0:6], result[6:12], result[12:18]
-        forces = result[_ONE_FORCES - _ONE_RESULT:_ONE_AFTER - _ONE_RESULT]
-        singularity = Singularity.of(result[_ONE_AFTER - _ONE_RESULT:_ONE_ANSWERED - _ONE_RESULT])
+        lengths, rates, demanded = written[LENGTHS], written[RATES], written[FORCES]
+        forces = written[_FORCES]
+        singularity = Singularity.of(written[_AFTER])
         solved = demanded[0] == demanded[0]
         return Output(
             stamp, lengths, rates, demanded if solved else None,
-            forces if forces[0] == forces[0] else None, result[18:24],
-            result[DETERMINANT], result[DETERMINANT_RATE],
-            result[CONDITION], singularity,
+            forces if forces[0] == forces[0] else None, written[UNIT_LOAD_FORCES],
+            written[DETERMINANT], written[DETERMINANT_RATE], written[CONDITION], singularity,
             before is None or singularity.warning != before.warning,
-            self._excesses(lengths, rates, demanded if solved else None)
-            if result[_ONE_EXCEEDING - _ONE_RESULT] else ())
+            self._limits.exceeded(lengths, rates, demanded if solved else None)
+            if written[_EXCEEDING.start] else ())
 
     def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
         """Return what setpoints give one after the other; see the call for one."""
@@ -367,62 +310,3 @@ class Step:
         changed[:1] = before is None or warnings[:1] != before.warning
         changed[1:] = warnings[1:] != warnings[:-1]
         return Outputs(answered, stamps, results, forces, states, changed, exceeding)
-
-    def messages(self, output: Output) -> Iterator[tuple[str, bytes]]:
-        """Yield topics (keys of OUTPUT_TYPES) and messages to publish for an output."""
-        yield 'leg_states', self._joint_state.write(
-            output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
-            output.forces)
-        yield 'leg_lengths', cdr.float64_array(output.lengths)
-        if output.forces is not None:
-            yield 'leg_forces', cdr.float64_array(output.forces)
-        yield 'jacobian_determinant', cdr.float64(output.determinant)
-        if output.warning_changed:
-            yield 'singularity_warning', cdr.boolean(output.singularity.warning)
-
-    def messages_of(self, outputs: Outputs) -> list[tuple[str, Stamps, NDArray[np.void]]]:
-        """
-        Return the same messages as ``messages``, of many outputs.
-
-        Returns
-        -------
-        list of (topic, which, messages)
-            In the order in which they are published for one output; ``which`` (K,) outputs have
-            such a message, and the messages (K,) as entries of their length. A topic may come
-            twice, for its messages with and without forces.
-
-        """
-        positions = outputs.lengths - self._zero_lengths
-        solved = np.isfinite(outputs.forces[:, 0])
-        having, lacking = np.flatnonzero(solved), np.flatnonzero(~solved)
-        stamps, rates, forces = outputs.stamps, outputs.rates, outputs.forces
-        messages = [
-            ('leg_states', having, self._with_effort.write(
-                stamps[having], positions[having], rates[having], forces[having])),
-            ('leg_states', lacking, self._without_effort.write(
-                stamps[lacking], positions[lacking], rates[lacking])),
-            ('leg_lengths', np.arange(len(stamps)), cdr.FLOAT64_ARRAY.write(
-                None, outputs.lengths)),
-            ('leg_forces', having, cdr.FLOAT64_ARRAY.write(None, forces[having])),
-            ('jacobian_determinant', np.arange(len(stamps)), cdr.FLOAT64.write(
-                None, outputs.determinants[:, None])),
-        ]
-        changed = np.flatnonzero(outputs.changed)
-        warnings = [cdr.boolean(on) for on in outputs.warnings[changed].tolist()]
-        messages.append(('singularity_warning', changed, np.frombuffer(
-            b''.join(warnings), dtype=f'V{len(cdr.boolean(True))}')))
-        return messages
-
-    def _excesses(
-            self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Excess, ...]:
-        """Return every limit broken."""
-        found = []
-        for limit, bounds in self._limits.items():
-            values = (rates if limit == 'limits.velocity_max'
-                      else forces if limit == 'limits.force_max' else lengths)
-            if values is None:
-                continue
-            for leg, (value, bound) in enumerate(zip(values, bounds, strict=True)):
-                if (value < bound if limit == 'limits.length_min' else abs(value) > bound):
-                    found.append(Excess(limit, leg, value, bound))
-        return tuple(found)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the node says of the external wrench, a status of its own once a measurement has come."""
+"""The status ``external wrench``: there is one once a measurement has come."""
 
 from __future__ import annotations
 
@@ -21,20 +21,22 @@ from collections.abc import Sequence
 import math
 
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics import ERROR, Held, Level, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.diagnostics.report import (
+    ERROR, Held, Level, LevelLog, LogLine, OK, STALE, Status, WARN)
 from stewart_dynamics.runtime.external_wrench import Estimate, Overload
-from stewart_dynamics.runtime.setpoints import Refusal
+from stewart_dynamics.runtime.rejections import Rejection
 
 _NAME = 'external wrench'
+_NEVER = -math.inf
 _QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
                'external_wrench.moment_max': ('moment', 'N m')}
 _COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'moment y (N m)',
                'moment z (N m)')
 
 
-class WrenchDiagnostics:
+class ExternalWrenchDiagnostics:
     """
-    Gathers what becomes of measured legs; times are seconds of a steady clock.
+    Notes what becomes of measured legs.
 
     Parameters
     ----------
@@ -46,31 +48,32 @@ class WrenchDiagnostics:
     def __init__(self, parameters: Parameters) -> None:
         self._joints = parameters['joints']
         self._timeout = parameters['setpoint.timeout']
-        self._begun = self._heard = -math.inf
+        self._begun = self._heard = self._estimated_at = _NEVER
         self._estimated = 0
-        self._estimated_at = -math.inf
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._refusals: Counter[Refusal] = Counter()
+        self._rejections: Counter[Rejection] = Counter()
         self._held = Held()
-        self._level = OK  # in the last report
+        self._log = LevelLog(_NAME)
+        self._reported = OK  # the level in the last report
 
     def heard(self, now: float) -> None:
         """Note that a message came."""
         self._heard = now
-        if self._begun == -math.inf:
+        if self._begun == _NEVER:
             self._begun = now
 
-    def refused(self, refusal: Refusal, details: str, now: float) -> None:
-        """Note a refusal."""
-        self._refusals[refusal] += 1
-        self._held.see(Level(WARN, f'{refusal.topic}: {refusal.reason} ({details})'), now)
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
+        """Note a rejection."""
+        self._rejections[rejection] += 1
+        self._held.happened(
+            Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
 
     def estimated(self, estimate: Estimate, target: Sequence[float] | None, now: float) -> bool:
         """
-        Note an estimate and the last setpoint; return whether the level has changed.
+        Note an estimate and the last setpoint, a row of motion, None where there is none.
 
-        The setpoint is a row of motion, none where there is none yet.
+        Return whether the level is another than in the last report.
         """
         self._estimate, self._target = estimate, target
         if estimate.wrench is None:
@@ -78,33 +81,41 @@ class WrenchDiagnostics:
         self._estimated += 1
         self._estimated_at = now
         self._held.see(Level(ERROR if estimate.overloads else OK,
-                             ', '.join(map(_words, estimate.overloads))), now, lasting=True)
-        return self._held.at(now).level != self._level
+                             ', '.join(map(_words, estimate.overloads))), now)
+        return self._held.level(now) != self._reported
 
     def level(self, now: float) -> int:
         """Return the present level."""
-        return self._state(now).level
+        if self._begun == _NEVER:
+            return OK
+        return STALE if self._is_stale(now) else self._held.level(now)
 
-    def report(self, now: float) -> tuple[Status, ...]:
-        """Return the status, none before a measurement has come."""
-        level, message, _ = self._state(now)
-        self._level = level
-        if self._begun == -math.inf:
-            return ()
+    def status(self, now: float) -> Status | None:
+        """Return the status, None before a measurement has come."""
+        self._reported = self.level(now)
+        if self._begun == _NEVER:
+            return None
         values = [('wrenches', str(self._estimated))]
         if self._estimated:
             values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
         if self._estimate is not None:
             values += self._numbers(self._estimate)
-        values += [(f'refused, {topic}: {reason}', str(n))
-                   for (topic, reason), n in sorted(self._refusals.items())]
-        return Status(_NAME, level, message or 'no overload', tuple(values)),
+        values += [(f'rejected, {topic}: {reason}', str(n))
+                   for (topic, reason), n in sorted(self._rejections.items())]
+        return Status(_NAME, *self._state(now), tuple(values))
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return the changes of level."""
+        return self._log.lines(self._state(now))
+
+    def _is_stale(self, now: float) -> bool:
+        last = max(self._begun, self._estimated_at)
+        return last != _NEVER and now - last > self._timeout
 
     def _state(self, now: float) -> Level:
         held = self._held.at(now)
-        if now - max(self._begun, self._estimated_at) <= self._timeout or (
-                self._begun == -math.inf):
-            return held
+        if not self._is_stale(now):
+            return Level(held.level, held.message or 'no overload')
         silent = now - self._heard
         return Level(STALE, 'no wrench: ' + (
             f'measured_legs silent for {silent:.1f} s' if silent > self._timeout
@@ -139,4 +150,4 @@ def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, flo
 def _words(overload: Overload) -> str:
     quantity, unit = _QUANTITIES[overload.limit]
     return (f'{quantity} {overload.value:.6g} {unit} is {overload.value - overload.bound:.6g} '
-            f'{unit} beyond {overload.limit}')
+            f'{unit} above {overload.limit}')

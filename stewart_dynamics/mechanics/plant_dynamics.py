@@ -1,0 +1,208 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The motion of the platform under leg forces, integrated at a fixed step; compiled.
+
+The method is the classical Runge-Kutta method of fourth order, on position, quaternion and twist.
+After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
+Wanner, Geometric Numerical Integration, 2nd ed., IV.4, doi:10.1007/3-540-30666-8). Forces and
+wrench are constant within a call, so that the work of a leg force is the force times the change
+of its leg's length, exactly, and an energy balance shows the error of the method alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.end_stops import stop_force
+from stewart_dynamics.mechanics.forward_dynamics import acceleration, WORK
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.kernel import leg_line
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import ACCELERATION, consecutive, MOTION, ROTATION, TWIST
+from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, scale, Vector3
+
+# The state: position, quaternion x y z w, linear and angular velocity, base axes.
+STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
+STATE = 13
+# What is written beside it: lengths, rates, forces of the actuators, acceleration, and whether it
+# could be integrated.
+RESULT_LENGTHS, RESULT_RATES, RESULT_FORCES, RESULT_ACCELERATION = consecutive(6, 6, 6, 6)
+RESULT_SOUND = 24
+RESULT = 25
+# Six commands, and the wrench on the platform.
+COMMANDS, WRENCH = consecutive(6, 6)
+LOADS = 12
+
+# In one step the platform may turn by at most this [rad], and a platform joint move by at most
+# this part of its leg's length: what happens within the step would not be seen.
+LARGEST_MOVE = 0.5
+
+_matrix = inlined(from_quaternion)
+
+
+@inlined
+def _vector3(numbers: Array, at: int) -> Vector3:
+    return numbers[at], numbers[at + 1], numbers[at + 2]
+
+
+@inlined
+def _rotation(state: Array) -> Matrix3:
+    """Return R of the quaternion, which within a step is not of unit length."""
+    at = STATE_QUATERNION.start
+    x, y, z, w = state[at], state[at + 1], state[at + 2], state[at + 3]
+    k = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    return _matrix(k * x, k * y, k * z, k * w)
+
+
+@inlined
+def _twist(state: Array) -> tuple[Vector3, Vector3]:
+    return _vector3(state, STATE_TWIST.start), _vector3(state, STATE_TWIST.start + 3)
+
+
+@compiled
+def _slope(machine: Array, stops: Array, state: Array, loads: Array, motion: Array,
+           forces: Array, work: Array, slope: Array) -> None:
+    """Write a state's time derivative under its loads; motion, forces and work are memory."""
+    position, rotation = _vector3(state, 0), _rotation(state)
+    velocity, omega = _twist(state)
+    for n in range(3):
+        motion[n] = state[n]
+    for n in range(9):
+        motion[ROTATION.start + n] = rotation[n]
+    for n in range(6):
+        motion[TWIST.start + n] = state[STATE_TWIST.start + n]
+    for leg in range(6):
+        a, length, _, s = leg_line(machine, leg, position, rotation)
+        rate = dot(s, add(velocity, cross(omega, a)))
+        forces[leg] = loads[leg] + stop_force(stops, leg, length, rate)
+    acceleration(machine, motion, forces, loads[6:], work)
+    at = STATE_QUATERNION.start
+    vector, scalar = _vector3(state, at), state[at + 3]
+    turning = add(scale(scalar, omega), cross(omega, vector))
+    for n in range(3):
+        slope[n] = velocity[n]
+        slope[at + n] = 0.5 * turning[n]
+    slope[at + 3] = -0.5 * dot(omega, vector)
+    for n in range(6):
+        slope[STATE_TWIST.start + n] = motion[ACCELERATION.start + n]
+
+
+@compiled
+def _write_legs(machine: Array, state: Array, result: Array) -> float:
+    """
+    Write lengths and rates of the legs.
+
+    Return the largest of the angular speed and the speeds of the platform joints relative to
+    their legs' lengths [1/s]; infinite where a leg has no length.
+    """
+    position, rotation = _vector3(state, 0), _rotation(state)
+    velocity, omega = _twist(state)
+    fastest = math.sqrt(dot(omega, omega))
+    for leg in range(6):
+        a, length, inverse_length, s = leg_line(machine, leg, position, rotation)
+        joint_velocity = add(velocity, cross(omega, a))
+        moving = inverse_length * math.sqrt(dot(joint_velocity, joint_velocity))
+        result[leg] = length
+        result[RESULT_RATES.start + leg] = dot(s, joint_velocity)
+        fastest = max(fastest, moving) if 0.0 < length < math.inf else math.inf
+    return fastest
+
+
+@compiled
+def _next_state(machine: Array, stops: Array, loads: Array, state: Array, h: float,
+                motion: Array, forces: Array, work: Array, slope: Array, mean: Array,
+                after: Array) -> bool:
+    """Write the state one step later, and return whether it is finite; the rest is memory."""
+    _slope(machine, stops, state, loads, motion, forces, work, slope)
+    for n in range(STATE):
+        mean[n] = slope[n]
+        after[n] = state[n] + 0.5 * h * slope[n]
+    _slope(machine, stops, after, loads, motion, forces, work, slope)
+    for n in range(STATE):
+        mean[n] += 2.0 * slope[n]
+        after[n] = state[n] + 0.5 * h * slope[n]
+    _slope(machine, stops, after, loads, motion, forces, work, slope)
+    for n in range(STATE):
+        mean[n] += 2.0 * slope[n]
+        after[n] = state[n] + h * slope[n]
+    _slope(machine, stops, after, loads, motion, forces, work, slope)
+    finite = True
+    square = 0.0
+    for n in range(STATE):
+        after[n] = state[n] + h / 6.0 * (mean[n] + slope[n])
+        finite = finite and math.isfinite(after[n])
+        square += (after[n] * after[n]
+                   if STATE_QUATERNION.start <= n < STATE_QUATERNION.stop else 0.0)
+    for n in range(STATE_QUATERNION.start, STATE_QUATERNION.stop):
+        after[n] /= math.sqrt(square)
+    return finite
+
+
+@entry_point
+def advance(machine: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
+            result: Array, steps: int, h: float) -> None:
+    """
+    Take steps of h [s] and write the state and, beside it, the result.
+
+    Parameters
+    ----------
+    machine : (MACHINE,)
+        The constants of the hexapod as ``kernel`` takes them.
+    stops : (STOPS,)
+        The end stops, see ``end_stops``.
+    largest_forces : (6,)
+        To which the commands are clipped [N].
+    loads : (LOADS,)
+        Commands [N], force and moment on the platform [N, N m]; commands are clipped in place.
+    state : (STATE,)
+        The initial state, overwritten with the final one. Where a step cannot be computed: the
+        last state that could be, at rest.
+    result : (RESULT,)
+        Written.
+    steps, h
+        How many, and how long.
+
+    """
+    motion, forces, work = np.empty(MOTION), np.empty(6), np.empty(WORK)
+    after, slope, mean = np.empty(STATE), np.empty(STATE), np.empty(STATE)
+    for leg in range(6):
+        most = largest_forces[leg]
+        loads[leg] = min(max(loads[leg], -most), most)
+        result[RESULT_FORCES.start + leg] = loads[leg]
+    sound = h * _write_legs(machine, state, result) <= LARGEST_MOVE
+    for _step in range(steps):
+        finite = _next_state(
+            machine, stops, loads, state, h, motion, forces, work, slope, mean, after)
+        sound = (sound and finite
+                 and h * _write_legs(machine, after, result) <= LARGEST_MOVE)
+        if not sound:
+            break
+        for n in range(STATE):
+            state[n] = after[n]
+    _slope(machine, stops, state, loads, motion, forces, work, slope)
+    for n in range(6):
+        sound = sound and math.isfinite(slope[STATE_TWIST.start + n])
+    for n in range(6):
+        if not sound:
+            state[STATE_TWIST.start + n] = 0.0
+            result[RESULT_FORCES.start + n] = 0.0
+        result[RESULT_ACCELERATION.start + n] = (
+            slope[STATE_TWIST.start + n] if sound else 0.0)
+    _write_legs(machine, state, result)
+    result[RESULT_SOUND] = 1.0 if sound else 0.0

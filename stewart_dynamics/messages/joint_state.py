@@ -1,0 +1,307 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+sensor_msgs/JointState: how one is read, and how one is written.
+
+A message may have other joints besides the six of the hexapod, in any order; joints are found
+by name.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from operator import itemgetter
+from struct import Struct
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Bytes, Stamps
+from stewart_dynamics.messages.cdr import (
+    aligned8, COUNT, finite, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds, NOT_FINITE,
+    READ_ERRORS, sequence, text, TIME_AND_LENGTH)
+from stewart_dynamics.messages.layout import Layout
+
+FIELDS = ('position', 'velocity', 'effort')
+
+# Why a message is rejected, beside being malformed or not finite, or 'without effort'.
+MISSING_JOINTS = 'lacks one of the joints'
+UNEVEN = 'not as many numbers as names'
+
+# Layouts that are remembered, the newest ones.
+_MOST_LAYOUTS = 8
+# Messages that are read at once.
+_AT_ONCE = 4096
+
+_ZEROS = (0.0,) * 6
+
+
+class JointStateError(ValueError):
+    """A message that cannot be used: the reason, and the details of this message."""
+
+    def __init__(self, reason: str, details: str) -> None:
+        super().__init__(reason, details)
+        self.reason, self.details = reason, details
+
+
+class JointStates(NamedTuple):
+    """What was read of many messages, K of which can be used."""
+
+    stamps: Stamps
+    """(K,) [ns]"""
+    values: Array
+    """(K, 6 * fields): the six joints of one field, then of the next."""
+    rejected: dict[str, int]
+    """How many of the others were rejected, by reason."""
+
+
+class _Fields(NamedTuple):
+    """Stamp and names of a sensor_msgs/JointState, and where its numbers stand in its bytes."""
+
+    stamp: int
+    """[ns]"""
+    names: list[str]
+    numbers: tuple[tuple[int, int], ...]
+    """Of position, velocity and effort: offset and count."""
+    gaps: tuple[slice, ...]
+    """Bytes that only align what follows, and those behind the message: they may be anything."""
+
+
+def _fields(data: bytes) -> _Fields:
+    """Read all of a sensor_msgs/JointState but its numbers; its frame_id may be any."""
+    gaps: list[slice] = []
+    names, numbers = [], []
+    try:
+        count = COUNT[data[1]]
+        sec, nanosec, size = TIME_AND_LENGTH[data[1]].unpack_from(data, 4)
+        stamp = nanoseconds(data, sec, nanosec)
+        text(data, 16, size)
+        number, at = sequence(data, 16 + size, count, gaps)
+        for _ in range(number):
+            size, at = sequence(data, at, count, gaps)
+            names.append(text(data, at, size).decode(errors='replace'))
+            at += size
+        for _ in range(3):
+            number, end = sequence(data, at, count, gaps)
+            # An empty sequence has nothing to align.
+            at = aligned8(end) if number else end
+            gaps.append(slice(end, at))
+            numbers.append((at, number))
+            at += 8 * number
+    except READ_ERRORS as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    if at > len(data):
+        raise MalformedError(f'{len(data)} bytes: must be at least {at}')
+    return _Fields(stamp, names, tuple(numbers), (*gaps, slice(at, len(data))))
+
+
+class _Known(NamedTuple):
+    """A layout and what it says: which numbers are wanted, or why such messages are rejected."""
+
+    layout: Layout
+    columns: list[int]
+    chosen: Callable[[tuple[float, ...]], tuple[Any, ...]]
+    """Returns the columns of one message's numbers."""
+    reason: str
+    details: str
+
+
+class JointStateReader:
+    """
+    Reads the numbers of six joints from sensor_msgs/JointState messages.
+
+    Nearly all messages of a topic have one layout: the same names, the same counts. One is read
+    field by field, and those whose bytes are the same but for stamp and numbers are read by it,
+    one after the other or many at once.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        Names of the joints in the order wanted.
+    fields : sequence of str
+        Which of FIELDS are wanted; the others may be empty.
+
+    """
+
+    def __init__(self, joints: Sequence[str], fields: Sequence[str] = FIELDS) -> None:
+        self.found = False
+        """Whether a message had all joints."""
+        self.other_names: list[str] = []
+        """The names in the first message that lacked one."""
+        self._joints = list(joints)
+        self._fields = list(fields)
+        self._known: list[_Known] = []
+
+    def read_one(self, data: bytes) -> tuple[int, tuple[Any, ...]]:
+        """
+        Return stamp [ns] and values, laid out as in JointStates.
+
+        Raises
+        ------
+        MalformedError
+            The bytes are no JointState.
+        JointStateError
+            It lacks joints or fields, or a number is not finite.
+
+        """
+        for known in self._known:
+            read = known.layout.read_one(data)
+            if read is not None:
+                break
+        else:
+            known = self._learn(data)
+            read = known.layout.read_one(data)
+            assert read is not None
+        if known.reason:
+            raise JointStateError(known.reason, known.details)
+        values = known.chosen(read[1])
+        if not finite(values):
+            raise JointStateError(NOT_FINITE, str(values))
+        return read[0], values
+
+    def read_many(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike) -> JointStates:
+        """
+        Return what ``read_one`` gives of many messages, and how many it rejects.
+
+        Parameters
+        ----------
+        data : bytes or array of them
+            It holds all messages.
+        starts, sizes : (M,)
+            Where each begins, and its length in bytes.
+
+        """
+        whole = np.frombuffer(data, dtype=np.uint8)
+        begins, lengths = np.asarray(starts, dtype=np.int64), np.asarray(sizes, dtype=np.int64)
+        stamps, values = np.zeros(len(begins), dtype=np.int64), np.zeros(
+            (len(begins), len(self._fields) * len(self._joints)))
+        used, rejected = np.zeros(len(begins), dtype=bool), Counter[str]()
+
+        def take(known: _Known, which: Stamps) -> Stamps:
+            """Read those of the messages that have the layout, and return which have not."""
+            of_size = lengths[which] == known.layout.size
+            others, same = [which[~of_size]], which[of_size]
+            for first in range(0, len(same), _AT_ONCE):
+                part = same[first:first + _AT_ONCE]
+                alike, part_stamps, numbers = known.layout.read(whole, begins[part])
+                if not alike.all():
+                    others.append(part[~alike])
+                    part, part_stamps, numbers = part[alike], part_stamps[alike], numbers[alike]
+                if known.reason:
+                    rejected[known.reason] += len(part)
+                    continue
+                chosen = numbers[:, known.columns]
+                sound = np.isfinite(chosen).all(axis=1)
+                rejected[NOT_FINITE] += int(np.count_nonzero(~sound))
+                stamps[part], values[part], used[part] = part_stamps, chosen, sound
+            return np.sort(np.concatenate(others))
+
+        left: Stamps = np.arange(len(begins))
+        for known in tuple(self._known):
+            left = take(known, left)
+        while len(left):
+            first = int(left[0])
+            begin, length = int(begins[first]), int(lengths[first])
+            try:
+                known = self._learn(whole[begin:begin + length].tobytes())
+            except MalformedError:
+                rejected[MALFORMED] += 1
+                left = left[1:]
+                continue
+            left = take(known, left)
+        return JointStates(stamps[used], values[used], dict(+rejected))
+
+    def _learn(self, data: bytes) -> _Known:
+        """Read a message field by field and remember its layout."""
+        fields = _fields(data)
+        known = self._judge(data, fields)
+        if known.reason != MISSING_JOINTS:
+            self.found = True
+        else:
+            self.other_names = self.other_names or fields.names
+        self._known = [known, *self._known[:_MOST_LAYOUTS - 1]]
+        return known
+
+    def _judge(self, data: bytes, fields: _Fields) -> _Known:
+        """Return what the layout of a message says."""
+        names, many = fields.names, len(fields.names)
+        wanted = {field: fields.numbers[FIELDS.index(field)] for field in self._fields}
+        reason = details = ''
+        if missing := [joint for joint in self._joints if joint not in names]:
+            reason = MISSING_JOINTS
+            details = f'{", ".join(missing)}; there are {", ".join(names) or "none"}'
+        elif empty := [field for field, (_, count) in wanted.items() if not count]:
+            reason = f'without {" and ".join(empty)}'
+            details = f'{many} names'
+        elif uneven := [f'{count} of {field}' for field, (_, count) in wanted.items()
+                        if count != many]:
+            reason = UNEVEN
+            details = f'{many} names, {", ".join(uneven)}'
+        numbers = [] if reason else list(wanted.values())
+        # What is not wanted may be anything.
+        free = [slice(at, at + 8 * count) for at, count in fields.numbers]
+        columns = [] if reason else [part * many + names.index(joint)
+                                     for part in range(len(wanted)) for joint in self._joints]
+        return _Known(Layout(data, numbers, gaps=[*fields.gaps, *free]), columns,
+                      itemgetter(*columns or [0]), reason, details)
+
+
+class JointStateWriter:
+    """
+    Writes sensor_msgs/JointState of six joints with these names; frame_id is empty.
+
+    All but stamp and numbers is the same in every message and made once.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        head = '<4siII1s'  # encapsulation, stamp, the empty frame_id and its zero byte
+        constant: list[object] = [1, b'\x00']
+        size = 13
+        for name in [None, *names]:
+            head += f'{-size % 4}x'
+            size += -size % 4
+            if name is None:
+                head, size = head + 'I', size + 4
+                constant.append(6)
+            else:
+                encoded = name.encode() + b'\x00'
+                head, size = head + f'I{len(encoded)}s', size + 4 + len(encoded)
+                constant += [len(encoded), encoded]
+        first = f'{-size % 4}xI'
+        size += -size % 4 + 4
+        doubles = f'{-size % 8}x6d'
+        at = 4 + size + -size % 8
+        # Each later count stands where doubles end, so that four bytes align what follows.
+        self._numbers = [(at, 6), (at + 56, 6), (at + 112, 6)]
+        self._whole = Struct(f'{head}{first}{doubles}I4x6dI4x6d')
+        self._without_effort = Struct(f'{head}{first}{doubles}I4x6dI')
+        self._constant = tuple(constant)
+
+    def write(self, stamp: int, position: Iterable[float], velocity: Sequence[float],
+              effort: Sequence[float] | None) -> bytes:
+        """Return the message; its effort is empty where there is none."""
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        if effort is None:
+            return self._without_effort.pack(
+                LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position, 6, *velocity, 0)
+        return self._whole.pack(LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position,
+                                6, *velocity, 6, *effort)
+
+    def layout(self, effort: bool) -> Layout:
+        """Return the layout of the messages with or without effort."""
+        numbers = self._numbers if effort else self._numbers[:2]
+        return Layout(self.write(0, _ZEROS, _ZEROS, _ZEROS if effort else None), numbers)

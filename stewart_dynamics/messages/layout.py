@@ -1,0 +1,155 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Messages that differ in nothing but their stamp and numbers, read and written many at once.
+
+Nearly all messages of a topic have one layout: one message is read field by field, and the
+others by comparing their bytes with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from operator import itemgetter
+from struct import Struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
+from stewart_dynamics.messages.cdr import ORDERS
+
+
+class Layout:
+    """
+    Messages that differ in nothing but their stamp and numbers.
+
+    Parameters
+    ----------
+    message : bytes
+        One of them.
+    numbers : sequence of (offset, count)
+        Where doubles stand in it, one part after the other.
+    stamped : bool
+        It has a header.
+    gaps : sequence of slice
+        Bytes that may be anything: those that only align what follows.
+
+    """
+
+    def __init__(
+            self, message: bytes, numbers: Sequence[tuple[int, int]], stamped: bool = True,
+            gaps: Sequence[slice] = (),
+    ) -> None:
+        self.size = len(message)
+        self._message = message
+        order = ORDERS[message[1]]
+        free = np.zeros(self.size, dtype=bool)
+        fields: dict[str, tuple[Any, int]] = {}
+        if stamped:
+            free[4:12] = True
+            fields = {'sec': (f'{order}i4', 4), 'nanosec': (f'{order}u4', 8)}
+        self._parts = []
+        numbers = [(at, count) for at, count in numbers if count]
+        for at, count in numbers:
+            free[at:at + 8 * count] = True
+            fields[f'numbers at {at}'] = ((f'{order}f8', (count,)), at)
+            self._parts.append(f'numbers at {at}')
+        for gap in gaps:
+            free[gap] = True
+        # Runs of bytes that are the same in all messages.
+        edges = np.flatnonzero(np.diff(free, prepend=True, append=True)).tolist()
+        runs = list(zip(edges[::2], edges[1::2], strict=True))
+        self._fixed = {}
+        for begin, end in runs:
+            fields[f'fixed at {begin}'] = (f'V{end - begin}', begin)
+            self._fixed[f'fixed at {begin}'] = np.void(message[begin:end])
+        self._dtype = np.dtype({
+            'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
+            'offsets': [at for _, at in fields.values()], 'itemsize': self.size})
+        self._prepare_one(order, sorted([
+            *((begin, f'{end - begin}s') for begin, end in runs),
+            *((at, f'{count}d') for at, count in numbers),
+            *([(4, 'iI')] if stamped else [])]))
+
+    def _prepare_one(self, order: str, places: Sequence[tuple[int, str]]) -> None:
+        """Prepare reading a single message by a Struct of what is not free, by offset."""
+        layout, constant, values, many = order, list[int](), list[int](), 0
+        for at, place in places:
+            layout += f'{at - Struct(layout).size}x{place}'
+            if place[-1] == 's':
+                constant.append(many)
+            elif place[-1] == 'd':
+                values += range(many, many + int(place[:-1]))
+            many = len(Struct(layout).unpack(bytes(Struct(layout).size)))
+        self._struct = Struct(f'{layout}{self.size - Struct(layout).size}x')
+        self._values: Callable[[tuple[Any, ...]], tuple[float, ...]] = (
+            itemgetter(*values) if values else lambda fields: ())
+        self._constant = itemgetter(*constant)
+        self._expected = self._constant(self._struct.unpack(self._message))
+
+    def read_one(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return stamp [ns] and numbers of a message with a stamp; None if of another layout."""
+        if len(data) != self.size:
+            return None
+        fields = self._struct.unpack(data)
+        if fields[2] >= 1_000_000_000 or self._constant(fields) != self._expected:
+            return None
+        return fields[1] * 1_000_000_000 + fields[2], self._values(fields)
+
+    def read(self, data: Bytes, starts: Integers) -> tuple[Flags, Stamps, Array]:
+        """
+        Return which messages have this layout (N,), their stamps (N,) [ns] and numbers (N, ...).
+
+        Stamps and numbers of the others mean nothing.
+
+        Parameters
+        ----------
+        data : (M,)
+            Bytes that have all the messages in them.
+        starts : (N,)
+            Where each begins; each is of ``size``.
+
+        """
+        rows = at_any_byte(data, self.size)[starts].view(self._dtype)
+        stamps: Stamps = rows['sec'] * np.int64(1_000_000_000) + rows['nanosec']
+        alike: Flags = rows['nanosec'] < 1_000_000_000
+        for name, fixed in self._fixed.items():
+            alike &= rows[name] == fixed
+        if not self._parts:
+            return alike, stamps, np.empty((len(rows), 0))
+        numbers = np.concatenate([rows[name] for name in self._parts], axis=1)
+        return alike, stamps, numbers.astype(float, copy=False)
+
+    def write(self, stamps: Integers | None, *numbers: Array) -> NDArray[np.void]:
+        """Return messages (N,), each an entry of ``size`` bytes; each part's numbers (N, ...)."""
+        rows = np.empty(len(numbers[0]), dtype=self._dtype)
+        rows.view(np.uint8).reshape(-1, self.size)[:] = np.frombuffer(self._message, np.uint8)
+        if stamps is not None:
+            rows['sec'], rows['nanosec'] = np.divmod(stamps, 1_000_000_000)
+        for name, values in zip(self._parts, numbers, strict=True):
+            rows[name] = values
+        return rows.view(f'V{self.size}')
+
+
+def at_any_byte(data: Bytes, size: int) -> NDArray[np.void]:
+    """
+    Return the entries of a size that begin at each of the bytes; they share its memory.
+
+    They have no fields: numpy copies entries that have some field by field, far more slowly.
+    """
+    many = max(data.size - size + 1, 0)
+    return np.ndarray((many,), f'V{size}', data.data, strides=(1,))

@@ -1,0 +1,111 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Setpoints and wrenches: messages with a header and some numbers.
+
+PoseStamped, TwistStamped, AccelStamped and WrenchStamped of geometry_msgs, and a
+trajectory_msgs/MultiDOFJointTrajectory of one point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from struct import Struct
+
+from stewart_dynamics.messages.cdr import (
+    aligned8, COUNT, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence, SEVEN, SIX,
+    Stamped, stamped, text, TIME_AND_LENGTH)
+from stewart_dynamics.messages.layout import Layout
+from stewart_dynamics.messages.trajectory import points_of
+
+_DURATION = {0: Struct('>iI'), 1: Struct('<iI')}
+
+
+def pose(data: bytes) -> Stamped:
+    """Read a geometry_msgs/PoseStamped: x y z and the quaternion's x y z w."""
+    return stamped(data, SEVEN)
+
+
+def twist(data: bytes) -> Stamped:
+    """Read a geometry_msgs/TwistStamped or AccelStamped: linear and angular x y z."""
+    return stamped(data, SIX)
+
+
+def wrench(data: bytes) -> Stamped:
+    """Read a geometry_msgs/WrenchStamped: force and torque x y z."""
+    return stamped(data, SIX)
+
+
+def combined(data: bytes) -> Stamped:
+    """
+    Read a trajectory_msgs/MultiDOFJointTrajectory of one point and one joint.
+
+    The 19 values are position, quaternion x y z w, twist and acceleration.
+    """
+    try:
+        order = data[1]
+        sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
+        values: tuple[float, ...] = ()
+        for at, layout in zip(_combined_numbers(data), (SEVEN, SIX, SIX), strict=True):
+            values += layout[order].unpack_from(data, at)
+        # time_from_start: not used, but it must be there
+        _DURATION[order].unpack_from(data, at + layout[order].size)
+    except READ_ERRORS as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    return Stamped(nanoseconds(data, sec, nanosec), text(data, 16, size), values)
+
+
+def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]:
+    """Return where transform, velocity and acceleration begin; note what only aligns."""
+    gaps = [] if gaps is None else gaps
+    count = COUNT[data[1]]
+    points, at = points_of(data, gaps)
+    if points != 1:
+        raise MalformedError(f'{points} points: a setpoint has one')
+    found = []
+    for name, layout in (('transforms', SEVEN), ('velocities', SIX), ('accelerations', SIX)):
+        number, at = sequence(data, at, count, gaps)
+        if number != 1:
+            raise MalformedError(f'{number} {name}: a setpoint has one')
+        found.append(aligned8(at))
+        gaps.append(slice(at, found[-1]))
+        at = found[-1] + layout[data[1]].size
+    return found
+
+
+def layout_of(reader: Callable[[bytes], Stamped], message: bytes) -> Layout:
+    """Return the layout of a message that one of these readers has read."""
+    if reader is combined:
+        gaps: list[slice] = []
+        numbers = zip(_combined_numbers(message, gaps), (7, 6, 6), strict=True)
+        return Layout(message, list(numbers), gaps=gaps)
+    end = 16 + COUNT[message[1]].unpack_from(message, 12)[0]
+    at = aligned8(end)
+    return Layout(message, [(at, 7 if reader is pose else 6)], gaps=[slice(end, at)])
+
+
+class StampedWriter:
+    """Writes PoseStamped (7 numbers), TwistStamped or AccelStamped (6) of geometry_msgs."""
+
+    def __init__(self, frame: str, number: int) -> None:
+        self._frame = frame.encode() + b'\x00'
+        size = len(self._frame)
+        self._whole = Struct(f'<4siII{size}s{aligned8(16 + size) - 16 - size}x{number}d')
+
+    def write(self, stamp: int, values: Sequence[float]) -> bytes:
+        """Return the message."""
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        return self._whole.pack(
+            LITTLE_ENDIAN, sec, nanosec, len(self._frame), self._frame, *values)

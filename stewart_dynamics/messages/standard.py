@@ -1,0 +1,75 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The messages of std_msgs that the hot path reads and writes, and rosgraph_msgs/Clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import Struct
+
+from stewart_dynamics.messages.cdr import (
+    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, READ_ERRORS,
+    sequence)
+from stewart_dynamics.messages.layout import Layout
+
+_FLOAT64 = Struct('<4sd')
+_CLOCK = Struct('<4siI')
+_BOOL = Struct('<4s?')
+# an empty layout's two numbers, the number of entries, and what aligns them
+_FLOAT64_ARRAY = Struct('<4sIII4x6d')
+
+
+def float64(value: float) -> bytes:
+    """Write a std_msgs/Float64."""
+    return _FLOAT64.pack(LITTLE_ENDIAN, value)
+
+
+def boolean(value: bool) -> bytes:
+    """Write a std_msgs/Bool."""
+    return _BOOL.pack(LITTLE_ENDIAN, value)
+
+
+def clock(stamp: int) -> bytes:
+    """Write a rosgraph_msgs/Clock of a time [ns]."""
+    return _CLOCK.pack(LITTLE_ENDIAN, *divmod(stamp, 1_000_000_000))
+
+
+def float64_array(values: Sequence[float]) -> bytes:
+    """Write six numbers as a std_msgs/Float64MultiArray without a layout."""
+    return _FLOAT64_ARRAY.pack(LITTLE_ENDIAN, 0, 0, 6, *values)
+
+
+def float64_values(data: bytes) -> tuple[float, ...]:
+    """Read a std_msgs/Float64MultiArray: its numbers, whatever layout it claims."""
+    try:
+        order = data[1]
+        count = COUNT[order]
+        dimensions, at = sequence(data, 4, count, [])
+        for _ in range(dimensions):
+            size, at = sequence(data, at, count, [])
+            at = (at + size + 3 & ~3) + 8
+        # data_offset comes before the numbers
+        number, at = sequence(data, (at + 3 & ~3) + 4, count, [])
+        values: tuple[float, ...] = Struct(f'{ORDERS[order]}{number}d').unpack_from(
+            data, aligned8(at) if number else at)
+    except READ_ERRORS as exc:
+        raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+    check_encapsulation(data)
+    return values
+
+
+# To write many of them at once.
+FLOAT64_ARRAY = Layout(float64_array((0.0,) * 6), [(20, 6)], stamped=False)
+FLOAT64 = Layout(float64(0.0), [(4, 1)], stamped=False)

@@ -1,0 +1,170 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Planned trajectories: trajectory_msgs/MultiDOFJointTrajectory in, JointTrajectory out.
+
+Points are read and written as records, thousands at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.messages.cdr import (
+    COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, ORDERS, put_count, put_text,
+    READ_ERRORS, sequence, text, TIME_AND_LENGTH)
+
+# A point of a MultiDOFJointTrajectory of one joint, and one of a JointTrajectory of six without
+# accelerations. All begin at a multiple of eight bytes but the first, which may begin four bytes
+# behind one: then only its first count stands there, all else where it would in the others.
+_PARTS = ('transforms', 'velocities', 'accelerations')
+_PLATFORM_POINT = {order: np.dtype({
+    'names': [*_PARTS, 'pose', 'twist', 'accel', 'sec', 'nanosec'],
+    'formats': [f'{sign}{kind}' for kind in (
+        'u4', 'u4', 'u4', '7f8', '6f8', '6f8', 'i4', 'u4')],
+    'offsets': [0, 64, 120, 8, 72, 128, 176, 180], 'itemsize': 184})
+    for order, sign in ORDERS.items()}
+_LEG_POINT = {effort: np.dtype({
+    'names': ['positions', 'velocities', 'accelerations', 'efforts', 'position', 'velocity',
+              'effort', 'sec', 'nanosec'],
+    'formats': ['<u4', '<u4', '<u4', '<u4', '<6f8', '<6f8', f'<{6 * effort}f8', '<i4', '<u4'],
+    'offsets': [0, 56, 112, 116, 8, 64, 120, end, end + 4], 'itemsize': end + 8})
+    for effort, end in ((True, 168), (False, 120))}
+
+
+def points_of(data: bytes, gaps: list[slice]) -> tuple[int, int]:
+    """
+    Return how many points a MultiDOFJointTrajectory of one joint has, and where they begin.
+
+    Bytes before them that only align are added to the gaps.
+    """
+    count = COUNT[data[1]]
+    size = count.unpack_from(data, 12)[0]
+    names, at = sequence(data, 16 + size, count, gaps)
+    if names > 1:
+        raise MalformedError(f'{names} joint_names: must be at most one')
+    for _ in range(names):
+        length, at = sequence(data, at, count, gaps)
+        at += length
+    return sequence(data, at, count, gaps)
+
+
+class PlatformTrajectory:
+    """
+    Reads a trajectory_msgs/MultiDOFJointTrajectory of one joint and any number of points.
+
+    Parameters
+    ----------
+    data : bytes
+        The message.
+
+    Raises MalformedError where it has no header, or more than one joint.
+
+    """
+
+    def __init__(self, data: bytes) -> None:
+        try:
+            order = data[1]
+            sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
+            self.size, self._first = points_of(data, [])
+        except READ_ERRORS as exc:
+            raise MalformedError(f'{len(data)} bytes: {exc}') from exc
+        self.stamp = nanoseconds(data, sec, nanosec)
+        self.frame = text(data, 16, size)
+        self._data = data
+        self._begin = (self._first - 4 & ~7) + 4
+        kind = _PLATFORM_POINT[order]
+        whole = max(0, (len(data) - self._begin) // kind.itemsize)
+        self._records: NDArray[np.void] = np.frombuffer(
+            data, kind, min(whole, self.size), self._begin) if whole else np.empty(0, kind)
+
+    def points(self, first: int, end: int) -> NDArray[np.void]:
+        """
+        Return points by their index: fields pose (7), twist (6), accel (6), sec and nanosec.
+
+        Those before them must have been read. Raises MalformedError where one has not one
+        transform, velocity and acceleration: what follows it cannot be found.
+        """
+        records = self._records[first:end]
+        other = np.logical_or.reduce([records[part] != 1 for part in _PARTS])
+        other[:first == 0] = True  # its first count may stand elsewhere
+        for n in np.flatnonzero(other).tolist():
+            self._check_counts(first + n)
+        if end > len(self._records):
+            self._check_counts(len(self._records))
+            raise MalformedError(
+                f'{len(self._data)} bytes: points[{len(self._records)}] is cut short')
+        return records
+
+    def _check_counts(self, n: int) -> None:
+        kind = _PLATFORM_POINT[self._data[1]]
+        begin = self._begin + n * kind.itemsize
+        for part, at in zip(_PARTS, (begin if n else self._first, begin + 64, begin + 120),
+                            strict=True):
+            if at + 4 <= len(self._data):
+                number, = COUNT[self._data[1]].unpack_from(self._data, at)
+                if number != 1:
+                    raise MalformedError(f'points[{n}]: {number} {part}: each point has one')
+
+
+class LegTrajectory:
+    """
+    Writes a trajectory_msgs/JointTrajectory of six joints without accelerations.
+
+    Parameters
+    ----------
+    stamp : int
+        [ns]
+    names : sequence of str
+        Of the joints; frame_id is empty.
+    size : int
+        How many points it has.
+    effort : bool
+        Points have effort.
+
+    """
+
+    def __init__(self, stamp: int, names: Sequence[str], size: int, effort: bool) -> None:
+        head = header(stamp)
+        put_count(head, len(names))
+        for name in names:
+            put_text(head, name)
+        put_count(head, size)
+        self._effort = effort
+        self._records = np.zeros(size, _LEG_POINT[effort])
+        self._head = LITTLE_ENDIAN + head
+        self._shared = len(head) % 8  # bytes of the head where the first record begins
+        for name in ('positions', 'velocities', 'efforts')[:2 + effort]:
+            self._records[name] = 6
+        if self._shared:
+            self._records[:1].view('<u4')[:2] = size, 6
+
+    def put(self, first: int, points: NDArray[np.void], positions: Array,
+            velocities: Array, efforts: Array) -> None:
+        """Write points from an index on; their time_from_start is that of the other points."""
+        records = self._records[first:first + len(points)]
+        records['position'], records['velocity'] = positions, velocities
+        if self._effort:
+            records['effort'] = efforts
+        records['sec'], records['nanosec'] = points['sec'], points['nanosec']
+
+    def message(self) -> bytes:
+        """Return the message."""
+        head = self._head[:len(self._head) - self._shared]
+        return b''.join([head, self._records.view(np.uint8).data])

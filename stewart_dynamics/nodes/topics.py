@@ -1,0 +1,157 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The topics of the dynamics node: types, queues, and what is there while it is configured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.lifecycle import LifecycleNode
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH
+from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
+from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
+from stewart_dynamics.runtime.input_topics import INPUT_TYPES, SOURCES
+from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
+
+# Publishers, beside those of OUTPUT_TYPES.
+DIAGNOSTICS, MARKERS, LEG_TRAJECTORY = 'diagnostics', 'markers', planned.OUTPUT
+
+# So many messages of a topic may wait in the middleware.
+QUEUE = 1000
+_QUEUES = {planned.INPUT: LENGTH}
+
+_TYPES: dict[str, Any] = {
+    'geometry_msgs/msg/PoseStamped': PoseStamped,
+    'geometry_msgs/msg/TwistStamped': TwistStamped,
+    'geometry_msgs/msg/AccelStamped': AccelStamped,
+    'geometry_msgs/msg/WrenchStamped': WrenchStamped,
+    'trajectory_msgs/msg/MultiDOFJointTrajectory': MultiDOFJointTrajectory,
+    'sensor_msgs/msg/JointState': JointState,
+    'std_msgs/msg/Float64MultiArray': Float64MultiArray,
+    'std_msgs/msg/Float64': Float64,
+    'std_msgs/msg/Bool': Bool,
+}
+_INPUT_TYPES = {**INPUT_TYPES, MEASURED_LEGS: 'sensor_msgs/msg/JointState',
+                planned.INPUT: planned.INPUT_TYPE}
+
+
+class Topics:
+    """
+    The publishers and subscriptions of the node; there are none before ``make``.
+
+    Parameters
+    ----------
+    node : LifecycleNode
+        Whose they are.
+
+    Attributes
+    ----------
+    publishers : dict of str to Publisher
+        By topic, without the node's name.
+    setpoints : dict of str to Subscription
+        Those of the setpoint topics; raw ones.
+
+    """
+
+    def __init__(self, node: LifecycleNode) -> None:
+        self.publishers: dict[str, Publisher] = {}
+        self.setpoints: dict[str, Any] = {}
+        self._node = node
+        self._destroy: list[Callable[[], Any]] = []
+        self._names: dict[str, str] = {}
+
+    def make(self, parameters: Parameters, on_setpoint: Callable[[str, bytes], None],
+             others: Mapping[str, Callable[[bytes], None]]) -> None:
+        """
+        Make all of them.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            Which setpoint topics, and whether there are markers.
+        on_setpoint : callable
+            Gets topic and bytes of a message on a setpoint topic.
+        others : mapping of topic to callable
+            What gets the bytes of a message on the other topics.
+
+        """
+        for topic, name in OUTPUT_TYPES.items():
+            latched = topic == 'singularity_warning'
+            self._publish(topic, _TYPES[name], QoSProfile(
+                depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL) if latched else
+                QoSProfile(depth=10))
+        self._publish(EXTERNAL_WRENCH, WrenchStamped, QoSProfile(depth=10))
+        self._publish(LEG_TRAJECTORY, JointTrajectory, QoSProfile(depth=LENGTH))
+        self._publish(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), '/diagnostics')
+        if parameters['visualization_rate']:
+            self._publish(MARKERS, MarkerArray, QoSProfile(depth=1))
+        self.setpoints = {
+            topic: self._subscribe(_TYPES[_INPUT_TYPES[topic]], topic, partial(on_setpoint, topic))
+            for topic in SOURCES[parameters['setpoint.source']]}
+        self._names = {topic: subscription.topic_name
+                       for topic, subscription in self.setpoints.items()}
+        for topic, callback in others.items():
+            self._subscribe(
+                _TYPES[_INPUT_TYPES[topic]], topic, callback, _QUEUES.get(topic, QUEUE))
+
+    def writers(self) -> dict[str, int]:
+        """Return how many publishers each setpoint topic has."""
+        return {topic: self.writers_of(topic) for topic in self._names}
+
+    def writers_of(self, topic: str) -> int:
+        """Return how many publishers a setpoint topic has."""
+        return int(self._node.count_publishers(self._names[topic]))
+
+    def destroy(self) -> None:
+        """Destroy all of them."""
+        self.publishers, self.setpoints, self._names = {}, {}, {}
+        while self._destroy:
+            self._destroy.pop()()
+
+    def _publish(self, topic: str, kind: Any, qos: QoSProfile, name: str = '') -> None:
+        publisher = self._node.create_publisher(kind, name or f'~/{topic}', qos)
+        self._destroy.append(partial(self._node.destroy_publisher, publisher))
+        self.publishers[topic] = publisher
+
+    def _subscribe(self, kind: Any, topic: str, callback: Callable[[bytes], None],
+                   depth: int = QUEUE) -> Any:
+        subscription = self._node.create_subscription(
+            kind, f'~/{topic}', until_shutdown(self._node, callback), QoSProfile(depth=depth),
+            raw=True, qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=partial(self._on_incompatible_qos, topic)))
+        self._destroy.append(partial(self._node.destroy_subscription, subscription))
+        return subscription
+
+    def _on_incompatible_qos(self, topic: str, event: Any) -> None:
+        self._node.get_logger().error(
+            f'{topic}: a publisher offers an incompatible quality of service, policy '
+            f'{qos_policy_name_from_kind(event.last_policy_kind)}: its messages are not received')

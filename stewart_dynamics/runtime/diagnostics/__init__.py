@@ -1,0 +1,21 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the dynamics node reports of itself: parts of one protocol, see ``report``.
+
+``setpoints``, ``singularity``, ``limits``, ``timing``, ``planned_trajectory`` and
+``external_wrench`` have one status each; ``dynamics`` puts them together. They know no ROS and
+no clock: they are told what happens and when, in seconds of a steady clock.
+"""

@@ -1,0 +1,63 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The status ``planned trajectory``: there is one from the first planned trajectory on."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from stewart_dynamics.runtime.diagnostics.report import (
+    ERROR, Level, LevelLog, LogLine, OK, Status, WARN)
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+
+_NAME = 'planned trajectory'
+
+
+class PlannedTrajectoryDiagnostics:
+    """Keeps the outcome of the last planned trajectory, and counts them all."""
+
+    def __init__(self) -> None:
+        self._status: Status | None = None
+        self._counts: Counter[str] = Counter()
+        self._log = LevelLog(_NAME)
+        self._lines: list[LogLine] = []
+
+    def done(self, outcome: Outcome, seconds: float) -> None:
+        """Note an outcome, and how long it took from the message on [s]."""
+        level = ERROR if outcome.reason else WARN if outcome.warning else OK
+        counts = self._counts
+        counts[f'rejected: {outcome.reason}' if outcome.reason else 'answered'] += 1
+        self._status = Status(_NAME, level, outcome.message, (
+            ('answered', str(counts['answered'])),
+            ('rejected', str(counts.total() - counts['answered'])),
+            *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'answered'),
+            *outcome.values, ('time it took (s)', f'{seconds:.3f}')))
+        lines = self._log.lines(Level(level, outcome.message))
+        if outcome.reason:  # each, whatever came before
+            lines = [LogLine(ERROR, f'{_NAME} {outcome.message}', outcome.reason)]
+        self._lines += lines
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+        return self._status.level if self._status else OK
+
+    def status(self, now: float) -> Status | None:
+        """Return the status, None before the first planned trajectory."""
+        return self._status
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return the rejections, and the changes of level besides."""
+        lines, self._lines = self._lines, []
+        return lines

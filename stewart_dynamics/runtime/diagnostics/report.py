@@ -1,0 +1,186 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The report: when it is due, and what its parts have in common.
+
+A report is due once in a second and whenever the level of a part has changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import NamedTuple, Protocol
+
+# Of diagnostic_msgs/DiagnosticStatus.
+OK, WARN, ERROR, STALE = range(4)
+
+# The longest time between two reports [s].
+PERIOD = 1.0
+
+# How often a node calls ``Report.due`` where nothing else happens [s].
+TICK = 0.05
+
+# A level is kept for this long after its cause was last seen [s], so that a hexapod that moves
+# back and forth across a limit is not reported a thousand times in a second.
+_HOLD_SECONDS = 1.0
+
+
+class Level(NamedTuple):
+    """A level, and its cause in words."""
+
+    level: int
+    message: str
+
+
+FINE = Level(OK, '')
+
+
+class Status(NamedTuple):
+    """One diagnostic_msgs/DiagnosticStatus; keys of values carry their unit."""
+
+    name: str
+    level: int
+    message: str
+    values: tuple[tuple[str, str], ...]
+
+
+class LogLine(NamedTuple):
+    """What is to be logged."""
+
+    level: int
+    text: str
+    kind: Hashable = None
+    """Repeated lines of one kind are limited in number; without it each is logged."""
+
+
+class Part(Protocol):
+    """What has a status of its own."""
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+
+    def status(self, now: float) -> Status | None:
+        """Return the status for a report, None while there is nothing to report."""
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return what is to be logged since the last report."""
+
+
+class _Seen(NamedTuple):
+    """A state, and when it was last there."""
+
+    at: float
+    state: Level
+    lasts: bool
+
+
+class Held:
+    """A state that lasts, and those of a higher level for as long as they are held."""
+
+    def __init__(self) -> None:
+        self._state = FINE
+        self._seen: dict[int, _Seen] = {}
+
+    def see(self, state: Level, now: float) -> None:
+        """Note a state that lasts until the next one is noted."""
+        self._state = state
+        if state.level > OK:
+            self._seen[state.level] = _Seen(now, state, lasts=True)
+
+    def happened(self, state: Level, now: float) -> None:
+        """Note what is over as soon as it has happened."""
+        self._seen[state.level] = _Seen(now, state, lasts=False)
+
+    def level(self, now: float) -> int:
+        """Return the highest level that is held."""
+        if not self._seen:
+            return self._state.level
+        self._forget(now)
+        return max(self._state.level, *self._seen) if self._seen else self._state.level
+
+    def at(self, now: float) -> Level:
+        """Return what has the highest level; of a state that is past it says since when."""
+        self._forget(now)
+        worst = max(self._seen, default=OK)
+        if worst <= self._state.level:
+            return self._state
+        at, state, lasts = self._seen[worst]
+        if not lasts:
+            return state
+        return Level(state.level, f'{state.message} ({now - at:.1f} s ago)')
+
+    def _forget(self, now: float) -> None:
+        for level in [level for level, seen in self._seen.items()
+                      if now - seen.at >= _HOLD_SECONDS]:
+            del self._seen[level]
+
+
+class LevelLog:
+    """
+    What is logged of a level: its changes.
+
+    Parameters
+    ----------
+    name : str
+        What the lines begin with.
+
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._level = OK
+
+    def lines(self, state: Level) -> list[LogLine]:
+        """Return the line for a state, none where its level is that of the last one."""
+        if state.level == self._level:
+            return []
+        self._level = state.level
+        return [LogLine(state.level, f'{self._name}: {state.message}')]
+
+
+class Report:
+    """
+    The statuses of all parts, and when they are due.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        In the order of their statuses.
+    now : float
+        From when on there are reports.
+
+    """
+
+    def __init__(self, parts: Sequence[Part], now: float) -> None:
+        self._parts = parts
+        self._levels_of = [part.level for part in parts]
+        self._made = now
+        self._levels: list[int] = []
+
+    def level_changed(self, now: float) -> bool:
+        """Return whether a level is another than in the last report."""
+        return [level(now) for level in self._levels_of] != self._levels
+
+    def due(self, now: float, early: float = 0.0) -> bool:
+        """Return whether to make a report, so much before its time at most."""
+        return now - self._made >= PERIOD - early or self.level_changed(now)
+
+    def make(self, now: float) -> tuple[list[Status], list[LogLine]]:
+        """Return the statuses, and what is to be logged."""
+        self._made = now
+        self._levels = [level(now) for level in self._levels_of]
+        statuses = [part.status(now) for part in self._parts]
+        return ([status for status in statuses if status is not None],
+                [line for part in self._parts for line in part.log_lines(now)])

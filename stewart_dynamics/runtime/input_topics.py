@@ -1,0 +1,35 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The topics on which setpoints and the known wrench come, and their types."""
+
+from __future__ import annotations
+
+# Under the node's name.
+POSE = 'setpoint/pose'
+TWIST = 'setpoint/twist'
+ACCEL = 'setpoint/accel'
+COMBINED = 'setpoint/combined'
+WRENCH = 'wrench'
+
+INPUT_TYPES = {
+    POSE: 'geometry_msgs/msg/PoseStamped',
+    TWIST: 'geometry_msgs/msg/TwistStamped',
+    ACCEL: 'geometry_msgs/msg/AccelStamped',
+    COMBINED: 'trajectory_msgs/msg/MultiDOFJointTrajectory',
+    WRENCH: 'geometry_msgs/msg/WrenchStamped',
+}
+
+# Of each value of setpoint.source: the topics that are joined.
+SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}

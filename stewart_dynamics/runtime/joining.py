@@ -1,0 +1,128 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Many samples of several topics joined by stamp at once, where nothing is out of the ordinary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.mechanics.rows import MOTION
+
+# Samples of a topic that wait for those of the others; the oldest is dropped when one more
+# comes. As many as may wait in the node's middleware: it hands over one topic's after the
+# other's.
+WAITING = 1000
+
+Waiting = dict[int, tuple[float, ...]]
+"""Values of the samples of a topic that wait, by stamp [ns], in the order in which they came."""
+
+
+class Samples(NamedTuple):
+    """New samples of a topic, N of them."""
+
+    stamps: Stamps
+    """(N,) [ns]"""
+    values: Array
+    """(N, ...)"""
+    places: Integers
+    """(N,): where in the order of all messages each came."""
+
+
+class Joined(NamedTuple):
+    """What samples give: K setpoints, and what is left of each topic."""
+
+    stamps: Stamps
+    """(K,) [ns]"""
+    motions: Array
+    """Rows of motion (K, MOTION)."""
+    places: Integers
+    """(K,): where the message came that completed each."""
+    waiting: dict[str, Waiting]
+    dropped: dict[str, list[int]]
+    """Stamps of the samples that no setpoint can use any more."""
+
+
+def join_many(samples: Mapping[str, Samples], waiting: Mapping[str, Waiting],
+              last: Mapping[str, int]) -> Joined | None:
+    """
+    Join samples; None where stamps do not only rise, or more samples than WAITING wait.
+
+    Parameters
+    ----------
+    samples : mapping of str to Samples
+        Of each topic, in the order of topics in a row of motion.
+    waiting : mapping of str to Waiting
+        Of each topic, those that came before.
+    last : mapping of str to int
+        The stamps that were used last [ns]; empty, or one for each topic.
+
+    """
+    stamps: dict[str, Stamps] = {}
+    places: dict[str, Integers] = {}  # -1 of those that wait already
+    values: dict[str, Array] = {}
+    for topic, of_topic in samples.items():
+        before = waiting[topic]
+        stamps[topic] = np.concatenate([np.fromiter(before, dtype=np.int64), of_topic.stamps])
+        if not _only_rise(stamps[topic], of_topic.stamps, last.get(topic)):
+            return None
+        places[topic] = np.concatenate([np.full(len(before), -1), of_topic.places])
+        values[topic] = of_topic.values
+        if before:
+            old = np.array(list(before.values()))
+            values[topic] = np.concatenate([old, of_topic.values.reshape(-1, old.shape[1])])
+    # Stamps only rise, so setpoints are complete in the order of their stamps.
+    common, *others = stamps.values()
+    for other in others:
+        common = np.intersect1d(common, other, assume_unique=True)
+    chosen = {topic: np.searchsorted(stamps[topic], common) for topic in samples}
+    complete = np.max([places[topic][chosen[topic]] for topic in samples], axis=0)
+    if any(_overflows(stamps[topic], places[topic], common, complete) for topic in samples):
+        return None
+    motions = np.zeros((len(common), MOTION))
+    column = 0
+    for topic in samples:
+        width = values[topic].shape[1]
+        motions[:, column:column + width] = values[topic][chosen[topic]]
+        column += width
+    left, dropped = {}, {}
+    for topic in samples:
+        first = int(np.searchsorted(stamps[topic], common[-1], side='right')) if len(
+            common) else 0
+        left[topic] = dict(zip(stamps[topic][first:].tolist(),
+                               map(tuple, values[topic][first:].tolist()), strict=True))
+        if first > len(common):
+            dropped[topic] = np.setdiff1d(
+                stamps[topic][:first], common, assume_unique=True).tolist()
+    return Joined(common, motions, complete, left, dropped)
+
+
+def _only_rise(stamps: Stamps, new: Stamps, last: int | None) -> bool:
+    """Return whether stamps rise, from the last one on, and no new one is zero or less."""
+    # What waits need not have come in the order of its stamps.
+    return not (np.any(np.diff(stamps) <= 0) or (len(new) and (
+        new[0] <= 0 or (last is not None and stamps[0] <= last))))
+
+
+def _overflows(stamps: Stamps, places: Integers, common: Stamps, complete: Integers) -> bool:
+    """Return whether, at any time, more than WAITING samples of a topic wait."""
+    if len(stamps) <= WAITING:
+        return False
+    completed = np.searchsorted(complete, places)  # setpoints, when a sample comes
+    used = np.concatenate([[0], np.searchsorted(stamps, common, side='right')])[completed]
+    return bool(np.any(np.arange(1, len(stamps) + 1) - used > WAITING))

@@ -1,0 +1,109 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The messages to publish or write for what the step and the external wrench give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from operator import sub
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import NO_WRENCH, Stamps
+from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.messages.standard import (
+    boolean, FLOAT64, float64, FLOAT64_ARRAY, float64_array)
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.external_wrench import Estimate
+from stewart_dynamics.runtime.step import Output, Outputs
+
+# Under the node's name, in the order in which they are published for a setpoint.
+OUTPUT_TYPES = {
+    'leg_states': 'sensor_msgs/msg/JointState',
+    'leg_lengths': 'std_msgs/msg/Float64MultiArray',
+    'leg_forces': 'std_msgs/msg/Float64MultiArray',
+    'jacobian_determinant': 'std_msgs/msg/Float64',
+    'singularity_warning': 'std_msgs/msg/Bool',
+}
+
+
+class OutputMessages:
+    """
+    Writes the messages.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names and zero lengths of the legs, and the base frame.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._zero_lengths = parameters['geometry.zero_length'].tolist()
+        self._joint_state = JointStateWriter(parameters['joints'])
+        self._with_effort, self._without_effort = (
+            self._joint_state.layout(effort) for effort in (True, False))
+        self._wrench = StampedWriter(parameters['base_frame'], 6)
+
+    def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
+        """Yield topics (keys of OUTPUT_TYPES) and messages to publish for an output."""
+        yield 'leg_states', self._joint_state.write(
+            output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
+            output.forces)
+        yield 'leg_lengths', float64_array(output.lengths)
+        if output.forces is not None:
+            yield 'leg_forces', float64_array(output.forces)
+        yield 'jacobian_determinant', float64(output.determinant)
+        if output.warning_changed:
+            yield 'singularity_warning', boolean(output.singularity.warning)
+
+    def of_outputs(self, outputs: Outputs) -> list[tuple[str, Stamps, NDArray[np.void]]]:
+        """
+        Return the same messages as ``of_output``, of many outputs.
+
+        Returns
+        -------
+        list of (topic, which, messages)
+            In the order in which they are published for one output; ``which`` (K,) outputs have
+            such a message, and the messages (K,) as entries of their length. A topic may come
+            twice, for its messages with and without forces.
+
+        """
+        positions = outputs.lengths - self._zero_lengths
+        solved = np.isfinite(outputs.forces[:, 0])
+        having, lacking = np.flatnonzero(solved), np.flatnonzero(~solved)
+        stamps, rates, forces = outputs.stamps, outputs.rates, outputs.forces
+        messages = [
+            ('leg_states', having, self._with_effort.write(
+                stamps[having], positions[having], rates[having], forces[having])),
+            ('leg_states', lacking, self._without_effort.write(
+                stamps[lacking], positions[lacking], rates[lacking])),
+            ('leg_lengths', np.arange(len(stamps)), FLOAT64_ARRAY.write(
+                None, outputs.lengths)),
+            ('leg_forces', having, FLOAT64_ARRAY.write(None, forces[having])),
+            ('jacobian_determinant', np.arange(len(stamps)), FLOAT64.write(
+                None, outputs.determinants[:, None])),
+        ]
+        changed = np.flatnonzero(outputs.changed)
+        warnings = [boolean(on) for on in outputs.warnings[changed].tolist()]
+        messages.append(('singularity_warning', changed, np.frombuffer(
+            b''.join(warnings), dtype=f'V{len(boolean(True))}')))
+        return messages
+
+    def of_estimate(self, estimate: Estimate) -> bytes:
+        """Return the geometry_msgs/WrenchStamped of an estimate that has a wrench."""
+        return self._wrench.write(estimate.stamp, estimate.wrench or NO_WRENCH)

@@ -1,0 +1,196 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Planned trajectories as messages: platform trajectory in, leg trajectory or a rejection out.
+
+A trajectory_msgs/MultiDOFJointTrajectory is read, checked and answered in pieces, so that
+setpoints are answered between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Six, Stamps
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import consecutive, MOTION, POSITION, ROTATION
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.planned_trajectory import (
+    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
+from stewart_dynamics.runtime.rejections import (
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
+from stewart_dynamics.runtime.samples import unit_quaternions
+
+INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
+OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
+
+MOST_POINTS = 100_000
+# So many points are read or written between two yields: some tenths of a millisecond of work.
+_READ = 2 * PIECE
+_WRITTEN = 8 * PIECE
+
+QUEUE_FULL = 'queue full'
+
+_POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
+
+
+class Outcome(NamedTuple):
+    """What has become of a trajectory."""
+
+    message: str
+    """In words: accepted or rejected, and why."""
+    reason: str = ''
+    """Why it is rejected, a constant; empty where it is accepted."""
+    answer: bytes = b''
+    """A trajectory_msgs/JointTrajectory; empty where rejected."""
+    warning: bool = False
+    """Accepted, but the condition number reaches singularity.warn_condition."""
+    values: tuple[tuple[str, str], ...] = ()
+    """Keys with their units, and values."""
+
+
+class _RejectedError(Exception):
+
+    def __init__(self, reason: str, details: str) -> None:
+        super().__init__(reason, details)
+        self.outcome = rejected(reason, details)
+
+
+def rejected(reason: str, details: str) -> Outcome:
+    """Return the outcome of a trajectory that cannot be checked."""
+    return Outcome(f'rejected: {reason}: {details}', reason)
+
+
+def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome | None]:
+    """
+    Yield None after each piece of the work, and the outcome at the end.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        They hold for all of the work.
+    wrench : (6,)
+        External wrench at the platform's origin, base axes [N, N m].
+    data : bytes
+        A trajectory_msgs/MultiDOFJointTrajectory as received.
+
+    """
+    try:
+        message = _checked_header(data, parameters['base_frame'])
+        times, rows = yield from _read(message)
+    except MalformedError as exc:
+        yield rejected(MALFORMED, str(exc))
+        return
+    except _RejectedError as exc:
+        yield exc.outcome
+        return
+    result = None
+    for result in check_in_pieces(StewartPlatform(parameters), times, rows, np.array(wrench)):
+        if result is None:
+            yield None
+    assert result is not None  # the last one
+    written = b''
+    if result.accepted:
+        written = yield from _written(parameters, message, result)
+    yield Outcome(result.message, result.reason, written, result.warning,
+                  _values(parameters, result))
+
+
+def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
+    message = PlatformTrajectory(data)
+    if message.frame not in (b'', base_frame.encode()):
+        raise _RejectedError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
+    if not 1 <= message.size <= MOST_POINTS:
+        raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
+    return message
+
+
+def _read(message: PlatformTrajectory) -> Generator[None, None, tuple[Stamps, Array]]:
+    """Return times (N,) [ns] and rows of motion (N, MOTION) of a trajectory; reject bad points."""
+    times, rows = np.empty(message.size, dtype=np.int64), np.empty((message.size, MOTION))
+    for first in range(0, message.size, _READ):
+        end = min(first + _READ, message.size)
+        points = message.points(first, end)
+        if (late := points['nanosec'] >= 1_000_000_000).any():
+            n = int(np.argmax(late))
+            raise MalformedError(
+                f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
+                'under 1000000000')
+        times[first:end] = points['sec'] * np.int64(1_000_000_000) + points['nanosec']
+        stuck = first_not_increasing(times[first:end], times[first - 1] if first else -1)
+        if stuck is not None:
+            n = first + stuck
+            raise _RejectedError(NOT_INCREASING, f'points[{n}]: {times[n] * 1e-9:.9g} s, ' + (
+                f'after {times[n - 1] * 1e-9:.9g} s' if n else 'must be at least 0'))
+        rows[first:end] = _rows(
+            first, np.column_stack([points['pose'], points['twist'], points['accel']]))
+        yield
+    return times, rows
+
+
+def _rows(first: int, numbers: Array) -> Array:
+    """Return rows of motion (N, MOTION) of points (N, 19) from an index on; reject bad ones."""
+    if not (finite := np.isfinite(numbers).all(axis=1)).all():
+        n = int(np.argmin(finite))
+        raise _RejectedError(NOT_FINITE, f'points[{first + n}]: {tuple(numbers[n].tolist())}')
+    quaternions, lengths, unit = unit_quaternions(numbers[:, _QUATERNION])
+    if not unit.all():
+        n = int(np.argmin(unit))
+        raise _RejectedError(
+            NOT_UNIT, f'points[{first + n}]: {length_details(float(lengths[n]))}')
+    rows = np.empty((len(numbers), MOTION))
+    rows[:, POSITION] = numbers[:, _POSITION]
+    rows[:, ROTATION] = np.column_stack(from_quaternion(*quaternions))
+    rows[:, ROTATION.stop:] = numbers[:, _TWIST_AND_ACCELERATION]
+    return rows
+
+
+def _written(parameters: Parameters, message: PlatformTrajectory, result: PlannedTrajectory,
+             ) -> Generator[None, None, bytes]:
+    """Return the trajectory_msgs/JointTrajectory of an accepted trajectory."""
+    answer = LegTrajectory(
+        message.stamp, parameters['joints'], result.points, parameters['trajectory.effort'])
+    for first in range(0, result.points, _WRITTEN):
+        some = slice(first, min(first + _WRITTEN, result.points))
+        answer.put(
+            first, message.points(some.start, some.stop),
+            result.lengths[some] - parameters['geometry.zero_length'], result.rates[some],
+            result.forces[some])
+        yield
+    return answer.message()
+
+
+def _values(parameters: Parameters, result: PlannedTrajectory) -> tuple[tuple[str, str], ...]:
+    """Return what diagnostics say beside the message."""
+    values = [('points', str(result.points)), ('duration (s)', f'{result.duration:.9g}')]
+    joints = parameters['joints']
+    if result.accepted and result.force_leg is not None:
+        values += [('worst condition number', f'{result.condition_number:.6g}'),
+                   ('its time (s)', f'{result.condition_time:.3f}'),
+                   ('largest force (N)', f'{result.force:.6g}'),
+                   ('its leg', joints[result.force_leg])]
+        if parameters['limits.force_max'] is not None:
+            values.append(('largest force, of limits.force_max', f'{result.load:.4g}'))
+    elif not np.isnan(result.time):
+        values.append(('rejected at (s)', f'{result.time:.6g}'))
+        if result.leg is not None:
+            values.append(('leg', joints[result.leg]))
+    return tuple(values)

@@ -1,0 +1,163 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From messages of an input topic to checked samples, one message at a time or many at once.
+
+A sample is a stamp and the message's numbers, the quaternion of a pose replaced by the rotation
+matrix. Node and replay check alike, and get the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
+from stewart_dynamics.mechanics.rotation import from_quaternion, is_unit, quaternion_length
+from stewart_dynamics.messages.cdr import finite, MalformedError, Stamped
+from stewart_dynamics.messages.layout import Layout
+from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist, wrench
+from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
+from stewart_dynamics.runtime.rejections import (
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, Rejections, WRONG_FRAME)
+
+_READERS: dict[str, Callable[[bytes], Stamped]] = {
+    POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench}
+
+
+class SampleReader:
+    """
+    Reads the messages of one topic.
+
+    Most messages have the layout of the first sound one, and are read by it.
+
+    Parameters
+    ----------
+    topic : str
+        One of ``input_topics``.
+    base_frame : str
+        The frame that messages must have, or none.
+    rejections : Rejections
+        Told of what is rejected.
+
+    """
+
+    def __init__(self, topic: str, base_frame: str, rejections: Rejections) -> None:
+        self._topic = topic
+        self._reader = _READERS[topic]
+        self._has_pose = topic in (POSE, COMBINED)
+        self._base_frame = base_frame.encode()
+        self._rejections = rejections
+        self._layout: Layout | None = None
+
+    def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return a message's stamp [ns] and values, or reject it."""
+        read = self._layout.read_one(data) if self._layout else None
+        if read is None:
+            try:
+                stamp, frame, values = self._reader(data)
+            except MalformedError as exc:
+                self._rejections.reject(self._topic, MALFORMED, str(exc))
+                return None
+            if frame not in (b'', self._base_frame):
+                self._rejections.reject(
+                    self._topic, WRONG_FRAME, frame_details(frame, self._base_frame))
+                return None
+            self._layout = self._layout or layout_of(self._reader, data)
+        else:
+            stamp, values = read
+        if not finite(values):
+            self._rejections.reject(self._topic, NOT_FINITE, str(values))
+            return None
+        if self._has_pose:
+            x, y, z, w = values[3:7]
+            length = quaternion_length(x, y, z, w)
+            if not is_unit(length):
+                self._rejections.reject(self._topic, NOT_UNIT, length_details(length))
+                return None
+            values = values[:3] + from_quaternion(
+                x / length, y / length, z / length, w / length) + values[7:]
+        return stamp, values
+
+    def read_many(self, data: Bytes, starts: Integers, sizes: Integers,
+                  ) -> tuple[Stamps, Array] | None:
+        """
+        Return stamps (N,) [ns] and values (N, ...) of messages that are all sound.
+
+        None where one is not, or has another layout: read them one by one then.
+
+        Parameters
+        ----------
+        data : (M,)
+            Bytes that have all the messages in them.
+        starts, sizes : (N,)
+            Where each begins, and its length in bytes; at least one.
+
+        """
+        if self._layout is None:
+            self._learn(data[starts[0]:starts[0] + sizes[0]].tobytes())
+        if self._layout is None or np.any(sizes != self._layout.size):
+            return None
+        alike, stamps, values = self._layout.read(data, starts)
+        if not alike.all() or not np.isfinite(values).all():
+            return None
+        if not self._has_pose:
+            return stamps, values
+        quaternions, _, unit = unit_quaternions(values[:, 3:7])
+        if not unit.all():
+            return None
+        return stamps, np.column_stack(
+            [values[:, :3], *from_quaternion(*quaternions), values[:, 7:]])
+
+    def forget_layout(self) -> None:
+        """Take the layout of the next sound message."""
+        self._layout = None
+
+    def _learn(self, data: bytes) -> None:
+        """Take the layout of a message if it can be read and its frame is right."""
+        try:
+            frame = self._reader(data).frame
+        except MalformedError:
+            return
+        if frame in (b'', self._base_frame):
+            self._layout = layout_of(self._reader, data)
+
+
+def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
+    """
+    Return quaternions divided by their length, and which of them may be used.
+
+    Parameters
+    ----------
+    quaternions : (N, 4)
+        Finite numbers x y z w.
+
+    Returns
+    -------
+    quaternions : (4, N)
+        Of unit length, number by number.
+    lengths : (N,)
+        As they were.
+    unit : (N,)
+        Which lengths are 1 within QUATERNION_TOLERANCE.
+
+    """
+    # Number by number, as for one sample: the bits are the same.
+    x, y, z, w = quaternions.T
+    with np.errstate(over='ignore', divide='ignore', invalid='ignore'):
+        lengths = quaternion_length(x, y, z, w)
+        return (np.stack([x / lengths, y / lengths, z / lengths, w / lengths]), lengths,
+                is_unit(lengths))

@@ -1,0 +1,191 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is published for results: the same for one and for many, and finite numbers only."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from messages import STORE
+import numpy as np
+import pytest
+from test_step import (
+    answered, FLAT, HOME, PARAMETERS, QUARTER, REST, rotations, rows, sizes, STAMP, STEP, UPRIGHT)
+
+from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.runtime.external_wrench import Estimate
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.runtime.step import Batch, Setpoint, Step
+
+MESSAGES = OutputMessages(PARAMETERS)
+
+
+def decoded(messages: list[tuple[str, bytes]]) -> dict[str, Any]:
+    """Return the messages as rosbags reads them, by topic; each topic once."""
+    assert len({topic for topic, _ in messages}) == len(messages)
+    return {topic: STORE.deserialize_cdr(data, OUTPUT_TYPES[topic]) for topic, data in messages}
+
+
+def numbers_of(messages: dict[str, Any]) -> list[float]:
+    """Return all the numbers in them."""
+    found: list[float] = []
+    for topic, message in messages.items():
+        if topic == 'leg_states':
+            found += [*message.position, *message.velocity, *message.effort]
+        elif topic in ('leg_lengths', 'leg_forces'):
+            found += list(message.data)
+        else:
+            found.append(float(message.data))
+    return found
+
+
+def test_messages_carry_the_output() -> None:
+    zero = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    parameters = PARAMETERS.replaced({
+        'geometry.zero_length': zero, 'joints': ['a', 'bc', 'def', 'ghij', 'élan', '六']})
+    step, written = Step(parameters), OutputMessages(parameters)
+    for setpoint, wrench in rows(parameters, 10):
+        output = answered(step, setpoint, wrench)
+        messages = list(written.of_output(output))
+        assert [topic for topic, _ in messages] == list(OUTPUT_TYPES)
+        of = decoded(messages)
+        state = of['leg_states']
+        assert state.header.stamp.sec * 10 ** 9 + state.header.stamp.nanosec == setpoint.stamp
+        assert state.header.frame_id == ''
+        assert tuple(state.name) == parameters['joints']
+        assert tuple(state.position) == tuple(
+            a - b for a, b in zip(output.lengths, zero, strict=True))
+        assert tuple(state.velocity) == output.rates
+        assert tuple(state.effort) == output.forces
+        assert tuple(of['leg_lengths'].data) == output.lengths
+        assert tuple(of['leg_forces'].data) == output.forces
+        assert of['jacobian_determinant'].data == output.determinant
+        assert of['singularity_warning'].data == output.singularity.warning
+
+
+def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
+    state, sent = None, []
+    # to the singularity and back again, slowly: nothing is predicted
+    for angle in [*range(0, 89, 4), *range(88, -1, -4)]:
+        half = math.radians(angle) / 2
+        rotation = from_quaternion(0.0, 0.0, math.sin(half), math.cos(half))
+        output = answered(STEP, Setpoint(STAMP, (0.0, 0.0, 1.0, *rotation, *REST)), NO_WRENCH,
+                          state)
+        message = decoded(list(MESSAGES.of_output(output))).get('singularity_warning')
+        if message is not None:
+            sent.append(message.data)
+        changed = state is None or state.warning != output.singularity.warning
+        assert (message is not None) == changed == output.warning_changed
+        state = output.singularity
+    assert sent == [False, True, False]
+
+
+@pytest.mark.parametrize('setpoint', [QUARTER, FLAT], ids=['a quarter turn', 'flat'])
+def test_without_forces_there_are_none_in_the_messages(setpoint: Setpoint) -> None:
+    of = decoded(list(MESSAGES.of_output(answered(STEP, setpoint))))
+    assert list(of) == ['leg_states', 'leg_lengths', 'jacobian_determinant',
+                        'singularity_warning']
+    assert len(of['leg_states'].effort) == 0
+    assert np.all(np.isfinite(numbers_of(of)))
+
+
+@pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
+def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
+    """Toward a singularity and away, with forces and without, clipped and not."""
+    parameters = PARAMETERS.replaced({
+        'singularity.action': action, 'limits.force_max': 1000.0,
+        'geometry.zero_length': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+        'joints': ['a', 'bc', 'def', 'ghij', 'élan', '六']})
+    step, written = Step(parameters), OutputMessages(parameters)
+    angles = np.radians([*range(60, 90, 3), 90, *range(89, 60, -3)])
+    rotations_of = [from_quaternion(0.0, 0.0, math.sin(half), math.cos(half))
+                    for half in angles / 2]
+    motions = np.array([(0.0, 0.0, 1.0, *rotation, *REST) for rotation in rotations_of])
+    stamps = STAMP + np.arange(len(motions))
+    outputs = step.many(Batch(stamps, motions, np.zeros((len(motions), 6)),
+                              np.zeros(len(motions), dtype=bool), stamps), None)
+    found: dict[int, dict[str, bytes]] = {n: {} for n in range(len(motions))}
+    for topic, which, many in written.of_outputs(outputs):
+        for n, each in zip(which.tolist(), many, strict=True):
+            assert topic not in found[n]
+            found[n][topic] = each.tobytes()
+    state = None
+    lacking = 0
+    for n, motion in enumerate(motions.tolist()):
+        output = answered(step, Setpoint(STAMP + n, tuple(motion)), NO_WRENCH, state)
+        state = output.singularity
+        lacking += output.forces is None
+        assert found[n] == dict(written.of_output(output))
+    assert 0 < lacking < len(motions)
+
+
+def test_an_external_wrench_is_written_in_the_base_frame() -> None:
+    parameters = PARAMETERS.replaced({'base_frame': 'sol'})
+    wrench = (1.0, -2.0, 3.0, -4.0, 5.0, -6.0)
+    read = STORE.deserialize_cdr(OutputMessages(parameters).of_estimate(
+        Estimate(STAMP, HOME.motion, wrench, None)), 'geometry_msgs/msg/WrenchStamped')
+    assert read.header.frame_id == 'sol'
+    assert read.header.stamp.sec * 10 ** 9 + read.header.stamp.nanosec == STAMP
+    force, torque = read.wrench.force, read.wrench.torque
+    assert (force.x, force.y, force.z, torque.x, torque.y, torque.z) == wrench
+
+
+def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
+    output = step(setpoint._replace(wrench=wrench), None)
+    if output is None:
+        return
+    after = step(setpoint._replace(wrench=wrench), output.singularity)
+    assert after is not None
+    for of in (output, after):
+        read = decoded(list(OutputMessages(step.parameters).of_output(of)))
+        assert np.all(np.isfinite(numbers_of(read)))
+        assert read['leg_states'].position.shape == (6,)
+        assert ('leg_forces' in read) == bool(len(read['leg_states'].effort))
+        assert of.condition >= 1.0
+
+
+@settings(derandomize=True, deadline=None, max_examples=400)
+@given(st.tuples(sizes, sizes, sizes), rotations, st.tuples(*[sizes] * 12),
+       st.tuples(*[sizes] * 6))
+@example((0.0, 0.0, 0.0), UPRIGHT, REST, NO_WRENCH)
+@example((0.0, 0.0, 1e150), UPRIGHT, REST, NO_WRENCH)
+@example((0.0, 0.0, 1.0), UPRIGHT, (1e150,) * 12, NO_WRENCH)
+def test_only_finite_numbers_are_published(
+        position: tuple[float, ...], rotation: tuple[float, ...], rates: tuple[float, ...],
+        wrench: Six) -> None:
+    setpoint = Setpoint(STAMP, (*position, *rotation, *rates))
+    _check_finite(STEP, setpoint, wrench)
+    _check_finite(_LIMITED, setpoint, wrench)
+
+
+_LIMITED = Step(PARAMETERS.replaced({
+    'limits.force_max': 1000.0, 'limits.length_max': 2.0, 'limits.velocity_max': 1.0,
+    'singularity.action': 'suppress_forces', 'geometry.zero_length': 1.79e308}))
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(st.floats(5e-324, 1.79e308), st.floats(0.0, 1.79e308), st.floats(0.0, 1.79e308),
+       st.tuples(*[st.floats(-2.0, 2.0)] * 3), rotations, st.tuples(*[sizes] * 12))
+def test_only_finite_numbers_are_published_whatever_the_machine(
+        mass: float, leg_mass: float, zero_length: float, position: tuple[float, ...],
+        rotation: tuple[float, ...], rates: tuple[float, ...]) -> None:
+    step = Step(PARAMETERS.replaced({
+        'platform.mass': mass, 'legs.piston.mass': leg_mass,
+        'geometry.zero_length': zero_length}))
+    _check_finite(step, Setpoint(STAMP, (*position, *rotation, *rates)), NO_WRENCH)
