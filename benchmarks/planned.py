@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Planned motions: how long the node takes to answer one, and what that costs its setpoints.
+Planned trajectories: how long the node takes to check one, and what its setpoints pay for it.
 
 Run by hand, ``make bench-planned``, on Linux; README.md beside this file says what is compared
 and how.
@@ -38,7 +38,7 @@ from replay import table
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.runtime import planned_trajectory as planned
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
 
 BEGIN, END = '<!-- planned: begin -->', '<!-- planned: end -->'
 POINTS = 10_000
@@ -49,7 +49,7 @@ ALONE = 10
 
 class Planned(Measurement):
     """
-    The node with a stream of setpoints, in turns with and without a planned motion each second.
+    The node with a stream of setpoints, in turns with and without a trajectory each second.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ class Planned(Measurement):
 
     def measure(self) -> tuple[list[Turn], list[Turn], Array, Array]:
         """
-        Return turns without and with motions, times of motions alone and beside setpoints.
+        Return turns without and with trajectories, times of these alone and beside setpoints.
 
-        Times (N, 2) [ms]: to publish a motion, and from then to its answer.
+        Times (N, 2) [ms]: to publish a trajectory, and from then to its answer.
         """
         path = self._folder / 'planned.npz'
         with self._processes() as (nodes, source, _):
@@ -118,7 +118,7 @@ def pieces() -> tuple[float, int]:
             outcome = next(work)
             took.append((time.thread_time_ns() - begin) * 1e-6)
         of_runs.append(took)
-    # What a piece takes at all, and not what else the machine did then.
+    # What a piece takes at all, and not what else the computer did then.
     least = np.min(of_runs[1:], axis=0)
     return float(least.max()), len(least)
 
@@ -136,13 +136,13 @@ def main() -> None:
         without, beside, alone, streaming = Planned(
             options.rounds, options.seconds, Path(name)).measure()
     rows: list[tuple[str, ...]] = [
-        (f'from sending {POINTS:,} points to their answer (ms)', 'median', 'max', 'motions')]
+        (f'from sending {POINTS:,} points to their answer (ms)', 'median', 'max', 'trajectories')]
     for label, times in (('alone', alone), ('beside setpoints at 1 kHz', streaming)):
         rows.append((label, f'{np.median(times.sum(axis=1)):.0f}',
                      f'{times.sum(axis=1).max():.0f}', str(len(times))))
     lines = ['', *table(rows), '']
     rows = [('latency of setpoints (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core')]
-    for label, turns in (('no planned motion', without), ('one each second', beside)):
+    for label, turns in (('no planned trajectory', without), ('one each second', beside)):
         latencies = np.concatenate([turn.latencies for turn in turns])
         rows.append((label, *(f'{value:,.0f}' for value in np.percentile(latencies, EACH)),
                      str(sum(turn.lost for turn in turns)),

@@ -48,10 +48,12 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.mechanics.plant_dynamics import advance, STATE_TWIST
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.standard import float64_array
+from stewart_dynamics.nodes.simulator_messages import StateMessages
 from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.plant import _advance, Plant
+from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 sys.path.append(str(HERE.parent / 'test'))
@@ -104,10 +106,11 @@ def period_rows(rounds: int) -> list[tuple[str, ...]]:
         steps = f'{plant.steps} step{"s: no reflected mass" if plant.steps > 1 else ""}'
         for name, call in (
                 ('the compiled call', partial(
-                    _advance, plant._machine, plant._legs, plant._loads, plant._state,
-                    plant._result, plant.steps, plant._step)),
+                    advance, plant._machine, plant._stops, plant._limits.force_max, plant._loads,
+                    plant._state, plant._result, plant.steps, plant._step)),
                 ('`Plant.advance`', partial(plant.advance, commands, NO_WRENCH)),
-                ('its four messages beside', lambda plant=plant: list(plant.messages(1)))):
+                ('its four messages beside',
+                 partial(published, StateMessages(plant.parameters), plant))):
             timed(call)
             times = [timed(call) for _ in range(rounds)]
             middle = float(np.median(times))
@@ -116,6 +119,11 @@ def period_rows(rounds: int) -> list[tuple[str, ...]]:
                          f'{min(times):.1f} .. {max(times):.1f}',
                          '' if of_messages else f'{1e3 / middle:,.0f}'))
     return rows
+
+
+def published(messages: StateMessages, plant: Plant) -> list[tuple[str, bytes]]:
+    """Return the messages of a period."""
+    return list(messages.write(1, plant.measured()))
 
 
 # The node
@@ -227,7 +235,7 @@ def balance_of_a_tumble(step: float) -> float:
     """Return the change of energy of a machine that tumbles freely, of all that it has."""
     plant = Plant(SimulatorParameters({
         **GIVEN, **IDEAL, 'rate': RATE, 'step': step, 'gravity': [0.0, 0.0, 0.0]}))
-    plant._state[7:13] = 0.5, -0.3, 1.0, 8.0, -5.0, 12.0
+    plant._state[STATE_TWIST] = 0.5, -0.3, 1.0, 8.0, -5.0, 12.0
     plant.state = plant._run(0)
     before = energy_of(plant)
     for _ in range(200):

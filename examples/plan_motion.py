@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-Example: get the leg trajectory of a planned motion from stewart_dynamics. Copy what you need.
+Example: get the leg trajectory of a planned trajectory from stewart_dynamics. Copy what you need.
 
-The motion leads from pose to pose, at rest at both ends. It is published as a whole on
+The trajectory leads from pose to pose, at rest at both ends. It is published as a whole on
 stewart_dynamics/platform_trajectory; the answer on stewart_dynamics/leg_trajectory is what a
-joint_trajectory_controller takes. A rejected motion has no answer: /diagnostics states the reason.
-Exit code: 0 answered, 1 not.
+joint_trajectory_controller takes. A rejected one has no answer: /diagnostics states the reason.
+Exit code: 0 accepted, 1 not.
 """
 
 import argparse
@@ -88,9 +88,9 @@ class Planner(Node):
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.connected |= status.name.startswith('stewart_dynamics: ')
-            if status.name == 'stewart_dynamics: trajectory':
+            if status.name == 'stewart_dynamics: planned trajectory':
                 values = {pair.key: pair.value for pair in status.values}
-                self.rejected, self.reason = int(values['refused']), status.message
+                self.rejected, self.reason = int(values['rejected']), status.message
 
     def ready(self) -> bool:
         """Return whether both directions are connected: the node answers only once."""
@@ -137,7 +137,7 @@ def main() -> None:
     finally:
         rclpy.try_shutdown()
     last = answer.points[-1].time_from_start
-    line = f'answered: {len(answer.points)} points over {last.sec + 1e-9 * last.nanosec:g} s'
+    line = f'accepted: {len(answer.points)} points over {last.sec + 1e-9 * last.nanosec:g} s'
     if len(answer.points[0].effort):  # the node's trajectory.effort
         line += f', largest effort {max(np.abs(p.effort).max() for p in answer.points):.0f} N'
     print(line)

@@ -31,13 +31,15 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters import Parameters
+    from stewart_dynamics.runtime.planned_trajectory import (
+        check_planned_trajectory, PlannedTrajectory)
 
 __version__ = '0.1.0'
 
 __all__ = [
     'BagError', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionError', 'NaturalModes',
-    'ParameterError', 'Parameters', 'Pose', 'PoseError', 'SingularityError', 'StewartError',
-    'StewartPlatform', '__version__']
+    'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'SingularityError',
+    'StewartError', 'StewartPlatform', '__version__', 'check_planned_trajectory']
 
 _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
@@ -49,6 +51,7 @@ _MODULES = {
     'mechanics.stewart_platform': ('StewartPlatform',),
     'mechanics.stiffness': ('NaturalModes',),
     'parameters': ('Parameters',),
+    'runtime.planned_trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -983,11 +983,12 @@ class Planner:
         assert len(self.raw) == number
         return deserialize_message(self.raw[-1], JointTrajectory)
 
-    def until_refused(self, text: str, number: int) -> None:
-        """Wait until the last trajectory is refused for a reason, so many in all."""
-        self._node.until_status('trajectory', b'\2', text)
-        self._node.until(lambda: self._node.values('trajectory')['refused'] == str(number),
-                         f'{number} trajectories are refused')
+    def until_rejected(self, text: str, number: int) -> None:
+        """Wait until the last trajectory is rejected for a reason, so many in all."""
+        self._node.until_status('planned trajectory', b'\2', text)
+        self._node.until(
+            lambda: self._node.values('planned trajectory')['rejected'] == str(number),
+            f'{number} trajectories are rejected')
 
 
 def bits(numbers: Any) -> bytes:

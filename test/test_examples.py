@@ -76,7 +76,7 @@ def test_a_planned_motion_is_answered_or_its_refusal_is_said(
                             program.stderr)
         program = planned(*arguments)
         assert program.wait() == 0, program.stderr
-        assert program.stdout == ('answered: 201 points over 2 s, largest effort '
+        assert program.stdout == ('accepted: 201 points over 2 s, largest effort '
                                   f'{np.abs(expected.forces).max():.0f} N\n')
         node.until(lambda n=n: len(answers) == n + 1, 'the answer is heard here, too')
     program = planned('--duration', '-1.0')

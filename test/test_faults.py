@@ -868,62 +868,64 @@ def _refused_in_little_memory(folder: Path, reasons: dict[Path, str]) -> None:
     assert int(largest) < int(usual) + 50_000
 
 
-# Planned motions
+# Planned trajectories
 
 TURNED = HOME._replace(quaternion=(0.0, 0.0, math.sin(1.0), math.cos(1.0)))
 UNFIT = {
-    'refused: at ': ([HOME, HOME._replace(position=(0.0, 0.0, 4.0))], {}),
-    'det(J) passes zero': ([HOME, TURNED], {}),
+    'rejected: at ': ([HOME, HOME._replace(position=(0.0, 0.0, 4.0))], {}),
+    'det(J) crosses zero': ([HOME, TURNED], {}),
     'not finite: points[1]': ([HOME, HOME._replace(position=(0.0, 0.0, math.nan))], {}),
     'quaternion not of unit length: points[0]': (
         [HOME._replace(quaternion=(0.0, 0.0, 0.0, 1.1)), HOME], {}),
     "wrong frame_id: 'world', must be 'base' or empty": ([HOME, HOME], {'frame': 'world'}),
-    'time_from_start does not rise: points[1]': ([HOME, HOME], {'step': 0}),
+    'time_from_start is not strictly increasing: points[1]': ([HOME, HOME], {'step': 0}),
     'malformed: 0 points': ([], {}),
-    'out of range: the numbers overflow': ([HOME._replace(position=(1e200, 0.0, 0.0))], {}),
-    'too far between points': ([HOME, HOME._replace(position=(1e9, 0.0, 0.0))], {}),
+    'out of range: numbers overflow': ([HOME._replace(position=(1e200, 0.0, 0.0))], {}),
+    'points too far apart': ([HOME, HOME._replace(position=(1e9, 0.0, 0.0))], {}),
 }
 
 
-def test_a_trajectory_that_is_unfit_is_refused_as_a_whole(renew: Start) -> None:
+def test_a_trajectory_that_is_unfit_is_rejected_as_a_whole(renew: Start) -> None:
     node = renew('singularity.stop_condition:=1.0e+9', 'limits.force_max:=1.0e+9',
                  'limits.velocity_max:=100.0', 'limits.length_max:=3.0')
     planner = Planner(node)
     for number, (text, (samples, how)) in enumerate(UNFIT.items(), start=1):
         planner.send(samples, **{'step': 10**9, **how})
-        planner.until_refused(text, number)
+        planner.until_rejected(text, number)
         node.answer(MOVING)
     planner.send_bytes(raw(HOME.combined(1))[:-20])
-    planner.until_refused('refused: malformed: ', len(UNFIT) + 1)
-    assert any('trajectory refused: ' in line for line in log_lines(node.program.stderr, 'ERROR'))
+    planner.until_rejected('rejected: malformed: ', len(UNFIT) + 1)
+    assert any('planned trajectory rejected: ' in line
+               for line in log_lines(node.program.stderr, 'ERROR'))
     assert not planner.raw
     planner.send([HOME, HOME])
     planner.until_answered(1)
-    node.until_status('trajectory', OK, 'answered: 2 points')
+    node.until_status('planned trajectory', OK, 'accepted: 2 points')
 
 
-def test_more_trajectories_than_can_wait_are_refused(renew: Start) -> None:
+def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> None:
     node = renew()
     planner = Planner(node)
     planner.fill()
-    node.until_reported('trajectory', ERROR, 'refused: more than can wait: 5 are in work or wait')
-    node.until_status('trajectory', OK, 'answered: 50000 points')
-    node.until(lambda: int(node.values('trajectory')['refused: more than can wait']) > 0,
+    node.until_reported(
+        'planned trajectory', ERROR, 'rejected: queue full: 5 are in work or wait')
+    node.until_status('planned trajectory', OK, 'accepted: 50000 points')
+    node.until(lambda: int(node.values('planned trajectory')['rejected: queue full']) > 0,
                'they are counted')
 
 
-def test_a_trajectory_in_work_is_given_up_with_the_node(renew: Start) -> None:
+def test_a_trajectory_in_work_is_dropped_with_the_node(renew: Start) -> None:
     node = renew()
     planner = Planner(node)
     planner.fill()
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
         assert node.change(transition)
-    node.until_said('trajectories given up, the node is deactivated: ')
+    node.until_said('planned trajectories dropped, because the node is deactivated: ')
     node.until_active()
 
     def answered() -> bool:
         # What was still in the middleware may come before it, and leave no place for it.
         planner.send([HOME, HOME])
-        return 'answered: 2 points' in node.status('trajectory').message
+        return 'accepted: 2 points' in node.status('planned trajectory').message
 
     node.until(answered, 'the next trajectory is answered')

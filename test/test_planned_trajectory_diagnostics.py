@@ -25,7 +25,7 @@ from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 BEGIN = 100.0
-ANSWERED = Outcome('answered: 2 points', answer=b'1')
+ACCEPTED = Outcome('accepted: 2 points', answer=b'1')
 REJECTED = Outcome('rejected: x', 'why', values=(('points', '3'),))
 
 
@@ -33,9 +33,9 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
     diagnostics = DynamicsDiagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN)
     report, planned = diagnostics.report, diagnostics.planned_trajectory
     assert [each.name for each in report.make(BEGIN)[0]][-1] == 'timing'
-    planned.done(ANSWERED, 0.25)
-    assert report.make(BEGIN)[0][-1] == ('planned trajectory', OK, 'answered: 2 points', (
-        ('answered', '1'), ('rejected', '0'), ('time it took (s)', '0.250')))
+    planned.done(ACCEPTED, 0.25)
+    assert report.make(BEGIN)[0][-1] == ('planned trajectory', OK, 'accepted: 2 points', (
+        ('accepted', '1'), ('rejected', '0'), ('time it took (s)', '0.250')))
     assert not report.level_changed(BEGIN)
     planned.done(REJECTED, 0.1)
     assert report.level_changed(BEGIN)
@@ -45,25 +45,25 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
         assert status.name == 'planned trajectory'
         assert status.level == ERROR
         assert dict(status.values) == {
-            'answered': '1', 'rejected': '1', 'rejected: why': '1', 'points': '3',
+            'accepted': '1', 'rejected': '1', 'rejected: why': '1', 'points': '3',
             'time it took (s)': '0.100'}
-    planned.done(ANSWERED._replace(warning=True), 0.1)
+    planned.done(ACCEPTED._replace(warning=True), 0.1)
     assert report.make(BEGIN)[0][-1].level == WARN
 
 
 def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:
     planned = DynamicsDiagnostics(
         Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN).planned_trajectory
-    planned.done(ANSWERED, 0.1)
+    planned.done(ACCEPTED, 0.1)
     assert planned.log_lines(BEGIN) == []
     for _ in range(2):
         planned.done(REJECTED, 0.1)
     assert planned.log_lines(BEGIN) == 2 * [
         LogLine(ERROR, 'planned trajectory rejected: x', 'why')]
     assert planned.log_lines(BEGIN) == []
-    for outcome in (ANSWERED, ANSWERED, ANSWERED._replace(warning=True), REJECTED):
+    for outcome in (ACCEPTED, ACCEPTED, ACCEPTED._replace(warning=True), REJECTED):
         planned.done(outcome, 0.1)
     assert planned.log_lines(BEGIN) == [
-        LogLine(OK, 'planned trajectory: answered: 2 points'),
-        LogLine(WARN, 'planned trajectory: answered: 2 points'),
+        LogLine(OK, 'planned trajectory: accepted: 2 points'),
+        LogLine(WARN, 'planned trajectory: accepted: 2 points'),
         LogLine(ERROR, 'planned trajectory rejected: x', 'why')]

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Planned motions over real topics: answered beside the setpoints, and never half."""
+"""Planned trajectories over real topics: checked beside the setpoints, and never half."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def check(answer: JointTrajectory, samples: list[Sample], platform: StewartPlatf
         assert len(point.accelerations) == 0
 
 
-def test_a_motion_is_answered_with_the_librarys_bits(fresh: Start) -> None:
+def test_a_trajectory_is_answered_with_the_bits_of_the_library(fresh: Start) -> None:
     node = fresh()
     node.until_active()
     planner = Planner(node)
@@ -61,8 +61,8 @@ def test_a_motion_is_answered_with_the_librarys_bits(fresh: Start) -> None:
     assert nanoseconds(answer.header.stamp) == 123_456_789_012
     assert [nanoseconds(point.time_from_start) for point in answer.points] == [
         0, 500_000_000, 1_000_000_000, 1_500_000_000]
-    node.until_status('trajectory', OK, 'answered: 4 points over 1.5 s')
-    assert node.values('trajectory')['answered'] == '1'
+    node.until_status('planned trajectory', OK, 'accepted: 4 points over 1.5 s')
+    assert node.values('planned trajectory')['accepted'] == '1'
     # The load that ~/wrench last gave holds for it as for setpoints.
     load = (100.0, -50.0, -300.0, 20.0, 10.0, -5.0)
     node.publish('wrench', wrench_message(load))
@@ -81,36 +81,36 @@ def test_without_effort_there_is_none(fresh: Start) -> None:
     answer = planner.until_answered(1)
     assert [len(point.effort) for point in answer.points] == [0] * 4
     assert [len(point.velocities) for point in answer.points] == [6] * 4
-    node.until_status('trajectory', WARN, 'singularity.warn_condition, 2')
+    node.until_status('planned trajectory', WARN, 'singularity.warn_condition, 2')
     node.until(lambda: any('warn_condition, 2' in line for line in log_lines(
         node.program.stderr, 'WARN')), 'it is logged')
 
 
-def test_a_refused_motion_is_not_answered_and_the_next_one_is(fresh: Start) -> None:
+def test_a_rejected_trajectory_is_not_answered_and_the_next_one_is(fresh: Start) -> None:
     node = fresh()
     node.until_active()
     planner = Planner(node)
     for number in (1, 2):
         planner.send([HOME, TOO_HIGH], step=1_000_000_000)
-        planner.until_refused('refused: at ', number)
-        values = node.values('trajectory')
-        assert values['refused: a limit is broken'] == str(number)
-        assert values['answered'] == str(number - 1)
-        assert 0.0 < float(values['refused at (s)']) < 1.0
-        assert values['leg'] in node.status('trajectory').message
+        planner.until_rejected('rejected: at ', number)
+        values = node.values('planned trajectory')
+        assert values['rejected: a limit is exceeded'] == str(number)
+        assert values['accepted'] == str(number - 1)
+        assert 0.0 < float(values['rejected at (s)']) < 1.0
+        assert values['leg'] in node.status('planned trajectory').message
         planner.send(MOTION, step=500_000_000)
         check(planner.until_answered(number), MOTION, node.platform)
-        node.until_status('trajectory', OK, 'answered')
+        node.until_status('planned trajectory', OK, 'accepted')
     line = log_lines(node.program.stderr, 'ERROR')[0]
-    assert 'trajectory refused: at ' in line
-    assert 'beyond limits.' in line
+    assert 'planned trajectory rejected: at ' in line
+    assert ' limits.' in line
 
 
-def test_setpoints_are_answered_while_motions_are_in_work(fresh: Start) -> None:
+def test_setpoints_are_answered_while_trajectories_are_in_work(fresh: Start) -> None:
     """
-    By order: many setpoints, one after the other, are answered before the next motion is done.
+    By order: many setpoints, one after the other, are answered before the next trajectory is done.
 
-    The motions are refused at their ends: answers so long may come later than they are sent.
+    The trajectories are rejected at their ends: answers so long may come later than they are sent.
     """
     node = fresh()
     node.until_active()
@@ -118,7 +118,7 @@ def test_setpoints_are_answered_while_motions_are_in_work(fresh: Start) -> None:
     planner.fill(leap=0.01)
 
     def done() -> int:
-        return int(node.values('trajectory').get('refused: a limit is broken', 0))
+        return int(node.values('planned trajectory').get('rejected: a limit is exceeded', 0))
 
     # Five are in work or wait, and one more comes for each that is done; a few setpoints could be
     # answered before each is done if they were in work all at once.
@@ -138,7 +138,7 @@ def test_setpoints_are_answered_while_motions_are_in_work(fresh: Start) -> None:
     assert longest > 8
 
 
-def test_a_motion_is_answered_with_one_set_of_parameters(fresh: Start) -> None:
+def test_a_trajectory_is_answered_with_one_set_of_parameters(fresh: Start) -> None:
     node = fresh()
     node.until_active()
     planner = Planner(node)
@@ -168,4 +168,4 @@ def test_what_is_in_work_ends_with_the_node(start: Start) -> None:
         node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/')),
         'its topic is closed')
     node.stop()
-    assert any('given up' in line for line in log_lines(node.program.stderr, 'WARN'))
+    assert any('dropped' in line for line in log_lines(node.program.stderr, 'WARN'))

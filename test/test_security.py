@@ -48,8 +48,8 @@ from running import (  # noqa: E402
     Peer, PLATFORM, Program)
 
 from stewart_dynamics.errors import StewartError  # noqa: E402
+from stewart_dynamics.nodes import simulator_messages  # noqa: E402
 from stewart_dynamics.nodes.security import check_environment  # noqa: E402
-from stewart_dynamics.runtime import plant  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
@@ -197,8 +197,8 @@ def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> N
         peer.until(lambda: name not in peer.node.get_node_names(), 'the simulator has gone')
     peer.close()
     assert union == granted('/stewart_simulator')
-    assert {f'/{name}/{topic}' for topic in plant.OUTPUT_TYPES} < union['publish']
-    assert {f'/{name}/{topic}' for topic in plant.INPUT_TYPES} < union['subscribe']
+    assert {f'/{name}/{topic}' for topic in simulator_messages.OUTPUT_TYPES} < union['publish']
+    assert {f'/{name}/{topic}' for topic in simulator_messages.INPUT_TYPES} < union['subscribe']
 
 
 # What would start with less security than is asked for does not start

@@ -41,9 +41,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Pose, StewartError, StewartPlatform
+from stewart_dynamics.nodes.simulator_messages import OUTPUT_TYPES, StateMessages
 from stewart_dynamics.nodes.simulator_node import SimulatorNode
 from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.plant import OUTPUT_TYPES, Plant
+from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 SIMULATOR = '/stewart_simulator'
@@ -271,9 +272,9 @@ def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None
         for n, command in enumerate(commands):
             if n == 20:
                 simulator.load((100.0, 0.0, -50.0, 0.0, 10.0, 0.0))
-                # What is not a command comes behind what is: a refused one tells that it came.
+                # Wrenches and commands come in any order: a rejected one tells that they came.
                 simulator.load((1.0,) * 6, frame='elsewhere')
-                simulator.until_said('WARN', 'wrench refused: wrong frame_id')
+                simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
             simulator.step(command)
         seen.append({topic: simulator.raw[topic][-len(commands):] for topic in TYPES})
         assert simulator.stamps()[-len(commands):] == [
@@ -281,10 +282,11 @@ def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None
     assert seen[0] == seen[1]
     plant = Plant(SimulatorParameters({
         **GIVEN, 'noise.length': 1e-5, 'noise.rate': 1e-3, 'noise.force': 2.0}))
-    list(plant.messages(FIRST))
+    plant.measured()  # of the messages that it publishes until the first command
+    messages = StateMessages(plant.parameters)
     for n, command in enumerate(commands.tolist()):
         plant.advance(tuple(command), (100.0, 0.0, -50.0, 0.0, 10.0, 0.0) if n >= 20 else NO_LOAD)
-        for topic, data in plant.messages(FIRST + PERIOD * (n + 1)):
+        for topic, data in messages.write(FIRST + PERIOD * (n + 1), plant.measured()):
             assert seen[0][topic][n] == data
 
 
@@ -361,7 +363,7 @@ def test_a_load_moves_it(begin: Start) -> None:
 # Faults: see docs/faults.md
 
 @pytest.mark.parametrize('mode', ['real time', 'stepped'])
-def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mode: str) -> None:
+def test_bad_commands_are_rejected_and_the_last_holds(begin: Start, mode: str) -> None:
     simulator = begin(*([STEPPED] if mode == 'stepped' else []))
     good = holding()
     if mode == 'stepped':
@@ -376,8 +378,8 @@ def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mod
         simulator.command([1.0] * many)
     simulator.command(b'\0\1\0\0\0')
     simulator.command(b'\0\7\0\0' + bytes(68))
-    for reason in ('not finite: (', 'not six numbers: 0 of them', 'malformed: '):
-        simulator.until_said('WARN', f'commands refused: {reason}')
+    for reason in ('not finite: (', 'not six numbers: 0 numbers', 'malformed: '):
+        simulator.until_said('WARN', f'commands rejected: {reason}')
     before = stamp_of(simulator.raw['leg_states'][-1])
     if mode == 'stepped':
         # Time stood; the next is one period.
@@ -388,15 +390,15 @@ def test_commands_that_are_none_are_refused_and_the_last_holds(begin: Start, mod
     simulator.until_said('WARN', '(the last of 18)')
 
 
-def test_loads_that_are_none_are_refused_and_the_last_holds(begin: Start) -> None:
+def test_bad_wrenches_are_rejected_and_the_last_holds(begin: Start) -> None:
     simulator = begin(STEPPED)
     simulator.load((0.0, 0.0, 500.0, 0.0, 0.0, 0.0))
     for n in range(6):
         for special in SPECIAL:
             simulator.load([0.0] * n + [special] + [0.0] * (5 - n))
     simulator.load((1e6, 0.0, 0.0, 0.0, 0.0, 0.0), frame='world')
-    simulator.until_said('WARN', 'wrench refused: wrong frame_id')
-    simulator.until_said('WARN', 'wrench refused: not finite')
+    simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
+    simulator.until_said('WARN', 'wrench rejected: not finite')
     simulator.step(holding())
     assert np.allclose(numbers_of(simulator.last('accel'))[:2], 0.0, atol=1e-1)
     assert simulator.last('accel').accel.linear.z > 0.5
@@ -407,8 +409,8 @@ def test_forces_beyond_their_limit_saturate(begin: Start) -> None:
     simulator.step([1000.0, -7000.0, 6000.0, 6001.0, 0.0, 1e300])
     assert simulator.last().effort.tolist() == [
         1000.0, -6000.0, 6000.0, 6000.0, 0.0, 6000.0]
-    line = simulator.until_said('WARN', 'is beyond limits.force_max, clipped to')
-    assert 'commands: leg_6: 1e+300 N is beyond limits.force_max, clipped to 6000 N' in line
+    line = simulator.until_said('WARN', 'exceeds limits.force_max, clipped to')
+    assert 'commands: leg_6: 1e+300 N exceeds limits.force_max, clipped to 6000 N' in line
 
 
 @pytest.mark.parametrize('mode', ['real time', 'stepped'])
@@ -419,7 +421,7 @@ def test_what_cannot_be_computed_holds_it_at_rest(
         assert simulator.step([1e300] * 6) == FIRST + PERIOD
     else:
         simulator.command([1e300] * 6)
-    simulator.until_said('ERROR', 'held at rest, for good')
+    simulator.until_said('ERROR', 'held at rest for good')
     assert simulator.said('ERROR', 'motion cannot be computed')
     if mode == 'stepped':
         assert simulator.step(holding()) == FIRST + 2 * PERIOD
@@ -473,7 +475,7 @@ CANNOT = [
      'actuator.coulomb_friction: [1000000000.0, '),
     (('actuator.viscous_friction:=1.0e+9', 'actuator.reflected_mass:=0.0'),
      'too large for a platform of 150 kg: the integration would need steps of '),
-    (('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]',), 'beyond limits.length_max, 1.65 m'),
+    (('initial_pose:=[0.0, 0.0, 1.6, 0.0, 0.0, 0.0]',), 'leg_1: length 1.6'),
     (('rate:=300.0',), 'rate: 300.0 Hz: a period must be a whole number of steps of 0.001 s'),
     (('step:=0.01',), 'step: 0.01 s: must be at least 1e-05, at most 0.001'),
     (('noise.lenght:=0.1',), 'noise.lenght: unknown parameter; do you mean noise.length?'),
@@ -515,6 +517,6 @@ def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
         assert f'  {name} (double' in program.stdout
 
 
-def test_the_topics_are_those_of_the_plant() -> None:
+def test_the_topics_are_those_of_the_messages() -> None:
     assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
             for topic, kind in TYPES.items()} == OUTPUT_TYPES

@@ -29,35 +29,35 @@ from stewart_dynamics.parameter_set import Parameter
 from stewart_dynamics.parameters import PARAMETERS, Parameters
 
 _OWN = (
-    Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma; brakes hold the platform there '
-              'until the first command', 'm, rad', required=True, sizes=(6,)),
-    Parameter('step', 'double', 'step of the integration; divided where friction or end stops '
-              'need shorter steps', 's', 1e-3, minimum=1e-5, maximum=1e-3),
-    Parameter('rate', 'double', 'states published per second, a whole number of steps apart; '
-              'with use_sim_time each command advances time by 1 / rate', 'Hz', 500.0,
+    Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '
+              'platform until the first command', 'm, rad', required=True, sizes=(6,)),
+    Parameter('step', 'double', 'step of the integration; smaller where friction or end stops '
+              'need it', 's', 1e-3, minimum=1e-5, maximum=1e-3),
+    Parameter('rate', 'double', 'rate of the published states; a period is a whole number of '
+              'steps. With use_sim_time each command advances time by one period', 'Hz', 500.0,
               minimum=1.0, maximum=1e4),
-    Parameter('end_stops.frequency', 'double', 'natural frequency of the mass that a leg carries '
-              'on its end stop: a sixth of platform and pistons, and its own reflected mass', 'Hz',
-              30.0, minimum=0.0, above=True),
-    Parameter('end_stops.damping_ratio', 'double', 'damping ratio of the same; 1: no rebound', '',
-              0.5, minimum=0.0),
+    Parameter('end_stops.frequency', 'double', 'natural frequency of the mass of a leg on its end '
+              'stop: its reflected mass and a sixth of platform and pistons', 'Hz', 30.0,
+              minimum=0.0, above=True),
+    Parameter('end_stops.damping_ratio', 'double', 'damping ratio of the same; 1: no rebound',
+              '', 0.5, minimum=0.0),
     Parameter('noise.length', 'double', 'standard deviation of the measured lengths', 'm', 0.0,
               minimum=0.0, maximum=1e9),
     Parameter('noise.rate', 'double', 'standard deviation of the measured rates', 'm/s', 0.0,
               minimum=0.0, maximum=1e9),
     Parameter('noise.force', 'double', 'standard deviation of the measured forces', 'N', 0.0,
               minimum=0.0, maximum=1e9),
-    Parameter('noise.seed', 'double', 'seed of the noise; equal seeds give equal noise', '', 0.0),
+    Parameter('noise.seed', 'double', 'seed of the noise: equal seeds give equal noise', '', 0.0),
 )
 
 SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
-    # The node has no lifecycle, so none of the hexapod's may change either.
+    # The node has no lifecycle: none of the hexapod's may change while it runs either.
     **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
     **{own.name: own for own in _OWN}})
 
 
 class SimulatorParameters(Parameters):
-    """The parameters of the hexapod, with other rules for changes, and of the simulation."""
+    """The parameters of the simulated hexapod, and of the simulation."""
 
     table = SIMULATOR_PARAMETERS
     node = 'stewart_simulator'

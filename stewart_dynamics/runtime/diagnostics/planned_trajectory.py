@@ -38,11 +38,11 @@ class PlannedTrajectoryDiagnostics:
         """Note an outcome, and how long it took from the message on [s]."""
         level = ERROR if outcome.reason else WARN if outcome.warning else OK
         counts = self._counts
-        counts[f'rejected: {outcome.reason}' if outcome.reason else 'answered'] += 1
+        counts[f'rejected: {outcome.reason}' if outcome.reason else 'accepted'] += 1
         self._status = Status(_NAME, level, outcome.message, (
-            ('answered', str(counts['answered'])),
-            ('rejected', str(counts.total() - counts['answered'])),
-            *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'answered'),
+            ('accepted', str(counts['accepted'])),
+            ('rejected', str(counts.total() - counts['accepted'])),
+            *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'accepted'),
             *outcome.values, ('time it took (s)', f'{seconds:.3f}')))
         lines = self._log.lines(Level(level, outcome.message))
         if outcome.reason:  # each, whatever came before

@@ -1,0 +1,304 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Planned trajectories as messages: accepted to the last bit, or rejected in words."""
+
+from __future__ import annotations
+
+from functools import partial
+import math
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import messages
+import numpy as np
+import pytest
+from trajectories import (
+    Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP, UNBOUND)
+
+from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.runtime import planned_trajectory
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
+from stewart_dynamics.runtime.planned_trajectory import NOT_INCREASING, PIECE, TOO_FAR
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+
+
+def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = NO_WRENCH,
+               ) -> Outcome:
+    """Return what becomes of a trajectory."""
+    *pieces, outcome = planned.answer(parameters, wrench, data)
+    assert outcome is not None
+    assert not any(pieces)
+    assert bool(outcome.answer) != bool(outcome.reason)
+    assert outcome.message.startswith('rejected: ' if outcome.reason else 'accepted: ')
+    return outcome
+
+
+def decoded(outcome: Outcome) -> Any:
+    """Return the answer as another library reads it."""
+    assert outcome.answer, outcome.message
+    return messages.STORE.deserialize_cdr(outcome.answer, planned.OUTPUT_TYPE)
+
+
+# Accepted
+
+@pytest.mark.parametrize('points', [1, 2, PIECE, PIECE + 1, 1000])
+@pytest.mark.parametrize(('frame', 'names'), [
+    ('', ()), ('base', ('platform',)), ('', ('p',)), ('base', ('moving',)), ('', ('',))])
+def test_points_are_answered_with_the_bits_of_the_library(
+        points: int, frame: str, names: tuple[str, ...]) -> None:
+    times, rows = some(points)
+    wrench = (100.0, -50.0, -300.0, 20.0, 10.0, -5.0)
+    # Names of any length, so that doubles stand at another place in the message.
+    joints = [f'{"x" * points}{name}' for name in PARAMETERS['joints']]
+    if points > 2:
+        joints = [name[-3 - points % 4:] for name in joints]
+    parameters = PARAMETERS.replaced({'joints': joints})
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows, frame, names), parameters, wrench)
+    assert outcome.message == (f'accepted: {points} point{"s" * (points > 1)} over '
+                               f'{(times[-1] - times[0]) * 1e-9:.6g} s')
+    got = decoded(outcome)
+    assert got.header.stamp.sec * SECOND + got.header.stamp.nanosec == STAMP
+    assert got.header.frame_id == ''
+    assert got.joint_names == joints
+    assert [point.time_from_start.sec * SECOND + point.time_from_start.nanosec
+            for point in got.points] == times
+    result = StewartPlatform(parameters).inverse_dynamics(motion_of(rows), wrench)
+    for field, expected in (('positions', result.lengths - parameters['geometry.zero_length']),
+                            ('velocities', result.rates), ('effort', result.forces)):
+        assert np.array([getattr(point, field) for point in got.points]).tobytes() \
+            == np.ascontiguousarray(expected).tobytes()
+    assert all(len(point.accelerations) == 0 for point in got.points)
+
+
+@pytest.mark.parametrize('names', [(), ('platform',), ('p',)])
+def test_big_endian_messages_are_read(names: tuple[str, ...]) -> None:
+    times, rows = some(10)
+    both = [messages.trajectory(STAMP, times, rows, names=names, little_endian=little)
+            for little in (True, False)]
+    assert both[0] != both[1]
+    assert outcome_of(both[0]).answer == outcome_of(both[1]).answer
+
+
+@pytest.mark.parametrize('joint', ['a', 'ab', 'abc', 'abcd', 'abcde'])
+def test_without_effort_points_have_none(joint: str) -> None:
+    times, rows = some(5)
+    parameters = PARAMETERS.replaced({
+        'trajectory.effort': False, 'joints': [joint + str(n) for n in range(6)]})
+    data = messages.trajectory(STAMP, times, rows)
+    got, with_it = decoded(outcome_of(data, parameters)), decoded(outcome_of(data))
+    for point, other in zip(got.points, with_it.points, strict=True):
+        assert len(point.effort) == 0
+        assert len(other.effort) == 6
+        assert np.array_equal(point.positions, other.positions)
+        assert np.array_equal(point.velocities, other.velocities)
+        assert point.time_from_start == other.time_from_start
+
+
+def test_values_say_what_it_asks_of_the_hexapod() -> None:
+    times, rows = sampled('clear', SECOND // 100)
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows))
+    values = dict(outcome.values)
+    result = StewartPlatform(PARAMETERS).inverse_dynamics(motion_of(rows))
+    largest = np.abs(result.forces).max()
+    leg = int(np.argmax(np.abs(result.forces).max(axis=0)))
+    assert values['points'] == '1001'
+    assert values['duration (s)'] == '10'
+    assert float(values['largest force (N)']) == pytest.approx(largest, rel=1e-3)
+    assert values['its leg'] == f'leg_{leg + 1}'
+    assert float(values['largest force, of limits.force_max']) == pytest.approx(
+        largest / 6000.0, rel=1e-3)
+    assert float(values['worst condition number']) == pytest.approx(
+        result.condition_number.max(), rel=1e-3)
+    assert 'largest force, of limits.force_max' not in dict(
+        outcome_of(messages.trajectory(STAMP, times, rows), FREE).values)
+
+
+def test_within_warn_condition_it_is_accepted_with_a_warning() -> None:
+    times, rows = sampled('clear', SECOND)
+    parameters = PARAMETERS.replaced({'singularity.warn_condition': 4.0})
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows), parameters)
+    assert outcome.answer
+    assert outcome.warning
+    assert 'condition number 4.352 at 10.000 s is not below singularity.warn_condition, 4' in (
+        outcome.message)
+    assert not outcome_of(messages.trajectory(STAMP, times, rows)).warning
+
+
+# The work in pieces
+
+def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved: list[int] = []
+    solve = StewartPlatform.solve
+
+    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None) -> Array:
+        solved.append(len(rows))
+        return solve(platform, rows, wrenches)
+
+    monkeypatch.setattr(StewartPlatform, 'solve', counted)
+    for step in (SECOND, SECOND // 1000):
+        times, rows = sampled('clear', step)
+        total = 0
+        for _ in planned.answer(PARAMETERS, NO_WRENCH, messages.trajectory(STAMP, times, rows)):
+            # of what the platform does between points, and of where the legs lead it
+            assert sum(solved) <= 2 * (PIECE + 1)
+            total += sum(solved)
+            solved.clear()
+        assert total > len(times)
+
+
+@pytest.mark.parametrize('piece', [1, 2, 7, 100, 10**6])
+@pytest.mark.parametrize(('name', 'step'), [
+    ('clear', SECOND), ('clear', SECOND // 10), ('singular', SECOND // 2)])
+def test_the_outcome_does_not_depend_on_the_pieces(
+        monkeypatch: pytest.MonkeyPatch, piece: int, name: str, step: int) -> None:
+    times, rows = sampled(name, step)
+    for parameters in (PARAMETERS, UNBOUND):
+        data = messages.trajectory(STAMP, times, rows)
+        expected = outcome_of(data, parameters)
+        with monkeypatch.context() as patch:
+            patch.setattr(planned, '_READ', piece)
+            patch.setattr(planned, '_WRITTEN', piece)
+            patch.setattr(planned, 'check_in_pieces', partial(
+                planned_trajectory.check_in_pieces, piece=piece))
+            assert outcome_of(data, parameters) == expected
+
+
+def test_parameters_and_wrench_are_those_it_began_with() -> None:
+    times, rows = sampled('clear', SECOND // 100)
+    data = messages.trajectory(STAMP, times, rows)
+    light = PARAMETERS.replaced({'platform.mass': 100.0})
+    works = [planned.answer(parameters, NO_WRENCH, data) for parameters in (PARAMETERS, light)]
+    outcomes: list[Outcome | None] = [None, None]
+    while not all(outcomes):
+        outcomes = [next(work, None) or outcome
+                    for work, outcome in zip(works, outcomes, strict=True)]
+    assert outcomes == [outcome_of(data), outcome_of(data, light)]
+
+
+# Rejected
+
+def spoilt(**changes: Any) -> bytes:
+    """Return a message of four points, spoilt."""
+    times, rows = some(4)
+    times = list(changes.pop('times', times))
+    for (point, column), value in changes.pop('numbers', {}).items():
+        rows[point, column] = value
+    return messages.trajectory(STAMP, times, rows, **changes)
+
+
+WHOLE = spoilt()
+BAD: dict[str, tuple[bytes, str, str]] = {
+    'nothing': (b'', 'malformed', '0 bytes'),
+    'no CDR': (b'\x01' + WHOLE[1:], 'malformed', 'is not plain CDR'),
+    'another byte order': (b'\x00\x07' + WHOLE[2:], 'malformed', 'bytes'),
+    'cut short in the header': (WHOLE[:20], 'malformed', '20 bytes'),
+    'cut short in the last point': (WHOLE[:-40], 'malformed', 'points[3] is cut short'),
+    'cut short by a time': (WHOLE[:-8], 'malformed', 'points[3] is cut short'),
+    'no points': (messages.trajectory(STAMP, [], []), 'malformed',
+                  '0 points: must be 1 to 100000'),
+    'two joints': (spoilt(names=('a', 'b')), 'malformed', '2 joint_names'),
+    'no transform': (spoilt(parts=[(1, 1, 1), (0, 1, 1), (1, 1, 1), (1, 1, 1)]), 'malformed',
+                     'points[1]: 0 transforms: each point has one'),
+    'no velocity': (spoilt(parts=[(1, 1, 1), (1, 1, 1), (1, 0, 1), (1, 1, 1)]), 'malformed',
+                    'points[2]: 0 velocities: each point has one'),
+    'no acceleration at the end': (spoilt(parts=[(1, 1, 1)] * 3 + [(1, 1, 0)]), 'malformed',
+                                   'points[3]: 0 accelerations: each point has one'),
+    'no transform at the beginning': (spoilt(parts=[(0, 1, 1)] + [(1, 1, 1)] * 3), 'malformed',
+                                      'points[0]: 0 transforms: each point has one'),
+    'two transforms': (spoilt(parts=[(1, 1, 1)] * 2 + [(2, 1, 1), (1, 1, 1)]), 'malformed',
+                       'points[2]: 2 transforms: each point has one'),
+    'poses alone': (spoilt(parts=[(1, 0, 0)] * 4), 'malformed',
+                    'points[0]: 0 velocities: each point has one'),
+    'another frame': (spoilt(frame='world'), 'wrong frame_id',
+                      "'world', must be 'base' or empty"),
+    'not finite': (spoilt(numbers={(2, 8): math.nan}), 'not finite', 'points[2]'),
+    'infinite': (spoilt(numbers={(3, 18): -math.inf}), 'not finite', 'points[3]'),
+    'no unit quaternion': (spoilt(numbers={(1, 6): 1.01}), 'quaternion not of unit length',
+                           'points[1]: length 1.0'),
+    'times that stand': (spoilt(times=[0, 5, 5, 6]), NOT_INCREASING,
+                         'points[2]: 5e-09 s, after 5e-09 s'),
+    'times that go back': (spoilt(times=[0, 2 * SECOND, SECOND, 3 * SECOND]), NOT_INCREASING,
+                           'points[2]: 1 s, after 2 s'),
+    'a time before zero': (spoilt(times=[-SECOND, 0, 1, 2]), NOT_INCREASING,
+                           'points[0]: -1 s, must be at least 0'),
+    'out of range': (spoilt(numbers={(1, 0): 1e200}), TOO_FAR, 'points[0] and the next'),
+    'out of range at once': (messages.trajectory(STAMP, [0], [(1e200, *HOME[1:], *REST, *REST)]),
+                             'out of range', 'at 0.000 s: out of range: numbers overflow'),
+    'too far': (spoilt(times=[0, SECOND, 2 * SECOND, 10**18]), TOO_FAR,
+                'points[2] and the next'),
+}
+
+
+@pytest.mark.parametrize('case', BAD)
+@pytest.mark.parametrize('names', [('platform',), ('p',)])
+def test_bad_input_is_rejected_in_words(case: str, names: tuple[str, ...]) -> None:
+    data, reason, words = BAD[case]
+    outcome = outcome_of(data)
+    assert outcome.reason.startswith(reason)
+    assert words in outcome.message
+    assert '\n' not in outcome.message
+
+
+def test_of_too_many_points_none_is_read() -> None:
+    _, rows = some(1)
+    one = messages.trajectory(STAMP, [1], rows)
+    at = one.index(b'platform\0') + 12
+    assert one[at:at + 4] == b'\x01\0\0\0'
+    outcome = outcome_of(
+        one[:at] + (100_001).to_bytes(4, 'little') + one[at + 4:] + bytes(100_001))
+    assert outcome.message == 'rejected: malformed: 100001 points: must be 1 to 100000'
+
+
+def test_too_many_samples_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    times, rows = sampled('clear', SECOND)
+    monkeypatch.setattr(planned_trajectory, 'MOST_SAMPLES', 100)
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows))
+    assert outcome.reason == TOO_FAR
+    assert 'more than 100 samples' in outcome.message
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_whatever_comes_is_accepted_or_rejected(data: st.DataObject) -> None:
+    times, rows = some(data.draw(st.integers(1, 6)))
+    message = bytearray(messages.trajectory(
+        STAMP, times, rows, frame=data.draw(st.sampled_from(['', 'base'])),
+        names=data.draw(st.sampled_from([(), ('platform',), ('p',)]))))
+    for _ in range(data.draw(st.integers(0, 4))):
+        at = data.draw(st.integers(0, len(message) - 1))
+        change = data.draw(st.binary(min_size=1, max_size=8))
+        message[at:at + len(change)] = change
+    cut = data.draw(st.one_of(st.none(), st.integers(0, len(message))))
+    outcome = outcome_of(bytes(message[:cut]))
+    if outcome.answer:
+        for point in decoded(outcome).points:
+            assert np.isfinite([*point.positions, *point.velocities, *point.effort]).all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=600))
+def test_any_bytes_are_rejected(data: bytes) -> None:
+    assert outcome_of(data).reason
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(st.integers(1, 10**12), st.lists(st.floats(
+    allow_nan=False, allow_infinity=False), min_size=15, max_size=15)), min_size=1, max_size=5))
+def test_any_numbers_are_accepted_or_rejected(points: list[tuple[int, list[float]]]) -> None:
+    times = np.cumsum([time for time, _ in points]).tolist()
+    rows = [(*numbers[:3], *HOME[3:], *numbers[3:]) for _, numbers in points]
+    outcome_of(messages.trajectory(STAMP, times, rows))
