@@ -305,7 +305,8 @@ class _Work:
         if found:
             poses = poses[:found]
             forward_kinematics.twists(
-                constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None], poses)
+                constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
+                poses)
             self._legs_checks.check_singularities(
                 times[:found], after[:found - 1], self._platform.solve(poses),
                 after[:found - 1] > 0.0)
