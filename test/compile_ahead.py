@@ -29,10 +29,11 @@ from referees import ROOT
 
 from stewart_dynamics import Motion, StewartError, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.parameters import read_yaml
+from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.replay import main
 from stewart_dynamics.runtime.external_wrench import ExternalWrench, Measurement
-from stewart_dynamics.runtime.plant import Plant, SimulatorParameters
+from stewart_dynamics.runtime.plant import Plant
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 SIMULATOR = ROOT / 'config' / 'simulator.yaml'
@@ -58,7 +59,7 @@ def library() -> None:
     home = Motion([0.0, 0.0, 1.1], np.eye(3))
     result = platform.inverse_dynamics(home)
     platform.forward_kinematics(result.lengths, home)
-    platform.twist(home.position, home.rotation, result.rates)
+    platform.twist(home, result.rates)
     platform.forward_dynamics(home, result.forces)
     with suppress(StewartError):  # no legs have such lengths
         ExternalWrench(platform.parameters)(

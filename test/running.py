@@ -55,7 +55,8 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
@@ -241,26 +242,28 @@ class Inside:
 
     def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
                  said: Callable[[], str], done: Future | None = None) -> None:
-        from rclpy.experimental.events_executor import EventsExecutor
-
         self._said, self._stderr, self._done = said, '', done
+        self._stack = ExitStack()
         with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
             rclpy.init(args=sys.argv, domain_id=domain)
-            self._stack = ExitStack()
-            self._stack.callback(gc.unfreeze)
-            self._stack.callback(rclpy.try_shutdown)
             try:
-                self._node = kind()
+                node = kind()
             except BaseException:
-                self._stack.close()
+                rclpy.shutdown()
                 raise
-        self._stack.callback(self._node.destroy_node)
-        executor = EventsExecutor()
-        executor.add_node(self._node)
-        self._thread = Thread(target=executor.spin)
-        self._stack.callback(self._thread.join)
-        self._stack.callback(executor.shutdown)
+        self._executor = EventsExecutor()
+        self._executor.add_node(node)
+        self._thread = Thread(target=self._spin)
+        for end in (gc.unfreeze, node.destroy_node, self._executor.shutdown, self._thread.join,
+                    rclpy.try_shutdown):
+            self._stack.callback(end)
         self._thread.start()
+
+    def _spin(self) -> None:
+        # Bounded waits, and an end by ROS's own: as the executables have it.
+        with suppress(ExternalShutdownException):
+            while rclpy.ok():
+                self._executor.spin_until_future_complete(Future(), 10.0)
 
     @property
     def stderr(self) -> str:
@@ -516,28 +519,33 @@ class DynamicsNode:
         self.platform = StewartPlatform.from_yaml(process.file)
         self._statuses: dict[str, DiagnosticStatus] = {}
         self._reported: list[DiagnosticStatus] = []
-        self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
-                        for topic, kind in INPUTS.items()}
-        self.raw = {topic: self.peer.listen(
-            f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
-            for topic, kind in OUTPUTS.items()}
         self._decoded: dict[str, list[Any]] = defaultdict(list)
         self._clients = {name: self.peer.node.create_client(kind, f'{NODE}/{name}')
                          for name, kind in SERVICES.items()}
         self._said: list[str] = []
-        self.peer.node.create_subscription(
-            Log, '/rosout', lambda message: self._said.append(message.msg), LATCHED)
-        self.peer.node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
         self._known = False
         self._unconfigured = process.runs or bool(overrides)
-        self.peer.watched = self.program if process.runs else process.start()
-        if self._unconfigured:
-            try:
+        try:
+            if process.runs:
+                # Before the others listen: what is latched there is of another test.
+                self.peer.watched = self.program
+                self._clean_up()
+            self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
+                            for topic, kind in INPUTS.items()}
+            self.raw = {topic: self.peer.listen(
+                f'{NODE}/{topic}', kind, LATCHED if topic == 'singularity_warning' else QOS)
+                for topic, kind in OUTPUTS.items()}
+            self.peer.node.create_subscription(
+                Log, '/rosout', lambda message: self._said.append(message.msg), LATCHED)
+            self.peer.node.create_subscription(
+                DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
+            if not process.runs:
+                self.peer.watched = process.start()
+            if self._unconfigured:
                 self._renew(overrides)
-            except BaseException:
-                self._stack.close()  # or the next one hears this one as well
-                raise
+        except BaseException:
+            self._stack.close()  # or the next one hears this one as well
+            raise
 
     @property
     def program(self) -> Program:
@@ -617,6 +625,12 @@ class DynamicsNode:
                     for raw in self.raw[topic][len(decoded):]]
         return decoded
 
+    @property
+    def warning(self) -> bool | None:
+        """The last warning of a singularity, None before the first."""
+        warnings = self.received('singularity_warning')
+        return bool(warnings[-1].data) if warnings else None
+
     def status(self, name: str) -> DiagnosticStatus:
         """Return the last diagnostics of a name, empty ones where there are none."""
         return self._statuses.get(name, DiagnosticStatus())
@@ -672,8 +686,10 @@ class DynamicsNode:
         def answered() -> bool:
             found[:] = [state for state in self.received('leg_states')
                         if nanoseconds(state.header.stamp) == stamp]
+            states = self.received('leg_states')
             return bool(found) and len(self.raw['leg_lengths']) == len(
-                self.raw['jacobian_determinant']) == len(self.raw['leg_states'])
+                self.raw['jacobian_determinant']) == len(states) and len(
+                    self.raw['leg_forces']) == sum(len(state.effort) > 0 for state in states)
 
         self.until(answered, f'the setpoint with stamp {stamp} is answered')
         assert len(found) == 1
@@ -771,13 +787,17 @@ class DynamicsNode:
         """The state of the lifecycle."""
         return str(self.call('get_state', GetState.Request()).current_state.label)
 
-    def _renew(self, overrides: Sequence[str]) -> None:
-        """Bring the node that runs to the state ``unconfigured``, with these parameters."""
+    def _clean_up(self) -> None:
+        """Bring the node that runs to the state ``unconfigured``."""
         state = self.state
         if state == 'active':
             assert self.change(Transition.TRANSITION_DEACTIVATE)
         if state != 'unconfigured':
             assert self.change(Transition.TRANSITION_CLEANUP)
+
+    def _renew(self, overrides: Sequence[str]) -> None:
+        """Bring the node that runs to the state ``unconfigured``, with these parameters."""
+        self._clean_up()
         wanted = {name: parameter.default for name, parameter in Parameters.table.items()}
         wanted.update(Parameters.from_yaml(self._process.file).given)
         wanted.update((name, yaml.safe_load(text)) for name, _, text in (

@@ -368,6 +368,7 @@ def test_a_topic_that_never_came_is_named(fresh: Fresh) -> None:
 def test_without_setpoints_diagnostics_are_stale_and_nothing_is_repeated(
         node: DynamicsNode) -> None:
     node.answer(MOVING)
+    node.until(lambda: node.warning is False, 'all of the answer has come')
     answered = {topic: len(node.raw[topic]) for topic in OUTPUTS}
     for topic in SEPARATE:
         node.until_status('setpoints', STALE, f'{topic} silent for ')
@@ -382,8 +383,7 @@ def test_without_setpoints_diagnostics_are_stale_and_nothing_is_repeated(
 def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_forces(
         node: DynamicsNode) -> None:
     node.answer()
-    node.until(lambda: node.received('singularity_warning')
-               and not node.received('singularity_warning')[-1].data, 'no warning is on')
+    node.until(lambda: node.warning is False, 'no warning is on')
     forces, warnings = len(node.raw['leg_forces']), len(node.raw['singularity_warning'])
     state = node.state_of(node.send(FLAT))
     assert len(state.effort) == 0
@@ -393,14 +393,14 @@ def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_
     assert node.received('leg_lengths')[-1].data.tolist() == (state.position + zero).tolist()
     assert abs(node.received('jacobian_determinant')[-1].data) < 1e-30
     node.until(lambda: len(node.raw['singularity_warning']) > warnings, 'it warns')
-    assert node.received('singularity_warning')[-1].data
+    assert node.warning
     node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
     node.until_status('limits', ERROR, 'beyond limits.length_min')
     # Out of it again the forces are back; the warning ends a sample after det(J) has changed.
     node.answer(MOVING)
     node.answer(MOVING)
     node.until(lambda: len(node.raw['singularity_warning']) == warnings + 2, 'the warning ends')
-    assert not node.received('singularity_warning')[-1].data
+    assert node.warning is False
     assert len(node.raw['leg_forces']) == forces + 2
     node.until_counted()
 
@@ -443,7 +443,7 @@ def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
     assert values['condition number'] == f'{result.condition_number:.6g}'
     assert values['det(J) (m^3)'] == f'{result.determinant:.9g}'
     node.answer()
-    node.until(lambda: not node.received('singularity_warning')[-1].data, 'the warning ends')
+    node.until(lambda: node.warning is False, 'the warning ends')
 
 
 # Other writers and readers
@@ -722,11 +722,11 @@ def test_a_payload_is_picked_up_while_active(node: DynamicsNode) -> None:
 
 def test_thresholds_change_while_active(node: DynamicsNode) -> None:
     node.answer(MOVING)
-    node.until(lambda: not node.received('singularity_warning')[-1].data, 'no warning is on')
+    node.until(lambda: node.warning is False, 'no warning is on')
     condition = float(node.result_of(MOVING).condition_number)
     assert node.set_parameters(singularity__warn_condition=condition - 0.01).successful
     node.answer(MOVING)
-    node.until(lambda: node.received('singularity_warning')[-1].data, 'it warns')
+    node.until(lambda: node.warning, 'it warns')
     assert node.set_parameters(singularity__stop_condition=condition - 0.005,
                                singularity__action='suppress_forces').successful
     assert len(node.state_of(node.send(MOVING)).effort) == 0

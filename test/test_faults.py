@@ -687,8 +687,7 @@ def _turned(degrees: float, rate: float = 0.0) -> Sample:
 def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> None:
     node = at_work
     node.answer()
-    node.until(lambda: node.received('singularity_warning')
-               and not node.received('singularity_warning')[-1].data, 'no warning is on')
+    node.until(lambda: node.warning is False, 'no warning is on')
     crossings = int(node.values('singularity').get('crossings', '0'))
     # 4 degrees in 10 ms.
     there = [_turned(degrees, math.radians(400.0)) for degrees in (84.0, 88.0, 92.0, 96.0)]
@@ -697,7 +696,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
     for sample in there:
         state = node.answer(sample)
         assert np.abs(state.effort).max() <= 6000.0
-        node.until(lambda: node.received('singularity_warning')[-1].data, 'it warns')
+        node.until(lambda: node.warning, 'it warns')
     # One sample crossed, the next ones are only near: it is said for a second nevertheless.
     node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
     # Back with one leap, from where nothing is near into where nothing is.
@@ -705,7 +704,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
         node.answer(_turned(degrees))
     node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
     node.answer(_turned(50.0))
-    node.until(lambda: not node.received('singularity_warning')[-1].data, 'the warning ends')
+    node.until(lambda: node.warning is False, 'the warning ends')
     node.until_status('singularity', OK, 'clear')
     assert node.values('singularity')['crossings'] == str(crossings + 2)
 
@@ -745,7 +744,7 @@ def test_a_machine_that_is_singular_at_home_starts_and_gives_no_forces(
         assert bits(state.position) == bits(node.platform.inverse_kinematics(
             sample.motion()))
     assert node.raw['leg_forces'] == []
-    assert node.received('singularity_warning')[-1].data
+    node.until(lambda: node.warning, 'it warns')
     node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
     node.check_answers()
     assert any('singular' in line for line in log_lines(node.program.stderr, 'WARN'))
