@@ -118,7 +118,7 @@ def mistakes(names: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
         'a number without a point': [{'platform.mass': 21}],
         'moments first, then products: ixx iyy izz ixy ixz iyz': [
             {'platform.inertia': np.concatenate([moments, products])}],
-        'platform joints that begin with another leg': [
+        'platform joints that start with another leg': [
             {'geometry.platform_joints': np.roll(p['geometry.platform_joints'], by, axis=0)}
             for by in (1, 3, 5)],
         "center of mass from CAD's origin": [
