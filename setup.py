@@ -29,6 +29,7 @@ version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py'
 # No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
 # knows them under other names. Everything else that an executable imports is here.
 install_requires = [
+    'jinja2>=3.1',  # the replay's pages
     'lz4>=4',
     'mcap>=1.2',
     'numba>=0.57; platform_machine in "x86_64 AMD64 aarch64 arm64"',
@@ -95,7 +96,7 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['*.html']},
+    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),

@@ -114,7 +114,7 @@ if code := main([sys.argv[1], '--params', {str(PARAMETERS)!r}, '--output', sys.a
                  '--strict', *sys.argv[3:]]):
     sys.exit(code)
 summary = json.loads(next(Path(sys.argv[2]).glob('*/summary.json')).read_text())
-assert not summary['refused']
+assert not summary['rejected']
 many = 3 * summary['setpoints']['answered']
 """
 ENDING = """

@@ -33,7 +33,7 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.external_wrench import (
-    Estimate, ExternalWrench, Measurement, Overload)
+    Estimate, external_wrenches, ExternalWrench, Measurement, Overload)
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
@@ -149,6 +149,40 @@ def test_in_motion_it_is_what_the_equation_of_motion_leaves() -> None:
             largest.append(np.max(np.abs(found - load)))
         orders = np.log2(np.divide(largest[:-1], largest[1:]))
         assert np.all(np.abs(orders - 1.0) < 0.1)
+
+
+def test_many_are_the_equation_of_motion_of_each() -> None:
+    """With the sign of ~/wrench: the load that the model does not know of is found."""
+    random = rng(9)
+    for _ in range(10):
+        parameters = random_parameters(random)
+        platform = StewartPlatform(parameters)
+        motion = random_motion(parameters, random, 50)
+        known, load = random_wrench(parameters, random, 50), random_wrench(parameters, random, 50)
+        model = platform.inverse_dynamics(motion, known).forces
+        forces = platform.inverse_dynamics(motion, known + load).forces
+        found = external_wrenches(platform, motion.rows, model, forces)
+        assert relative(found, load) < 1e-9
+        jacobian = platform.jacobian(motion.position, motion.rotation)
+        assert relative(found, np.einsum('nji,nj->ni', jacobian, model - forces)) < 1e-12
+        # Each alone gives the same bits, of a pose alone too, and however the arrays lie.
+        for n in range(0, 50, 7):
+            assert np.array_equal(external_wrenches(
+                platform, motion.rows[n:n + 1, :12], model[n:n + 1], forces[n:n + 1]),
+                found[n:n + 1])
+        assert np.array_equal(external_wrenches(
+            platform, motion.rows[::-2], model[::-2], forces[::-2]), found[::-2])
+    assert external_wrenches(platform, np.empty((0, 12)), *np.empty((2, 0, 6))).shape == (0, 6)
+
+
+def test_one_not_filtered_is_the_mean_of_many_at_both_ends() -> None:
+    step, platform = ExternalWrench(MACHINE.replaced(UNFILTERED)), StewartPlatform(MACHINE)
+    data = resting(MACHINE, HOME, LOAD, [BEGIN, BEGIN + MILLISECOND])
+    found = estimates(step, data)[1]
+    rows = np.array([found.motion] * 2)
+    model = platform.solve(rows)[:, 12:18]
+    many = external_wrenches(platform, rows, model, np.array([data[1].forces] * 2))
+    assert relative(found.wrench, many[0]) < 1e-9
 
 
 # The filter

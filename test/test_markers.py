@@ -37,7 +37,7 @@ from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.nodes import markers as pictures  # noqa: E402
 from stewart_dynamics.nodes.markers import Markers  # noqa: E402
-from stewart_dynamics.runtime.diagnostics import ERROR, OK, WARN  # noqa: E402
+from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, WARN  # noqa: E402
 from stewart_dynamics.runtime.step import Output, Setpoint, Step  # noqa: E402
 
 Array = NDArray[np.float64]

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import forward_kinematics
-from stewart_dynamics.mechanics.arguments import as_array, optional_array
+from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
 from stewart_dynamics.mechanics.cubics import Cubics
 from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.jit import COMPILED
@@ -147,6 +147,8 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
         Shapes do not fit, numbers are not finite or times not strictly increasing.
 
     """
+    if not isinstance(motion, Motion):
+        raise wrong_type('motion', motion, 'a Motion')
     if len(motion.shape) != 1 or not motion.shape[0]:
         raise MotionError(f'motion: shape {motion.shape}: must be (N,), of N points')
     seconds = as_array('times', times, motion.shape)
@@ -293,9 +295,9 @@ class _Work:
         """
         poses, many = rows.copy(), len(rows)
         codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
-        machine = self._platform.constants
+        constants = self._platform.constants
         forward_kinematics.poses(
-            machine, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
+            constants, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
         lost = np.flatnonzero(codes != forward_kinematics.FOUND)
         found = int(lost[0]) if len(lost) else many
         if found < many:
@@ -303,7 +305,8 @@ class _Work:
         if found:
             poses = poses[:found]
             forward_kinematics.twists(
-                machine, legs.rate_at(fraction[:, None])[:found] / durations[:found, None], poses)
+                constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
+                poses)
             self._legs_checks.check_singularities(
                 times[:found], after[:found - 1], self._platform.solve(poses),
                 after[:found - 1] > 0.0)

@@ -150,7 +150,7 @@ class Plant:
                 f'held at rest for good: after the position {list(state[STATE_POSITION])} m the '
                 'motion cannot be computed: numbers overflow, or within a step of '
                 f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
-                f'joint moves by more than that part of its leg; shortest leg '
+                'joint moves by more than that part of its leg; shortest leg '
                 f'{min(lengths):.3g} m')
         return State(lengths, result[RESULT_RATES], result[RESULT_FORCES],
                      state[:STATE_TWIST.start], state[STATE_TWIST], result[RESULT_ACCELERATION])
