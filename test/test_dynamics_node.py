@@ -770,7 +770,7 @@ def test_parameters_are_described_with_text_and_unit(node: DynamicsNode) -> None
     mass, force, action, warn_time = node.call(
         'describe_parameters', DescribeParameters.Request(names=names)).descriptors
     assert mass.name == 'platform.mass'
-    assert mass.description == 'mass of the platform with all that it carries [kg]'
+    assert mass.description == 'mass of the platform with its payload [kg]'
     assert mass.additional_constraints == 'more than 0; set also while active'
     assert force.description.endswith('[N]')
     assert action.additional_constraints == (
