@@ -14,15 +14,22 @@
 
 
 from glob import glob
+from pathlib import Path
+import re
 
 from setuptools import find_packages, setup
 
 package_name = 'stewart_dynamics'
 share = f'share/{package_name}'
 
+# Read, not imported: where the package is built its dependencies need not be installed.
+version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py').read_text(
+    encoding='utf-8'), re.MULTILINE)[0]
+
 # No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
 # knows them under other names. Everything else that an executable imports is here.
 install_requires = [
+    'jinja2>=3.1',  # the replay's pages
     'lz4>=4',
     'mcap>=1.2',
     'numba>=0.57; platform_machine in "x86_64 AMD64 aarch64 arm64"',
@@ -82,14 +89,14 @@ extras_require = {
 
 setup(
     name=package_name,
-    version='0.1.0',
+    version=version,
     description='Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs',
     author='The stewart_dynamics developers',
     maintainer='The stewart_dynamics developers',
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['*.html']},
+    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),

@@ -40,7 +40,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.mechanics.reference_motion import sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 HERE = Path(__file__).resolve().parent
 NODE = 'stewart_dynamics'
@@ -142,7 +142,7 @@ def record(name: str) -> None:
                 quiet_since = time.monotonic()
     if trajectory.returncode:
         raise SystemExit(f'stewart_trajectory ended with exit code {trajectory.returncode}')
-    expected = 3 * len(sample_times(TrajectoryParameters.from_yaml(
+    expected = 3 * len(sample_times(ReferenceMotionParameters.from_yaml(
         HERE.parent / 'config' / config)))
     if not spoiled and recorder.messages != expected:
         raise SystemExit(f'{name}: {recorder.messages} of {expected} messages came: record again')

@@ -60,7 +60,7 @@ def legal_poses(platform: StewartPlatform, random: np.random.Generator, many: in
         motion = Motion(
             HOME + random.uniform(-0.6, 0.6, (many, 3)),
             from_euler(random.uniform(-1.0, 1.0, (many, 3)) * np.radians([20.0, 20.0, 30.0])))
-        lengths = platform.inverse_kinematics(motion.position, motion.rotation)
+        lengths = platform.inverse_kinematics(motion)
         legal = np.all((lengths >= p['limits.length_min'])
                        & (lengths <= p['limits.length_max']), axis=-1)
         found.append(motion.rows[legal])
@@ -80,11 +80,11 @@ def steps_table(platform: StewartPlatform) -> list[str]:
     random = np.random.default_rng(20260103)
     poses = legal_poses(platform, random, GUESSES)
     guesses = far_from(poses, random)
-    lengths = platform.inverse_kinematics(poses.position, poses.rotation)
+    lengths = platform.inverse_kinematics(poses)
     rows = guesses.rows.copy()
     codes, steps = np.empty(GUESSES, dtype=np.int64), np.empty(GUESSES, dtype=np.int64)
     residuals = np.empty(GUESSES)
-    forward_kinematics.poses(platform.machine, lengths, rows, codes, steps, residuals)
+    forward_kinematics.poses(platform.constants, lengths, rows, codes, steps, residuals)
     found = codes == FOUND
     determinants = [platform.solve(each.rows)[:, DETERMINANT] for each in (poses, guesses)]
     beyond = determinants[0] * determinants[1] <= 0.0
@@ -110,8 +110,8 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     q, v, _, _ = tree.state(one)
     dynamics = [
         Contestant('`forward_dynamics.solve`, one row', repeated(
-            'solve(machine, rows, forces, wrenches)', solve=forward_dynamics.solve,
-            machine=platform.machine, rows=row, forces=force, wrenches=no_wrench), ABA),
+            'solve(constants, rows, forces, wrenches)', solve=forward_dynamics.solve,
+            constants=platform.constants, rows=row, forces=force, wrenches=no_wrench), ABA),
         Contestant(ABA, repeated(
             'aba(model, data, q, v, tau)', aba=pin.aba, model=tree.model, data=tree.data, q=q,
             v=v, tau=np.zeros(tree.model.nv)), ABA),
@@ -119,26 +119,26 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
             'solve(motion, forces)', solve=platform.forward_dynamics, motion=one,
             forces=forces[0]), ABA),
         Contestant(f'`forward_dynamics.solve`, a sample of {SAMPLES:,}', once(
-            SAMPLES, forward_dynamics.solve, platform.machine, motion.rows.copy(), forces,
+            SAMPLES, forward_dynamics.solve, platform.constants, motion.rows.copy(), forces,
             no_wrench), ABA)]
 
     random = np.random.default_rng(20260103)
     pose = legal_poses(platform, random, 1)
     guess = far_from(pose, random)
-    lengths = platform.inverse_kinematics(pose.position, pose.rotation)
+    lengths = platform.inverse_kinematics(pose)
     codes, steps, residuals = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64), np.empty(1)
 
     def newton(begin: Any) -> Any:
         return repeated(
-            'rows[:] = begin; poses(machine, lengths, rows, codes, steps, residuals)',
-            poses=forward_kinematics.poses, machine=platform.machine, lengths=lengths,
+            'rows[:] = begin; poses(constants, lengths, rows, codes, steps, residuals)',
+            poses=forward_kinematics.poses, constants=platform.constants, lengths=lengths,
             rows=begin.copy(), begin=begin, codes=codes, steps=steps, residuals=residuals)
 
     near = pose.rows.copy()
     near[0, :3] += [1e-4, -2e-4, 1e-4]  # 0.2 m/s at 1 kHz
 
     def miss(x: Any) -> Any:
-        return platform.inverse_kinematics(x[:3], from_euler(x[3:])) - lengths[0]
+        return platform.inverse_kinematics(Pose.from_euler(x[:3], x[3:])) - lengths[0]
 
     start = np.concatenate([guess.position[0], np.zeros(3)])
     assert np.max(np.abs(root(miss, start, tol=1e-12).fun)) < 1e-9

@@ -40,6 +40,7 @@ import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics import kernel, lagrange
+from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import FORCES, RESULT, WRENCH
 from stewart_dynamics.parameters import inertia_matrix
@@ -195,7 +196,7 @@ class Tree:
         q, v, a, g = self.state(motion)
         at = lagrange.legs(self.parameters, motion.position, motion.rotation)
         wrench = g.T @ pin.rnea(self.model, self.data, q, v, a)
-        forces: Array = np.linalg.solve(lagrange.jacobian(at).T, wrench) + _friction(
+        forces: Array = np.linalg.solve(lagrange.inverse_jacobian(at).T, wrench) + _friction(
             self.parameters, v[2:18:3])
         return forces
 
@@ -206,7 +207,7 @@ def _rod(mass: float, center_of_mass: float, inertia: float) -> Any:
 
 
 def _friction(parameters: Parameters, rates: Array) -> Array:
-    slip = np.clip(rates / kernel.COULOMB_RATE, -1.0, 1.0)
+    slip = np.clip(rates / COULOMB_RATE, -1.0, 1.0)
     force: Array = (parameters['actuator.viscous_friction'] * rates
                     + parameters['actuator.coulomb_friction'] * slip)
     return force
@@ -222,7 +223,7 @@ def lagrange_forces(parameters: Parameters, motion: Motion) -> Array:
     c = lagrange.coriolis_matrix(parameters, position, rotation, motion.linear_velocity,
                                  motion.angular_velocity)
     g = lagrange.gravity_vector(parameters, position, rotation)
-    j = lagrange.jacobian(lagrange.legs(parameters, position, rotation))
+    j = lagrange.inverse_jacobian(lagrange.legs(parameters, position, rotation))
     wrench = m @ acceleration + c @ twist + g[..., None]
     forces: Array = np.linalg.solve(np.swapaxes(j, -1, -2), wrench)[..., 0] + _friction(
         parameters, (j @ twist)[..., 0])
@@ -267,7 +268,7 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     """Return what is measured in single calls and in batches, after checking that all agree."""
     parameters = example_machine()
     machine = StewartPlatform(parameters)
-    numbers = machine.machine
+    numbers = machine.constants
     motion = random_motions(samples)
     rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
     results, c_results = (np.empty((samples, RESULT)) for _ in range(2))

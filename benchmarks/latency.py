@@ -51,7 +51,7 @@ from visualization_msgs.msg import MarkerArray
 
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.layout import Layout
@@ -75,7 +75,7 @@ REPEATED = 4000
 
 def messages(source: str) -> list[tuple[bytes, ...]]:
     """Return the messages of each setpoint, in the order of their topics, with no stamp yet."""
-    motion = motion_at(TrajectoryParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
+    motion = motion_at(ReferenceMotionParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
     numbers = (np.column_stack([motion.position, to_quaternion(motion.rotation)]),
                np.column_stack([motion.linear_velocity, motion.angular_velocity]),
                np.column_stack([motion.linear_acceleration, motion.angular_acceleration]))
@@ -256,7 +256,7 @@ def plan(path: Path, name: str, points: int) -> None:
 def trajectory(points: int) -> bytes:
     """Return a MultiDOFJointTrajectory of so many points of the motion, over ten seconds."""
     seconds = np.linspace(0.0, 10.0, points)
-    motion = motion_at(TrajectoryParameters(MOTION), seconds)
+    motion = motion_at(ReferenceMotionParameters(MOTION), seconds)
     rows = np.column_stack([motion.position, to_quaternion(motion.rotation),
                             motion.rows[:, 12:24]]).tolist()
     message = MultiDOFJointTrajectory(joint_names=['platform'])
@@ -276,7 +276,7 @@ def trajectory(points: int) -> bytes:
 
 def legs(parameters: Parameters, first: int) -> list[bytes]:
     """Return the measured leg states of the motion, at 1 kHz."""
-    motion = motion_at(TrajectoryParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
+    motion = motion_at(ReferenceMotionParameters(MOTION), np.arange(REPEATED) * (PERIOD * 1e-9))
     result = StewartPlatform(parameters).inverse_dynamics(motion)
     stamps = first + PERIOD * np.arange(REPEATED)
     layout = JointStateWriter(parameters['joints']).layout(True)

@@ -45,7 +45,7 @@ from replay import table
 
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.nodes.markers import Markers
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import ExternalWrench
@@ -418,7 +418,7 @@ def measurement_words() -> str:
 def picture_words() -> str:
     """Return how long a picture takes and how large it is."""
     parameters = Parameters.from_yaml(PARAMETERS)
-    motion = motion_at(TrajectoryParameters(MOTION), np.array([0.3])).rows[0].tolist()
+    motion = motion_at(ReferenceMotionParameters(MOTION), np.array([0.3])).rows[0].tolist()
     output = Step(parameters)(Setpoint(FIRST_STAMP, motion), None)
     assert output is not None
     markers = Markers(parameters)

@@ -47,7 +47,7 @@ from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'
@@ -114,7 +114,7 @@ if code := main([sys.argv[1], '--params', {str(PARAMETERS)!r}, '--output', sys.a
                  '--strict', *sys.argv[3:]]):
     sys.exit(code)
 summary = json.loads(next(Path(sys.argv[2]).glob('*/summary.json')).read_text())
-assert not summary['refused']
+assert not summary['rejected']
 many = 3 * summary['setpoints']['answered']
 """
 ENDING = """
@@ -180,7 +180,7 @@ SETPOINT = np.dtype([(topic, message(numbers)) for topic, _, numbers in TOPICS])
 
 def make_bag(path: Path, setpoints: int) -> None:
     """Write setpoints at 1 kHz on three topics, in chunks with checksums."""
-    trajectory = TrajectoryParameters(MOTION)
+    trajectory = ReferenceMotionParameters(MOTION)
     store = get_typestore(Stores.ROS2_JAZZY)
     declared: list[McapRecord] = []
     for n, (topic, kind, _) in enumerate(TOPICS, start=1):
@@ -231,7 +231,7 @@ def make_bag(path: Path, setpoints: int) -> None:
                    + b'\x89MCAP0\r\n')
 
 
-def setpoints_of(trajectory: TrajectoryParameters, index: Array) -> Array:
+def setpoints_of(trajectory: ReferenceMotionParameters, index: Array) -> Array:
     """Return the messages of setpoints with these numbers, from 0 on, as they are in a chunk."""
     motion = motion_at(trajectory, index * (STEP * 1e-9))
     numbers = {

@@ -106,7 +106,7 @@ def period_rows(rounds: int) -> list[tuple[str, ...]]:
         steps = f'{plant.steps} step{"s: no reflected mass" if plant.steps > 1 else ""}'
         for name, call in (
                 ('the compiled call', partial(
-                    advance, plant._machine, plant._stops, plant._limits.force_max, plant._loads,
+                    advance, plant._constants, plant._stops, plant._limits.force_max, plant._loads,
                     plant._state, plant._result, plant.steps, plant._step)),
                 ('`Plant.advance`', partial(plant.advance, commands, NO_WRENCH)),
                 ('its four messages beside',

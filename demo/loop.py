@@ -54,7 +54,7 @@ import yaml
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
 from stewart_dynamics.parameters import Parameters
@@ -248,12 +248,12 @@ class Loop:
         parameters = Parameters.from_yaml(hexapod)
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
                       'motion.duration': seconds, 'base_frame': parameters['base_frame']}
-        settings = TrajectoryParameters.from_yaml(motion).replaced(trajectory, str(motion))
+        settings = ReferenceMotionParameters.from_yaml(motion).replaced(trajectory, str(motion))
         platform = StewartPlatform(parameters)
         self.times = sample_times(settings)
         self._motion = motion_at(settings, self.times * 1e-9)
-        self._lengths = platform.inverse_kinematics(
-            self._motion.position, self._motion.rotation) - parameters['geometry.zero_length']
+        self._lengths = (platform.inverse_kinematics(self._motion)
+                         - parameters['geometry.zero_length'])
         if not 0.0 < bandwidth < math.inf:
             raise Failure(f'bandwidth: {bandwidth} Hz: must be more than 0')
         start = motion_at(settings, 0.0)
@@ -328,8 +328,8 @@ class Loop:
 
 def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
     """Return the mass that one leg moves alone [kg], the mean of the six."""
-    to_legs = np.linalg.inv(platform.jacobian(motion.position, motion.rotation))
-    masses = to_legs.T @ platform.mass_matrix(motion.position, motion.rotation) @ to_legs
+    to_legs = np.linalg.inv(platform.inverse_jacobian(motion))
+    masses = to_legs.T @ platform.mass_matrix(motion) @ to_legs
     return float(np.mean(np.diag(masses)))
 
 

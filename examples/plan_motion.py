@@ -39,7 +39,7 @@ from trajectory_msgs.msg import (
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml
@@ -52,7 +52,7 @@ def vector(three: np.ndarray) -> Vector3:
 
 def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajectory:
     """Return a motion from pose to pose, X Y Z alpha beta gamma [m, rad], of a duration [s]."""
-    parameters = TrajectoryParameters({
+    parameters = ReferenceMotionParameters({
         'motion.type': 'quintic', 'motion.initial': start, 'motion.final': end,
         'motion.duration': duration, 'rate': 100.0})
     times = sample_times(parameters)  # [ns], a point every 10 ms

@@ -15,8 +15,7 @@
 """
 Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs, for ROS 2.
 
-The names are resolved when they are first used (PEP 562): to check a parameter file loads no
-compiler.
+Names are imported when they are first used: checking a parameter file needs no compiler.
 """
 
 from importlib import import_module
@@ -25,24 +24,32 @@ from typing import Any, TYPE_CHECKING
 if TYPE_CHECKING:
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
-    from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+    from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown
+    from stewart_dynamics.mechanics.inverse_dynamics import InverseDynamics
     from stewart_dynamics.mechanics.motion import Motion
-    from stewart_dynamics.mechanics.stewart_platform import InverseDynamics, Pose, StewartPlatform
+    from stewart_dynamics.mechanics.pose import Pose
+    from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+    from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters import Parameters
     from stewart_dynamics.runtime.planned_trajectory import (
         check_planned_trajectory, PlannedTrajectory)
 
+__version__ = '0.1.0'
+
 __all__ = [
-    'BagError', 'CAUSES', 'ForceCauses', 'InverseDynamics', 'Motion', 'MotionError',
+    'BagError', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionError', 'NaturalModes',
     'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'SingularityError',
-    'StewartError', 'StewartPlatform', 'check_planned_trajectory']
+    'StewartError', 'StewartPlatform', '__version__', 'check_planned_trajectory']
 
 _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
-    'mechanics.force_breakdown': ('CAUSES', 'ForceCauses'),
+    'mechanics.force_breakdown': ('ForceBreakdown',),
+    'mechanics.inverse_dynamics': ('InverseDynamics',),
     'mechanics.motion': ('Motion',),
-    'mechanics.stewart_platform': ('InverseDynamics', 'Pose', 'StewartPlatform'),
+    'mechanics.pose': ('Pose',),
+    'mechanics.stewart_platform': ('StewartPlatform',),
+    'mechanics.stiffness': ('NaturalModes',),
     'parameters': ('Parameters',),
     'runtime.planned_trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
 }
@@ -50,7 +57,7 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 
 
 def __getattr__(name: str) -> Any:
-    """Return one of the library's names, loaded now."""
+    """Return one of the library's names (PEP 562)."""
     if name not in _MODULE_OF:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     value = getattr(import_module(f'{__name__}.{_MODULE_OF[name]}'), name)
@@ -59,5 +66,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the library's names with the others."""
+    """Return all names, imported or not."""
     return sorted({*globals(), *__all__})

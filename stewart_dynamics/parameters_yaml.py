@@ -118,7 +118,7 @@ def _read(data: bytes, source: str) -> Any:
         depth = 0
         for event in yaml.parse(data, Loader=_SafeLoader):  # libyaml's loader recurses unbounded
             if isinstance(event, yaml.AliasEvent):
-                raise _wrong(event, 'a YAML alias (*): write the value out')
+                raise _wrong(event, 'has a YAML alias (*): write the value out')
             depth += isinstance(event, yaml.CollectionStartEvent)
             depth -= isinstance(event, yaml.CollectionEndEvent)
             if depth > _DEEPEST:

@@ -22,7 +22,6 @@ import struct
 import time
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import (
     AccelStamped, PoseStamped, Transform, Twist, TwistStamped, WrenchStamped)
 from hypothesis import example, given, settings
@@ -32,12 +31,10 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
-from stewart_dynamics.messages.diagnostics import diagnostics
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import (
     combined, layout_of, pose, StampedWriter, twist, wrench)
@@ -362,73 +359,6 @@ def test_no_spoiled_array_raises_anything_else(data: st.DataObject) -> None:
 
 # Writing
 
-def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
-    """Return the fields of a JointState's bytes, and nothing of what stands between them."""
-    at = 4
-    fields = [data[:4]]
-
-    def take(size: int, align: int) -> None:
-        nonlocal at
-        at += -(at - 4) % align
-        fields.append(data[at:at + size])
-        assert len(fields[-1]) == size
-        at += size
-
-    take(4, 4)
-    take(4, 4)
-    for text in (b'', None, *(name.encode() for name in names)):
-        take(4, 4)
-        if text is not None:
-            take(len(text) + 1, 1)
-    for number in (6, 6, numbers):
-        take(4, 4)
-        for _ in range(number):
-            take(8, 8)
-    assert len(data) - at < 8
-    return fields
-
-
-@settings(derandomize=True, deadline=None, max_examples=200)
-@given(stamps, st.lists(texts, min_size=6, max_size=6), sixes, sixes, st.none() | sixes)
-def test_a_joint_state_is_what_rclpy_and_rosbags_write(
-        stamp: int, names: list[str], position: tuple[float, ...], velocity: tuple[float, ...],
-        effort: tuple[float, ...] | None) -> None:
-    data = JointStateWriter(names).write(stamp, position, velocity, effort)
-
-    by_rclpy = deserialize_message(data, JointState)
-    by_rosbags = STORE.deserialize_cdr(data, 'sensor_msgs/msg/JointState')
-    for read in (by_rclpy, by_rosbags):
-        assert (read.header.stamp.sec, read.header.stamp.nanosec) == divmod(stamp, SECOND)
-        assert read.header.frame_id == ''
-        assert list(read.name) == names
-        assert same(read.position, position)
-        assert same(read.velocity, velocity)
-        assert same(read.effort, effort or ())
-
-    # rosbags writes zeros into the gaps, as we do; rclpy leaves in them, and behind an empty
-    # effort, what the memory held before
-    if all(value == value for value in (*position, *velocity, *(effort or ()))):
-        again = bytes(STORE.serialize_cdr(by_rosbags, 'sensor_msgs/msg/JointState'))
-        assert again[:len(data)] == data
-        assert not any(again[len(data):])
-        ros = serialize_message(by_rclpy)
-        numbers = 0 if effort is None else 6
-        assert significant(ros, names, numbers) == significant(data, names, numbers)
-
-
-def test_names_of_every_length_are_written() -> None:
-    numbers = (1.5, -2.5, 3.5, -4.5, 5.5, -6.5)
-    for letter in ('a', 'é', '漢'):
-        for length in range(33):
-            names = [letter * (length + n) for n in range(6)]
-            for effort in (numbers, None):
-                data = JointStateWriter(names).write(7, numbers, numbers, effort)
-                read = deserialize_message(data, JointState)
-                assert list(read.name) == names
-                assert tuple(read.position) == tuple(read.velocity) == numbers
-                assert tuple(read.effort) == (effort or ())
-
-
 @moderately
 @given(sixes)
 def test_an_array_is_what_rclpy_writes(values: tuple[float, ...]) -> None:
@@ -472,25 +402,6 @@ def test_a_number_and_a_truth_value_are_what_rclpy_writes(number: float, truth: 
     assert serialize_message(Bool(data=truth))[:len(data)] == data  # padded to four bytes
     assert deserialize_message(data, Bool).data is truth
     assert STORE.deserialize_cdr(data, 'std_msgs/msg/Bool').data is truth
-
-
-statuses = st.lists(st.tuples(
-    st.integers(0, 3), st.tuples(texts, texts, texts),
-    st.lists(st.tuples(texts, texts), max_size=4)), max_size=4)
-
-
-@moderately
-@given(stamps, statuses)
-def test_diagnostics_are_what_rclpy_and_rosbags_write(stamp: int, written: Any) -> None:
-    data = diagnostics(stamp, written)
-    array = deserialize_message(data, DiagnosticArray)
-    assert (array.header.stamp.sec, array.header.stamp.nanosec) == divmod(stamp, SECOND)
-    assert array.header.frame_id == ''
-    assert [(status.level[0], (status.name, status.message, status.hardware_id),
-             [(pair.key, pair.value) for pair in status.values])
-            for status in array.status] == written
-    kind = 'diagnostic_msgs/msg/DiagnosticArray'
-    assert bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, kind), kind)) == data
 
 
 @pytest.mark.parametrize(('stamp', 'holds'), [

@@ -26,7 +26,7 @@ import pytest
 from referees import ROOT
 import yaml
 
-from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics import Parameters, Pose, StewartPlatform
 
 CONFIG = ROOT / 'config'
 JOINTS = list(Parameters.from_yaml(CONFIG / 'platform.yaml')['joints'])
@@ -259,9 +259,9 @@ def test_the_example_gains_damp_every_mode_of_the_hexapod() -> None:
     The modes of the legs are those of J^-T M J^-1; no payload adds more to a mode than its share.
     """
     platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
-    home = [0.0, 0.0, 1.1], np.eye(3)
-    inverse = np.linalg.inv(platform.jacobian(*home))
-    masses = np.linalg.eigvalsh(inverse.T @ platform.mass_matrix(*home) @ inverse)
+    home = Pose([0.0, 0.0, 1.1], np.eye(3))
+    inverse = np.linalg.inv(platform.inverse_jacobian(home))
+    masses = np.linalg.eigvalsh(inverse.T @ platform.mass_matrix(home) @ inverse)
     assert masses.round().astype(int).tolist()[::5] == [53, 338]  # as the file says
     file, = (yaml.safe_load(path.read_text(encoding='utf-8')) for path in CONTROLLERS
              if path.name == 'trajectory_effort.yaml')

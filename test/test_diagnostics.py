@@ -354,9 +354,9 @@ def test_a_clear_motion_is_ok() -> None:
     # The warning ends only below 0.8 of it, and the text is not of the number before.
     (Cause.CONDITION, 17.5, 9.0, 'condition number 17.5 has exceeded singularity.warn_condition, '
      '20, and is not yet below 16'),
-    (Cause.FORETOLD, 5.0, 0.25, 'crossing of det(J) = 0 predicted in 0.25 s, '
+    (Cause.PREDICTED, 5.0, 0.25, 'crossing of det(J) = 0 predicted in 0.25 s, '
      'singularity.warn_time is 0.5 s'),
-    (Cause.FORETOLD, 5.0, 0.6, 'crossing of det(J) = 0 predicted in 0.6 s, '
+    (Cause.PREDICTED, 5.0, 0.6, 'crossing of det(J) = 0 predicted in 0.6 s, '
      'singularity.warn_time is 0.5 s (the warning ends above 0.625 s)')])
 def test_a_warning_says_its_cause_with_its_own_numbers(
         cause: Cause, condition: float, time: float, message: str) -> None:

@@ -42,7 +42,7 @@ from running import (
     NODE, OUTPUTS, Peer, PLATFORM, raw, refused, ROOT, Sample, SEPARATE, wrench_message)
 from std_msgs.msg import Bool
 
-from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics import Parameters, Pose, StewartPlatform
 
 Start = Fresh = Callable[..., DynamicsNode]
 
@@ -389,7 +389,7 @@ def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_
     assert len(state.effort) == 0
     zero = node.platform.parameters['geometry.zero_length']
     assert bits(state.position) == bits(
-        node.platform.inverse_kinematics(FLAT.position, np.eye(3)) - zero)
+        node.platform.inverse_kinematics(Pose(FLAT.position, np.eye(3))) - zero)
     assert node.received('leg_lengths')[-1].data.tolist() == (state.position + zero).tolist()
     assert abs(node.received('jacobian_determinant')[-1].data) < 1e-30
     node.until(lambda: len(node.raw['singularity_warning']) > warnings, 'it warns')

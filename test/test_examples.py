@@ -28,7 +28,7 @@ from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Progra
 from trajectory_msgs.msg import JointTrajectory
 
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 EXAMPLES = ROOT / 'examples'
 
@@ -62,7 +62,7 @@ def test_a_planned_motion_is_answered_or_its_refusal_is_said(
     def planned(*arguments: object) -> Program:
         return run('plan_motion.py', node.domain, '--timeout', '60.0', *arguments)
 
-    settings = TrajectoryParameters({
+    settings = ReferenceMotionParameters({
         'motion.type': 'quintic', 'motion.initial': HOME, 'motion.final': THERE,
         'motion.duration': 2.0, 'rate': 100.0})
     expected = node.platform.inverse_dynamics(motion_at(settings, sample_times(settings) * 1e-9))

@@ -33,7 +33,7 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.external_wrench import (
-    Estimate, ExternalWrench, Measurement, Overload)
+    Estimate, external_wrenches, ExternalWrench, Measurement, Overload)
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
@@ -109,7 +109,7 @@ def test_a_static_load_is_found() -> None:
         assert relative(wrenches(found), [load, load]) < 1e-9
         assert relative(found[-1].motion[:3], pose.position) < 1e-9
         differences = np.linalg.solve(
-            StewartPlatform(parameters).jacobian(pose.position, pose.rotation).T, -load)
+            StewartPlatform(parameters).inverse_jacobian(pose).T, -load)
         assert relative(found[-1].differences, differences) < 1e-9
 
 
@@ -136,13 +136,11 @@ def test_in_motion_it_is_what_the_equation_of_motion_leaves() -> None:
             motion = motion_at(np.subtract(stamps, BEGIN) * 1e-9)
             data = measured(parameters, motion, load + known, stamps)
             found = wrenches(estimates(ExternalWrench(parameters), data, motion_at(0.0), known))
-            pose = motion.position, motion.rotation
             twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=1)
             acceleration = np.diff(twist, axis=0) / (interval * 1e-9)
-            mass, jacobian = platform.mass_matrix(*pose), platform.jacobian(*pose)
-            rest = platform.gravity_vector(*pose) - known + np.einsum(
-                'nij,nj->ni', platform.coriolis_matrix(
-                    *pose, motion.linear_velocity, motion.angular_velocity), twist)
+            mass, jacobian = platform.mass_matrix(motion), platform.inverse_jacobian(motion)
+            rest = platform.gravity_vector(motion) - known + np.einsum(
+                'nij,nj->ni', platform.coriolis_matrix(motion), twist)
             forces = np.array([each.forces for each in data[1:]])
             left = sum(np.einsum('nij,nj->ni', mass[end], acceleration) + rest[end]
                        - np.einsum('nji,nj->ni', jacobian[end], forces)
@@ -151,6 +149,40 @@ def test_in_motion_it_is_what_the_equation_of_motion_leaves() -> None:
             largest.append(np.max(np.abs(found - load)))
         orders = np.log2(np.divide(largest[:-1], largest[1:]))
         assert np.all(np.abs(orders - 1.0) < 0.1)
+
+
+def test_many_are_the_equation_of_motion_of_each() -> None:
+    """With the sign of ~/wrench: the load that the model does not know of is found."""
+    random = rng(9)
+    for _ in range(10):
+        parameters = random_parameters(random)
+        platform = StewartPlatform(parameters)
+        motion = random_motion(parameters, random, 50)
+        known, load = random_wrench(parameters, random, 50), random_wrench(parameters, random, 50)
+        model = platform.inverse_dynamics(motion, known).forces
+        forces = platform.inverse_dynamics(motion, known + load).forces
+        found = external_wrenches(platform, motion.rows, model, forces)
+        assert relative(found, load) < 1e-9
+        jacobian = platform.jacobian(motion.position, motion.rotation)
+        assert relative(found, np.einsum('nji,nj->ni', jacobian, model - forces)) < 1e-12
+        # Each alone gives the same bits, of a pose alone too, and however the arrays lie.
+        for n in range(0, 50, 7):
+            assert np.array_equal(external_wrenches(
+                platform, motion.rows[n:n + 1, :12], model[n:n + 1], forces[n:n + 1]),
+                found[n:n + 1])
+        assert np.array_equal(external_wrenches(
+            platform, motion.rows[::-2], model[::-2], forces[::-2]), found[::-2])
+    assert external_wrenches(platform, np.empty((0, 12)), *np.empty((2, 0, 6))).shape == (0, 6)
+
+
+def test_one_not_filtered_is_the_mean_of_many_at_both_ends() -> None:
+    step, platform = ExternalWrench(MACHINE.replaced(UNFILTERED)), StewartPlatform(MACHINE)
+    data = resting(MACHINE, HOME, LOAD, [BEGIN, BEGIN + MILLISECOND])
+    found = estimates(step, data)[1]
+    rows = np.array([found.motion] * 2)
+    model = platform.solve(rows)[:, 12:18]
+    many = external_wrenches(platform, rows, model, np.array([data[1].forces] * 2))
+    assert relative(found.wrench, many[0]) < 1e-9
 
 
 # The filter
@@ -193,8 +225,8 @@ def test_noise_is_bounded_however_short_the_time_between_measurements(interval: 
     found = estimates(ExternalWrench(frictionless),
                       noisy(frictionless, interval, many, deviation, 5)[0])
     platform = StewartPlatform(frictionless)
-    per_rate = platform.mass_matrix(HOME.position, HOME.rotation) @ np.linalg.inv(
-        platform.jacobian(HOME.position, HOME.rotation))
+    per_rate = platform.mass_matrix(HOME) @ np.linalg.inv(
+        platform.inverse_jacobian(HOME))
     gain = 2.0 * math.pi * 10.0
     x = gain * interval * 1e-9
     expected = deviation * gain * -math.expm1(-x) / x * math.sqrt(2.0 / (1.0 + math.exp(-x)))
@@ -218,9 +250,9 @@ def test_it_is_a_momentum_observer() -> None:
     touched = resting(frictionless, HOME, LOAD, [0])[0].forces
     data = [each._replace(forces=touched) if 3000 <= n < 7000 else each
             for n, each in enumerate(data)]
-    mass = platform.mass_matrix(HOME.position, HOME.rotation)
-    jacobian = platform.jacobian(HOME.position, HOME.rotation)
-    gravity = platform.gravity_vector(HOME.position, HOME.rotation)
+    mass = platform.mass_matrix(HOME)
+    jacobian = platform.inverse_jacobian(HOME)
+    gravity = platform.gravity_vector(HOME)
     momentum = np.linalg.solve(jacobian, noise.T).T @ mass
     gain, dt = 2.0 * math.pi * 10.0, interval * 1e-9
     residual, integral, observed = np.zeros(6), np.zeros(6), []

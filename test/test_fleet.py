@@ -55,9 +55,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.replay.bags import folders_of_results
-from stewart_dynamics.replay.fleet import Fleet, replay_fleet
-from stewart_dynamics.replay.one import (
-    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, PARTLY_READ, replay)
+from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
+from stewart_dynamics.replay.one_bag import replay
+from stewart_dynamics.replay.options import (
+    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, PARTLY_READ)
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -233,7 +234,7 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
         assert row['error'] in line
     assert int(rows(output)[f'{bags / "cut"}']['setpoints']) > 100
     assert rows(output)[f'{bags / "cut"}']['complete'] == 'false'
-    assert int(rows(output)[f'{bags / "flawed"}']['refused']) > 100
+    assert int(rows(output)[f'{bags / "flawed"}']['rejected']) > 100
     assert rows(output)[f'{bags / "noise"}']['results'] == ''
     assert list((output / 'other').iterdir()) == []
     assert hidden(output) == []
@@ -305,8 +306,8 @@ def test_a_bag_whose_processes_die_is_given_up(bags: Path, tmp_path: Path) -> No
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
     long = fleet.ended[0]
-    assert long.error == (f'{bags / "long"}: the process that replayed it died 2 times; the last '
-                          'one was killed by SIGKILL (was there too little memory?)')
+    assert long.error == (f'{bags / "long"}: the process that replayed it was killed, '
+                          'twice (was there too little memory?)')
     assert not long.folder.exists()
     assert hidden(output) == []
     for bag, folder in pairs[1:]:
@@ -320,8 +321,8 @@ def test_processes_that_cannot_begin_are_told_of_at_once(bags: Path, tmp_path: P
         'from pathlib import Path\n'
         'from stewart_dynamics import Parameters, StewartError\n'
         'from stewart_dynamics.replay.bags import folders_of_results\n'
-        'from stewart_dynamics.replay.fleet import replay_fleet\n'
-        'from stewart_dynamics.replay.one import Options\n'
+        'from stewart_dynamics.replay.many_bags import replay_fleet\n'
+        'from stewart_dynamics.replay.options import Options\n'
         f'output = Path({str(tmp_path / "out")!r})\n'
         f'pairs = folders_of_results([Path({str(bags)!r})], output)\n'
         f'parameters = Parameters.from_yaml({str(PARAMS)!r})\n'
@@ -332,8 +333,7 @@ def test_processes_that_cannot_begin_are_told_of_at_once(bags: Path, tmp_path: P
         '    print(exc)\n', encoding='utf-8')
     ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60,
                            check=False)
-    assert ended.stdout == ('a process that was to replay bags could not begin: ended with exit '
-                            'code 1\n')
+    assert ended.stdout == 'the processes that were to replay bags could not start\n'
     assert "if __name__ == '__main__':" in ended.stderr
 
 
@@ -588,7 +588,7 @@ def test_a_cluster_that_is_lost_is_said_of_each_bag(
 @pytest.mark.parametrize('address', ['tcp://127.0.0.1:1', 'nonsense', 'foo://x', ''])
 def test_a_cluster_that_is_not_there_is_an_error(
         bags: Path, tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('stewart_dynamics.replay.fleet._PATIENCE', 1.0)
+    monkeypatch.setattr('stewart_dynamics.replay.dask_cluster._PATIENCE', 1.0)
     output = tmp_path / 'out'
     with pytest.raises(StewartError, match=f'^{address}: no Dask scheduler answers there: \\w'):
         replay_fleet(folders_of_results([bags], output), PARAMETERS, output, PLAIN,

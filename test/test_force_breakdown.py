@@ -28,7 +28,7 @@ from referees import (
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics import lagrange
-from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.parameters import inertia_matrix
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ GRAVITY, PLATFORM, LEGS, VELOCITY, FRICTION, WRENCH = range(6)
 
 def split(p: Parameters, motion: Motion, wrench: Array) -> Array:
     """Return the forces by cause of a batch."""
-    return ForceCauses(p)(motion.rows, wrench)
+    return ForceBreakdownRows(p)(motion.rows, wrench)
 
 
 def off(value: Array, truth: Array, forces: Array) -> float:
@@ -49,7 +49,7 @@ def off(value: Array, truth: Array, forces: Array) -> float:
 
 def solved(p: Parameters, motion: Motion, load: Array) -> Array:
     """Return the leg forces that hold a load (N, 6): J_inv^-T load."""
-    j_inv = lagrange.jacobian(lagrange.legs(p, motion.position, motion.rotation))
+    j_inv = lagrange.inverse_jacobian(lagrange.legs(p, motion.position, motion.rotation))
     f: Array = np.linalg.solve(np.swapaxes(j_inv, -1, -2), load[..., None])[..., 0]
     return f
 
@@ -79,7 +79,7 @@ def test_each_cause_is_what_the_matrices_of_the_reference_say(machine: int) -> N
     inertia = np.einsum('nij,nj->ni', lagrange.mass_matrix(p, x, r), acceleration)
     of_platform = platform_load(p, motion)
     velocity = np.einsum('nij,nj->ni', lagrange.coriolis_matrix(p, x, r, v, w), twist)
-    rates = np.einsum('nij,nj->ni', lagrange.jacobian(lagrange.legs(p, x, r)), twist)
+    rates = np.einsum('nij,nj->ni', lagrange.inverse_jacobian(lagrange.legs(p, x, r)), twist)
     truths = {
         GRAVITY: solved(p, motion, lagrange.gravity_vector(p, x, r)),
         PLATFORM: solved(p, motion, of_platform),
@@ -87,8 +87,8 @@ def test_each_cause_is_what_the_matrices_of_the_reference_say(machine: int) -> N
         VELOCITY: solved(p, motion, velocity), FRICTION: friction(p, rates),
         WRENCH: -solved(p, motion, wrench)}
     for cause, truth in truths.items():
-        assert np.abs(truth).max() > 1.0, CAUSES[cause]
-        assert off(forces[:, cause], truth, forces) < 1e-11, CAUSES[cause]
+        assert np.abs(truth).max() > 1.0, SOURCES[cause]
+        assert off(forces[:, cause], truth, forces) < 1e-11, SOURCES[cause]
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -99,7 +99,7 @@ def test_the_causes_sum_to_the_force(seed: int, many: int, loaded: bool) -> None
     motion = random_motion(p, random, many)
     wrench = random_wrench(p, random, many) if loaded else np.zeros((many, 6))
     forces = split(p, motion, wrench)
-    assert forces.shape == (many, len(CAUSES), 6)
+    assert forces.shape == (many, len(SOURCES), 6)
     whole = StewartPlatform(p).inverse_dynamics(motion, wrench).forces
     assert off(forces.sum(axis=1), whole, forces) < 1e-12
 
@@ -110,7 +110,7 @@ def test_many_are_split_as_each_alone() -> None:
     motion = random_motion(p, random, 2500)
     wrench = random_wrench(p, random, 2500)
     forces = split(p, motion, wrench)
-    causes = ForceCauses(p)
+    causes = ForceBreakdownRows(p)
     for n in (0, 1023, 1024, 1025, 2499):
         alone = causes(motion.rows[n:n + 1], wrench[n:n + 1])
         np.testing.assert_array_equal(forces[n], alone[0])
@@ -140,7 +140,7 @@ def test_no_force_is_split_where_there_is_none() -> None:
     p = symmetric_parameters()
     rows = np.concatenate([near_a_singularity(0.1, p).rows, near_a_singularity(0.2, p).rows])
     rows[1, 3:12] = QUARTER_TURN.ravel()
-    forces = ForceCauses(p)(rows, np.ones((2, 6)))
+    forces = ForceBreakdownRows(p)(rows, np.ones((2, 6)))
     assert np.isfinite(forces[0]).all()
     assert np.isnan(forces[1]).all()
 
@@ -168,6 +168,6 @@ def test_the_motions_are_left_as_they_are() -> None:
     motions = random_motion(p, random, MANY).rows
     wrenches = random_wrench(p, random, MANY)
     before = motions.copy(), wrenches.copy()
-    ForceCauses(p)(motions, wrenches)
+    ForceBreakdownRows(p)(motions, wrenches)
     np.testing.assert_array_equal(motions, before[0])
     np.testing.assert_array_equal(wrenches, before[1])

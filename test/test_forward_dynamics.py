@@ -80,15 +80,14 @@ def test_it_solves_the_lagrange_equations(seed: int) -> None:
     platform = StewartPlatform(p)
     motion, wrench = random_motion(p, random, STATES), random_wrench(p, random, STATES)
     forces = random.uniform(-2000.0, 2000.0, (STATES, 6))
-    j_inv = platform.jacobian(motion.position, motion.rotation)
+    j_inv = platform.inverse_jacobian(motion)
     twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
-    c = platform.coriolis_matrix(motion.position, motion.rotation, motion.linear_velocity,
-                                 motion.angular_velocity)
+    c = platform.coriolis_matrix(motion)
     rates = np.einsum('nij,nj->ni', j_inv, twist)
     right = (np.einsum('nji,nj->ni', j_inv, forces - friction(p, rates)) + wrench
              - np.einsum('nij,nj->ni', c, twist)
-             - platform.gravity_vector(motion.position, motion.rotation))
-    mass = platform.mass_matrix(motion.position, motion.rotation)
+             - platform.gravity_vector(motion))
+    mass = platform.mass_matrix(motion)
     truth = np.linalg.solve(mass, right[..., None])[..., 0]
     found = accelerations(platform.forward_dynamics(motion, forces, wrench))
     assert each_relative(found, truth) < 1e-11
@@ -145,7 +144,7 @@ def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit() -> None:
     motion = random_motion(p, rng(), 20_000)
     forces = rng().uniform(-1000.0, 1000.0, (20_000, 6))
     rows = motion.rows.copy()
-    forward_dynamics.solve(platform.machine, rows, forces, np.zeros((1, 6)))
+    forward_dynamics.solve(platform.constants, rows, forces, np.zeros((1, 6)))
     assert np.array_equal(platform.forward_dynamics(motion, forces).rows, rows)
     if COMPILED:
         assert len(forward_dynamics.solve.signatures) == 1
@@ -154,7 +153,7 @@ def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit() -> None:
 @pytest.mark.parametrize(('forces', 'wrench', 'text'), [
     (np.zeros(5), None, 'forces: shape (5,): must end in (6,)'),
     ([np.nan] * 6, None, 'forces[0]: nan: must be finite'),
-    (np.zeros((4, 6)), None, "'motion': (3,), 'forces': (4,)"),
+    (np.zeros((4, 6)), None, 'motion (3,), forces (4,)'),
     (np.zeros(6), np.zeros(5), 'wrench: shape (5,)'),
     ([1e308] * 6, None, 'overflow')])
 def test_what_does_not_fit_is_refused(forces: Any, wrench: Any, text: str) -> None:
@@ -167,7 +166,7 @@ def test_what_does_not_fit_is_refused(forces: Any, wrench: Any, text: str) -> No
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     p = random_parameters(rng())
     rows, forces = random_motion(p, rng(), 10).rows, np.arange(60.0).reshape(10, 6)
-    machine, wrench = StewartPlatform(p).machine, random_wrench(p, rng(), 10)
+    machine, wrench = StewartPlatform(p).constants, random_wrench(p, rng(), 10)
     given = {'machine': machine, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench}
     plain = uncompiled(
         'from stewart_dynamics.mechanics.forward_dynamics import solve\n'

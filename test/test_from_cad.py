@@ -29,9 +29,9 @@ from referees import ROOT
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
 MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
@@ -57,7 +57,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_the_file_on_the_page_is_the_machine_that_is_computed(names: dict[str, Any]) -> None:
     assert names['platform'].parameters == names['parameters']
-    assert doubts(names['parameters']) == ()
+    assert likely_mistakes(names['parameters']) == ()
 
 
 def test_the_node_gives_the_forces_on_the_page(
@@ -86,7 +86,7 @@ def test_the_motion_on_the_page_begins_at_home_and_keeps_all_limits(
         names: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / 'my_motion.yaml'
     file.write_text(MOVEMENT, encoding='utf-8')
-    settings = TrajectoryParameters.from_yaml(file)
+    settings = ReferenceMotionParameters.from_yaml(file)
     motion = motion_at(settings, sample_times(settings) * 1e-9)
     assert motion.position[0] == pytest.approx(names['home'], abs=1e-12)
     assert np.array_equal(motion.rotation[0], np.eye(3))
@@ -118,7 +118,7 @@ def mistakes(names: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
         'a number without a point': [{'platform.mass': 21}],
         'moments first, then products: ixx iyy izz ixy ixz iyz': [
             {'platform.inertia': np.concatenate([moments, products])}],
-        'platform joints that begin with another leg': [
+        'platform joints that start with another leg': [
             {'geometry.platform_joints': np.roll(p['geometry.platform_joints'], by, axis=0)}
             for by in (1, 3, 5)],
         "center of mass from CAD's origin": [
@@ -140,7 +140,7 @@ def test_what_the_node_says_of_mistakes_is_what_the_page_says(names: dict[str, A
     for mistake, changes in told.items():
         for change in changes:
             try:
-                said = '\n'.join(doubts(names['parameters'].replaced(change)))
+                said = '\n'.join(likely_mistakes(names['parameters'].replaced(change)))
             except ParameterError as exc:
                 said = str(exc)
                 assert 'does not start' in rows[mistake][0]
@@ -156,7 +156,7 @@ def test_what_the_node_cannot_see_shows_as_the_page_says(names: dict[str, Any]) 
     for change in (mirrored, by_two, {'geometry.zero_length': 0.77},
                    {'platform.inertia': p['platform.inertia'] * [1, -1, -1, 1, -1, 1]},
                    {'actuator.reflected_mass': 1.4e-5}):
-        assert doubts(p.replaced(change)) == ()
+        assert likely_mistakes(p.replaced(change)) == ()
 
     # The other three legs become longer in the mirror image.
     mirror = StewartPlatform(p.replaced(mirrored))

@@ -52,7 +52,7 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
     return {'software': 'stewart_dynamics 9', 'complete': True,
             'setpoints': {'answered': 1000, 'duration_s': 10.0}, 'legs': legs, 'limits': [],
-            'refused': [], 'singularity': {
+            'rejected': [], 'singularity': {
                 'determinant_nearest_m3': 0.25, 'crossings': 0, 'condition_max': 4.5,
                 'warnings': 0}, **changes}
 
@@ -73,17 +73,24 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
     limits = [{'limit': f'limits.{limit}', 'leg': leg} for limit, leg in (
         ('length_max', 'leg_2'), ('force_max', 'leg_1'), ('force_max', 'leg_3'))]
     write_fleet(tmp_path, [row('a', 1, summary(
-        [3.0, -120.5, 7.0, 120.0], limits=limits, refused=[{'count': 3}, {'count': 4}],
+        [3.0, -120.5, 7.0, 120.0], limits=limits, rejected=[{'count': 3}, {'count': 4}],
         singularity={'determinant_nearest_m3': -1e-7, 'crossings': 2, 'condition_max': 8e3,
                      'warnings': 1}), results='deep/a')])
     assert table(tmp_path) == [{
         'bag': 'a', 'code': '1', 'result': 'limit met', 'complete': 'true', 'setpoints': '1000',
         'duration_s': '10.0', 'force_worst_n': '-120.5', 'force_worst_leg': 'leg_1',
         'force_worst_at_s': '1.0', 'force_margin_n': '-20.5', 'length_margin_m': '',
-        'rate_margin_m_s': '0.0', 'limits_broken': 'length_max: leg_2; force_max: leg_1, leg_3',
+        'rate_margin_m_s': '0.0', 'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3',
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
-        'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'refused': '7',
+        'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
         'error': '', 'results': 'deep/a'}]
+
+
+def test_a_bag_without_answers_is_not_partly_read(tmp_path: Path) -> None:
+    unanswered = summary([None] * 6, setpoints={'answered': 0, 'duration_s': 0.0})
+    write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
+                           row('b', 3, summary([1.0]), 'cut off')])
+    assert [cells['result'] for cells in table(tmp_path)] == ['nothing answered', 'partly read']
 
 
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
@@ -224,7 +231,7 @@ def test_what_is_wrong_is_plain_to_see(page: Page, tmp_path: Path) -> None:
         text = page.page.eval_on_selector(selector, 'it => getComputedStyle(it).color')
         return [int(number) for number in re.findall(r'\d+', text)]
 
-    for selector in ('tr:nth-child(2) td.limits_broken', 'tr:nth-child(3) .pill',
+    for selector in ('tr:nth-child(2) td.limits_exceeded', 'tr:nth-child(3) .pill',
                      'tr:nth-child(3) td.error', 'tr:nth-child(4) td.error',
                      'tr:nth-child(6) td.bad'):
         red, green, blue = color(f'tbody {selector}')

@@ -23,7 +23,7 @@ import pytest
 from referees import rng, rotation_about, size_of
 from simulated import random_simulated, simulated
 
-from stewart_dynamics import ParameterError, StewartPlatform
+from stewart_dynamics import ParameterError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.integration_step import largest_eigenvalue, substeps
 
 
@@ -40,9 +40,9 @@ def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
         for _ in range(50):
             position = size_of(p) * random.uniform([-1, -1, 0.2], [1, 1, 2], 3)
             turn = rotation_about(np.array([0.6, 0.0, 0.8]), random.uniform(-1.0, 1.0))
-            jacobian = platform.jacobian(position, turn)
-            mobility = jacobian @ np.linalg.solve(
-                platform.mass_matrix(position, turn), jacobian.T)
+            pose = Pose(position, turn)
+            jacobian = platform.inverse_jacobian(pose)
+            mobility = jacobian @ np.linalg.solve(platform.mass_matrix(pose), jacobian.T)
             root = np.sqrt(has)
             worst = max(worst, float(np.linalg.eigvalsh(root[:, None] * mobility * root)[-1]))
         assert worst <= bound * (1.0 + 1e-12)

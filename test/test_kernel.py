@@ -39,10 +39,9 @@ from referees import (
 
 import stewart_dynamics
 from stewart_dynamics import (
-    InverseDynamics, Motion, MotionError, Parameters, SingularityError, StewartError,
+    InverseDynamics, Motion, MotionError, Parameters, Pose, SingularityError, StewartError,
     StewartPlatform)
-from stewart_dynamics.mechanics import lagrange
-from stewart_dynamics.mechanics import stewart_platform as platform_module
+from stewart_dynamics.mechanics import batch, lagrange
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.kernel import LANES, solve
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, MOTION, RESULT
@@ -56,15 +55,13 @@ STATES = 15
 
 def sample(motion: Motion, n: int) -> Motion:
     """Return one sample of a batch."""
-    return Motion(motion.position[n], motion.rotation[n], motion.linear_velocity[n],
-                  motion.angular_velocity[n], motion.linear_acceleration[n],
-                  motion.angular_acceleration[n])
+    return motion[n]
 
 
 def scaled_jacobian(platform: StewartPlatform, motion: Motion) -> Array:
     """Return J_inv with its right half divided by the characteristic length."""
     size = platform.parameters['singularity.characteristic_length']
-    j: Array = platform.jacobian(motion.position, motion.rotation) / [1, 1, 1, size, size, size]
+    j: Array = platform.inverse_jacobian(motion) / [1, 1, 1, size, size, size]
     return j
 
 
@@ -141,15 +138,13 @@ def test_forces_are_those_of_the_lagrange_matrices() -> None:
         twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
         acceleration = np.concatenate(
             [motion.linear_acceleration, motion.angular_acceleration], axis=-1)
-        j_inv = platform.jacobian(motion.position, motion.rotation)
+        j_inv = platform.inverse_jacobian(motion)
         for christoffel in (False, True):
-            c = platform.coriolis_matrix(motion.position, motion.rotation,
-                                         motion.linear_velocity, motion.angular_velocity,
+            c = platform.coriolis_matrix(motion,
                                          christoffel)
-            load = (np.einsum('nij,nj->ni', platform.mass_matrix(
-                        motion.position, motion.rotation), acceleration)
+            load = (np.einsum('nij,nj->ni', platform.mass_matrix(motion), acceleration)
                     + np.einsum('nij,nj->ni', c, twist)
-                    + platform.gravity_vector(motion.position, motion.rotation) - wrench)
+                    + platform.gravity_vector(motion) - wrench)
             truth = np.linalg.solve(np.swapaxes(j_inv, -1, -2), load[..., None])[..., 0]
             truth = truth + friction(p, result.rates)
             assert each_relative(result.forces, truth) < 1e-12
@@ -186,11 +181,11 @@ def test_lengths_are_the_distances_of_the_joints_and_rates_their_derivatives() -
     lengths = np.linalg.norm(ends - p['geometry.base_joints'], axis=-1)
     assert relative(result.lengths, lengths) < 1e-14
     assert np.array_equal(
-        result.lengths, platform.inverse_kinematics(motion.position, motion.rotation))
+        result.lengths, platform.inverse_kinematics(motion))
 
     def lengths_after(h: float) -> Array:
         later = moved(motion, h)
-        return platform.inverse_kinematics(later.position, later.rotation)
+        return platform.inverse_kinematics(later)
 
     assert each_relative(result.rates, derivative(lengths_after, 1e-3)) < 1e-9
 
@@ -203,7 +198,7 @@ def test_rates_are_j_inv_times_the_twist() -> None:
         motion = random_motion(p, random, STATES)
         twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
         rates = np.einsum(
-            'nij,nj->ni', platform.jacobian(motion.position, motion.rotation), twist)
+            'nij,nj->ni', platform.inverse_jacobian(motion), twist)
         assert each_relative(platform.inverse_dynamics(motion).rates, rates) < 1e-13
 
 
@@ -215,9 +210,9 @@ def test_forces_at_rest_balance_the_gravity_vector() -> None:
         moving = random_motion(p, random, STATES)
         rest = Motion(moving.position, moving.rotation)
         forces = platform.inverse_dynamics(rest).forces
-        j_inv = platform.jacobian(rest.position, rest.rotation)
+        j_inv = platform.inverse_jacobian(rest)
         held = np.einsum('nji,nj->ni', j_inv, forces)
-        assert each_relative(held, platform.gravity_vector(rest.position, rest.rotation)) < 1e-13
+        assert each_relative(held, platform.gravity_vector(rest)) < 1e-13
 
 
 def test_power_of_the_legs_and_the_wrench_is_the_change_of_energy_and_the_friction() -> None:
@@ -249,7 +244,7 @@ def test_a_wrench_is_held_by_the_forces_that_balance_it() -> None:
     wrench = random_wrench(p, random, STATES)
     taken = (platform.inverse_dynamics(motion).forces
              - platform.inverse_dynamics(motion, wrench).forces)
-    j_inv = platform.jacobian(motion.position, motion.rotation)
+    j_inv = platform.inverse_jacobian(motion)
     assert each_relative(np.einsum('nji,nj->ni', j_inv, taken), wrench) < 1e-12
     one_for_all = platform.inverse_dynamics(motion, wrench[0])
     assert np.array_equal(one_for_all.forces[3], platform.inverse_dynamics(
@@ -265,13 +260,13 @@ def test_determinant_and_its_rate_are_those_of_j_inv() -> None:
         platform = StewartPlatform(p)
         motion = random_motion(p, random, STATES)
         result = platform.inverse_dynamics(motion)
-        det = np.linalg.det(platform.jacobian(motion.position, motion.rotation))
+        det = np.linalg.det(platform.inverse_jacobian(motion))
         assert relative(result.determinant, det) < 1e-13
 
         def det_after(h: float, platform: StewartPlatform = platform,
                       motion: Motion = motion) -> Array:
             later = moved(motion, h)
-            return np.linalg.det(platform.jacobian(later.position, later.rotation))
+            return np.linalg.det(platform.inverse_jacobian(later))
 
         assert relative(result.determinant_rate, derivative(det_after, 1e-3)) < 1e-8
 
@@ -281,7 +276,7 @@ def test_determinant_rate_holds_up_to_a_singularity() -> None:
 
     def det(angle: float) -> Array:
         motion = turned(np.pi / 2 + angle)
-        return np.linalg.det(platform.jacobian(motion.position, motion.rotation))
+        return np.linalg.det(platform.inverse_jacobian(motion))
 
     truth = derivative(det, 1e-3)[0]
     for short_of in (1e-6, 1e-9, 1e-12):
@@ -313,7 +308,7 @@ def test_unit_load_force_is_reached_by_a_load_and_exceeded_by_none() -> None:
     result = platform.inverse_dynamics(motion)
     loads = random.normal(size=(20000, 6))
     loads /= np.linalg.norm(loads, axis=1, keepdims=True)
-    balance = np.linalg.inv(platform.jacobian(motion.position, motion.rotation).T)
+    balance = np.linalg.inv(platform.inverse_jacobian(motion).T)
     scaled = balance * [1, 1, 1, size, size, size]
     loads = np.vstack([loads, scaled / np.linalg.norm(scaled, axis=1, keepdims=True)])
     forces = np.abs(loads @ scaled.T)
@@ -342,7 +337,7 @@ def test_condition_number_and_determinant_hold_near_a_singularity(decade: int) -
     condition = np.linalg.cond(j)
     allowed = 1e-15 * condition + 1e-13
     assert np.all(np.abs(result[:, CONDITION] / condition - 1.0) < allowed)
-    det = np.linalg.det(platform.jacobian(motion.position, motion.rotation))
+    det = np.linalg.det(platform.inverse_jacobian(motion))
     assert np.all(np.abs(result[:, DETERMINANT] / det - 1.0) < allowed)
 
 
@@ -397,7 +392,7 @@ def test_determinant_rate_holds_where_a_pivot_is_exactly_zero() -> None:
     def determinant(time: float) -> float:
         motion = Motion(np.array([0.0, 0.0, 1.0]) + time * np.array([0.3, 0.2, 0.1]),
                         rotation_about(omega / speed, speed * time))
-        return float(np.linalg.det(platform.jacobian(motion.position, motion.rotation)))
+        return float(np.linalg.det(platform.inverse_jacobian(motion)))
 
     motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.3, 0.2, 0.1], omega)
     found = platform.solve(motion.rows[None])[0]
@@ -447,8 +442,8 @@ def test_a_sample_of_a_batch_of_any_size_is_the_sample_alone_bit_for_bit() -> No
 def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit(
         one_wrench: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     # more threads than there may be processors, and parts that end amid a tile
-    monkeypatch.setattr(platform_module, '_CPUS', 5)
-    monkeypatch.setattr(platform_module, '_SAMPLES_FOR_A_THREAD', 1000)
+    monkeypatch.setattr(batch, '_CPUS', 5)
+    monkeypatch.setattr(batch, '_SAMPLES_FOR_A_THREAD', 1000)
     platform, rows = samples_of_all_kinds(5 * 1000 + 77)
     wrenches = random_wrench(platform.parameters, rng(), 1 if one_wrench else len(rows))
     together = platform.solve(rows, wrenches)
@@ -478,13 +473,13 @@ def test_any_leading_shape_gives_the_same_samples() -> None:
             one = getattr(platform.inverse_dynamics(sample(flat, n), wrench[n]), name)
             assert np.shape(one) == tail
             assert np.array_equal(one, of_batch[n])
-    for function in (platform.jacobian, platform.mass_matrix, platform.gravity_vector,
+    for function in (platform.inverse_jacobian, platform.mass_matrix, platform.gravity_vector,
                      platform.inverse_kinematics):
-        of_grid = function(square.position, square.rotation)
-        of_batch = function(flat.position, flat.rotation)
+        of_grid = function(square)
+        of_batch = function(flat)
         assert of_grid.shape == (3, 4, *of_batch.shape[1:])
         assert np.allclose(of_grid.reshape(of_batch.shape), of_batch, rtol=1e-14, atol=1e-14)
-        assert function(flat.position[0], flat.rotation[0]).shape == of_batch.shape[1:]
+        assert function(flat[0]).shape == of_batch.shape[1:]
 
 
 def test_no_samples_give_no_results() -> None:
@@ -496,9 +491,9 @@ def test_no_samples_give_no_results() -> None:
 
 @pytest.mark.parametrize(('wrench', 'text'), [
     (np.zeros(5), 'must end in'), (5.0, 'must end in'), (np.zeros((4, 6)), 'do not fit'),
-    ('push', 'not an array of numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
+    ('push', 'not an array of real numbers'), ([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], 'finite'),
 ])
-def test_a_wrench_that_does_not_fit_is_refused(wrench: Any, text: str) -> None:
+def test_a_wrench_that_does_not_fit_is_rejected(wrench: Any, text: str) -> None:
     platform = StewartPlatform(symmetric_parameters())
     with pytest.raises(MotionError, match=text) as error:
         platform.inverse_dynamics(turned([0.0, 0.1, 0.2]), wrench)
@@ -517,21 +512,22 @@ def test_many_loads_on_one_pose_are_many_samples() -> None:
 
 
 @pytest.mark.parametrize('position', [[1e200, 0.0, 1.0], None], ids=['far', 'no length'])
-def test_a_leg_without_a_length_is_refused(position: Any) -> None:
+def test_a_leg_without_a_length_is_rejected(position: Any) -> None:
     p = symmetric_parameters()
     platform = StewartPlatform(p)
     if position is None:
         position = p['geometry.base_joints'][1] - p['geometry.platform_joints'][1]
-    for function in (platform.jacobian, platform.mass_matrix, platform.gravity_vector):
+    for function in (platform.inverse_jacobian, platform.mass_matrix, platform.gravity_vector):
         with pytest.raises(MotionError, match='leg [1-6] would have a length'):
-            function(position, np.eye(3))
+            function(Pose(position, np.eye(3)))
     with pytest.raises(MotionError, match='leg [1-6] would have a length'):
-        platform.coriolis_matrix(position, np.eye(3), np.ones(3), np.ones(3))
+        platform.coriolis_matrix(Motion(position, np.eye(3), np.ones(3), np.ones(3)))
 
 
 def test_a_pose_that_overflows_has_no_lengths() -> None:
     with pytest.raises(MotionError, match='overflow'):
-        StewartPlatform(symmetric_parameters()).inverse_kinematics([1e200, 0.0, 1.0], np.eye(3))
+        StewartPlatform(symmetric_parameters()).inverse_kinematics(
+            Pose([1e200, 0.0, 1.0], np.eye(3)))
 
 
 def test_where_machine_code_cannot_be_kept_it_is_compiled_at_every_start(
@@ -575,7 +571,7 @@ assert not COMPILED
 given = np.load({source!r})
 results = np.empty((len(given['rows']), RESULT))
 with np.errstate(all='ignore'):
-    kernel.solve(given['machine'], given['rows'], given['wrenches'], results)
+    kernel.solve(given['constants'], given['rows'], given['wrenches'], results)
 np.save({target!r}, results)
 """
 
@@ -590,7 +586,7 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit(
     for n, machine in enumerate((platform, other)):
         wrenches = random_wrench(machine.parameters, rng(), len(rows))
         source, target = str(tmp_path / f'{n}.npz'), str(tmp_path / f'{n}.npy')
-        np.savez(source, machine=machine.machine, rows=rows, wrenches=wrenches)
+        np.savez(source, constants=machine.constants, rows=rows, wrenches=wrenches)
         code = UNCOMPILED.format(source=source, target=target)
         if without == 'jit':
             run(code, NUMBA_DISABLE_JIT='1')
@@ -622,7 +618,7 @@ print(kernel.__file__, results[0, 0], sep='|')
 """
     platform = StewartPlatform(symmetric_parameters())
     given_arrays = np.empty(3, dtype=object)
-    given_arrays[:] = [platform.machine, turned(0.2).rows, np.zeros((1, 6))]
+    given_arrays[:] = [platform.constants, turned(0.2).rows, np.zeros((1, 6))]
     np.save(tmp_path / 'given.npy', given_arrays)
     where, before = run(code, tmp_path).split('|')
     assert Path(where).parents[2] == tmp_path
@@ -701,6 +697,6 @@ def test_lagrange_reference_names_the_same_jacobian() -> None:
     platform = StewartPlatform(p)
     motion = random_motion(p, random, STATES)
     at = lagrange.legs(p, motion.position, motion.rotation)
-    assert np.array_equal(platform.jacobian(motion.position, motion.rotation),
-                          lagrange.jacobian(at))
+    assert np.array_equal(platform.inverse_jacobian(motion),
+                          lagrange.inverse_jacobian(at))
     assert each_relative(platform.inverse_dynamics(motion).lengths, at.lengths) < 1e-14

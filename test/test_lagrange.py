@@ -46,15 +46,13 @@ class Case(NamedTuple):
 
     def coriolis(self, christoffel: bool) -> Array:
         """Return C of the batch."""
-        return self.platform.coriolis_matrix(
-            self.motion.position, self.motion.rotation, self.motion.linear_velocity,
-            self.motion.angular_velocity, christoffel)
+        return self.platform.coriolis_matrix(self.motion, christoffel)
 
     def mass_rate(self) -> Array:
         """Return M' along the twists, by differences."""
         def mass_after(time: float) -> Array:
             later = moved(self.motion, time)
-            return self.platform.mass_matrix(later.position, later.rotation)
+            return self.platform.mass_matrix(later)
 
         return derivative(mass_after, 1e-3)
 
@@ -68,7 +66,7 @@ def case(request: pytest.FixtureRequest) -> Case:
     motion = random_motion(p, random, STATES)
     return Case(p, platform, motion,
                 np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1),
-                platform.mass_matrix(motion.position, motion.rotation))
+                platform.mass_matrix(motion))
 
 
 def times_vector(matrix: Array, vector: Array) -> Array:
@@ -88,7 +86,7 @@ def test_mass_matrix_gives_the_kinetic_energy_of_the_parts(case: Case) -> None:
 
 
 def test_gravity_vector_is_the_gradient_of_the_potential_energy(case: Case) -> None:
-    gravity = case.platform.gravity_vector(case.motion.position, case.motion.rotation)
+    gravity = case.platform.gravity_vector(case.motion)
     for axis in range(6):
         way = np.tile(np.eye(6)[axis], (STATES, 1))
         # moved() needs a turn to turn about; a vanishing one moves nothing that is seen
@@ -151,10 +149,10 @@ def test_forward_dynamics_of_inverse_dynamics_gives_the_acceleration_back(case: 
     p, motion = case.parameters, case.motion
     wrench = random_wrench(p, rng(), STATES)
     result = case.platform.inverse_dynamics(motion, wrench)
-    j_inv = case.platform.jacobian(motion.position, motion.rotation)
+    j_inv = case.platform.inverse_jacobian(motion)
     load = (np.einsum('nji,nj->ni', j_inv, result.forces - friction(p, result.rates)) + wrench
             - times_vector(case.coriolis(False), case.twist)
-            - case.platform.gravity_vector(motion.position, motion.rotation))
+            - case.platform.gravity_vector(motion))
     acceleration = np.linalg.solve(case.mass, load[..., None])[..., 0]
     given = np.concatenate([motion.linear_acceleration, motion.angular_acceleration], axis=-1)
     assert each_relative(acceleration, given) < 1e-11
@@ -163,9 +161,9 @@ def test_forward_dynamics_of_inverse_dynamics_gives_the_acceleration_back(case: 
 def test_jacobian_rate_is_the_derivative_of_j_inv(case: Case) -> None:
     def jacobian_after(time: float) -> Array:
         later = moved(case.motion, time)
-        return case.platform.jacobian(later.position, later.rotation)
+        return case.platform.inverse_jacobian(later)
 
-    assert each_relative(case.platform.jacobian_rate(case.motion),
+    assert each_relative(case.platform.inverse_jacobian_rate(case.motion),
                          derivative(jacobian_after, 1e-3)) < 1e-9
 
 

@@ -33,7 +33,7 @@ from referees import (  # noqa: E402
 from running import DynamicsNode, nanoseconds, NODE, PLATFORM, Sample  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
-from stewart_dynamics import Parameters, StewartPlatform  # noqa: E402
+from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.nodes import markers as pictures  # noqa: E402
 from stewart_dynamics.nodes.markers import Markers  # noqa: E402
@@ -198,7 +198,7 @@ def test_legs_are_drawn_from_joint_to_joint(parameters: Parameters, to: Setpoint
     drawn = picture(parameters, to)
     tolerance = 1e-13 * (size_of(parameters) + float(np.abs(to.motion[:3]).max()))
     lengths = StewartPlatform(parameters).inverse_kinematics(
-        to.motion[:3], np.reshape(to.motion[3:12], (3, 3)))
+        Pose(to.motion[:3], np.reshape(to.motion[3:12], (3, 3))))
     shortest = parameters['limits.length_min']
     for n, (base, platform) in enumerate(zip(*joints_of(parameters, to), strict=True)):
         piston, cylinder = drawn['pistons', n], drawn['cylinders', n]

@@ -28,24 +28,23 @@ from numpy.typing import NDArray
 import pytest
 from referees import rng
 
-import stewart_dynamics
+import stewart_dynamics.mechanics
 from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 64  # as inverse_dynamics gives it
+MOST_STEPS = 64  # as the kernel has it
 
 
 @pytest.fixture(scope='module')
 def matrix6() -> Iterator[Any]:
     """Return the module as it is where numba is not installed."""
-    names = ('compiled', 'vectors', 'matrix6')
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(sys.modules, 'numba', None)
-        for name in names:
-            importlib.import_module(f'stewart_dynamics.{name}')
-            patch.delitem(sys.modules, f'stewart_dynamics.{name}')
-            patch.setattr(stewart_dynamics, name, None)
+        for name in ('jit', 'vectors', 'matrix6'):
+            importlib.import_module(f'stewart_dynamics.mechanics.{name}')
+            patch.delitem(sys.modules, f'stewart_dynamics.mechanics.{name}')
+            patch.setattr(stewart_dynamics.mechanics, name, None)
         yield importlib.import_module('stewart_dynamics.mechanics.matrix6')
 
 

@@ -29,7 +29,7 @@ import pytest
 from referees import random_parameters, rng, size_of
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.replay.measured import Comparison
+from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
@@ -101,10 +101,10 @@ def compared(comparison: Comparison, *given: Any) -> list[Array]:
     return [np.concatenate(each) for each in zip(*blocks, strict=True)]
 
 
-# The residual and its wrench
+# The residual and the external wrench
 
 @pytest.mark.parametrize('seed', range(4))
-def test_the_residual_wrench_is_the_negative_of_the_load_that_touched(seed: int) -> None:
+def test_the_external_wrench_is_the_load_that_the_model_does_not_know(seed: int) -> None:
     case = case_of(seed)
     load = rng(seed).uniform(-300.0, 300.0, (500, 6))
     forces = case.forces(load)
@@ -114,10 +114,10 @@ def test_the_residual_wrench_is_the_negative_of_the_load_that_touched(seed: int)
     assert np.array_equal(seconds, case.seconds)
     assert np.array_equal(measured, forces)
     assert np.array_equal(computed, case.outputs.demanded_forces)
-    assert np.max(np.abs(wrench + load)) < 1e-9 * np.max(np.abs(forces))
+    assert np.max(np.abs(wrench - load)) < 1e-9 * np.max(np.abs(forces))
     # by the library's matrix
-    j_inv = StewartPlatform(case.parameters).jacobian(case.motion.position, case.motion.rotation)
-    assert np.allclose(wrench, np.einsum('nij,ni->nj', j_inv, measured - computed),
+    j_inv = StewartPlatform(case.parameters).inverse_jacobian(case.motion)
+    assert np.allclose(wrench, np.einsum('nij,ni->nj', j_inv, computed - measured),
                        rtol=0.0, atol=1e-9 * np.max(np.abs(forces)))
 
     values = comparison.values()
@@ -126,7 +126,7 @@ def test_the_residual_wrench_is_the_negative_of_the_load_that_touched(seed: int)
     for number, (axis, unit) in enumerate([
             ('force_x', 'n'), ('force_y', 'n'), ('force_z', 'n'),
             ('moment_x', 'n_m'), ('moment_y', 'n_m'), ('moment_z', 'n_m')]):
-        column, found = wrench[:, number], values['wrench'][axis]
+        column, found = wrench[:, number], values['external_wrench'][axis]
         at = int(np.argmax(np.abs(column)))
         assert found == {
             f'rms_{unit}': pytest.approx(np.sqrt(np.mean(column ** 2)), rel=1e-12),
@@ -161,10 +161,10 @@ def test_a_load_that_the_model_knows_leaves_no_residual() -> None:
         comparison, Case(case.parameters, case.motion, case.seconds, with_load, outputs),
         (batch.stamps, case.forces(load)))
     assert np.max(np.abs(wrench)) < 1e-9
-    assert comparison.values()['touches']['count'] == 0
+    assert comparison.values()['contacts']['count'] == 0
 
 
-def test_a_touch_may_last_for_nearly_half_of_the_bag() -> None:
+def test_a_contact_may_last_for_nearly_half_of_the_bag() -> None:
     case = case_of(many=1000)
     comparison = Comparison(case.parameters)
     load = np.where(((case.seconds >= 3.0) & (case.seconds < 7.0))[:, None],
@@ -174,11 +174,11 @@ def test_a_touch_may_last_for_nearly_half_of_the_bag() -> None:
     compared(comparison, case, (case.setpoints.stamps,
                                 forces + 1e-4 * scale * rng().normal(size=forces.shape)))
     values = comparison.values()
-    touches = values['touches']
-    assert touches['count'] == 1
-    assert touches['strongest'][0]['from_s'] == pytest.approx(3.0, abs=0.02)
-    assert touches['strongest'][0]['to_s'] == pytest.approx(7.0, abs=0.02)
-    assert touches['strongest'][0]['force_n'][2] == pytest.approx(-200.0, rel=0.2)
+    contacts = values['contacts']
+    assert contacts['count'] == 1
+    assert contacts['strongest'][0]['from_s'] == pytest.approx(3.0, abs=0.02)
+    assert contacts['strongest'][0]['to_s'] == pytest.approx(7.0, abs=0.02)
+    assert contacts['strongest'][0]['force_n'][2] == pytest.approx(-200.0, rel=0.2)
     # and no friction is made of it
     assert all(leg['viscous_friction_n_s_m'] is None for leg in values['legs'].values())
 
@@ -218,13 +218,13 @@ def test_a_payload_that_is_missing_is_found() -> None:
     found = comparison.values()['mass']
     assert found['unmodelled_kg'] == pytest.approx(35.0, rel=1e-9)
     assert found['share'] == pytest.approx(1.0, rel=1e-9)
-    # heavier: the legs push against gravity, that is the sign of the residual wrench
-    assert np.mean(wrench[:, :3] @ given['gravity']) < 0.0
+    # heavier: the external force has the direction of gravity
+    assert np.mean(wrench[:, :3] @ given['gravity']) > 0.0
 
 
-# What touched it, and when
+# Contacts
 
-def test_a_touch_is_found_with_its_time_and_load() -> None:
+def test_a_contact_is_found_with_its_time_and_load() -> None:
     case = case_of(many=3000)
     random = rng()
     load = np.zeros((3000, 6))
@@ -233,29 +233,29 @@ def test_a_touch_is_found_with_its_time_and_load() -> None:
     noise = random.normal(0.0, 1.0, (3000, 6))
     comparison = Comparison(case.parameters)
     compared(comparison, case, (case.setpoints.stamps, case.forces(load) + noise))
-    touches = comparison.values()['touches']
-    assert touches['count'] == 2
-    push, blow = touches['strongest']
-    assert push['from_s'] == pytest.approx(12.0, abs=touches['resolution_s'])
-    assert push['to_s'] == pytest.approx(12.29, abs=touches['resolution_s'])
+    contacts = comparison.values()['contacts']
+    assert contacts['count'] == 2
+    push, blow = contacts['strongest']
+    assert push['from_s'] == pytest.approx(12.0, abs=contacts['resolution_s'])
+    assert push['to_s'] == pytest.approx(12.29, abs=contacts['resolution_s'])
     assert push['axis'] == 'force_z'
     assert push['force_n'][2] == pytest.approx(-400.0, abs=30.0)
-    assert blow['from_s'] == pytest.approx(20.0, abs=touches['resolution_s'])
+    assert blow['from_s'] == pytest.approx(20.0, abs=contacts['resolution_s'])
     assert blow['axis'] == 'moment_x'
     assert blow['moment_n_m'][0] == pytest.approx(900.0, abs=30.0)
-    assert touches['resolution_s'] < 0.01
+    assert contacts['resolution_s'] < 0.01
 
 
-def test_a_payload_and_noise_are_no_touch() -> None:
+def test_a_payload_and_noise_are_no_contact() -> None:
     case = case_of(many=3000)
     load = np.array([0.0, 0.0, -500.0, 30.0, 0.0, 0.0]) + np.zeros((3000, 1))
     comparison = Comparison(case.parameters)
     compared(comparison, case, (case.setpoints.stamps,
                                 case.forces(load) + rng().normal(0.0, 20.0, (3000, 6))))
-    assert comparison.values()['touches']['count'] == 0
+    assert comparison.values()['contacts']['count'] == 0
 
 
-def test_times_of_touches_hold_in_a_recording_of_hours() -> None:
+def test_times_of_contacts_hold_in_a_recording_of_hours() -> None:
     case = case_of(many=2000)
     comparison = Comparison(case.parameters)
     # the same 20 s over and over, 10 minutes apart, for 9 hours
@@ -269,17 +269,17 @@ def test_times_of_touches_hold_in_a_recording_of_hours() -> None:
         comparison.add_measured(batch.stamps, case.forces(load))
         comparison.add_setpoints(case.seconds + later, batch, case.outputs)
     comparison.finish()
-    touches = comparison.values()['touches']
-    assert touches['count'] == 1
-    touch = touches['strongest'][0]
-    assert touch['axis'] == 'force_x'
-    assert touch['force_n'][0] == pytest.approx(1000.0, rel=1e-6)
-    assert touches['resolution_s'] <= 4.0
-    assert abs(touch['from_s'] - at_s) <= touches['resolution_s']
-    assert abs(touch['to_s'] - at_s - 0.19) <= touches['resolution_s']
+    contacts = comparison.values()['contacts']
+    assert contacts['count'] == 1
+    contact = contacts['strongest'][0]
+    assert contact['axis'] == 'force_x'
+    assert contact['force_n'][0] == pytest.approx(1000.0, rel=1e-6)
+    assert contacts['resolution_s'] <= 4.0
+    assert abs(contact['from_s'] - at_s) <= contacts['resolution_s']
+    assert abs(contact['to_s'] - at_s - 0.19) <= contacts['resolution_s']
 
 
-def test_the_strongest_hundred_touches_are_listed_in_order_of_time() -> None:
+def test_the_strongest_hundred_contacts_are_listed_in_order_of_time() -> None:
     case = case_of(many=20_000)
     load = np.zeros((20_000, 6))
     strengths = rng().uniform(3000.0, 9000.0, 150)
@@ -287,12 +287,12 @@ def test_the_strongest_hundred_touches_are_listed_in_order_of_time() -> None:
         load[100 + 120 * number, 1] = strength
     comparison = Comparison(case.parameters)
     compared(comparison, case, (case.setpoints.stamps, case.forces(load)))
-    touches = comparison.values()['touches']
-    assert touches['count'] == 150
-    found = [each['force_n'][1] for each in touches['strongest']]
+    contacts = comparison.values()['contacts']
+    assert contacts['count'] == 150
+    found = [each['force_n'][1] for each in contacts['strongest']]
     assert found == pytest.approx([each for each in strengths
                                    if each >= np.sort(strengths)[50]], rel=1e-6)
-    times = [each['from_s'] for each in touches['strongest']]
+    times = [each['from_s'] for each in contacts['strongest']]
     assert times == sorted(times)
 
 
@@ -341,9 +341,10 @@ def test_nothing_compared_gives_null() -> None:
     assert values['setpoints_compared'] == values['samples'] == 0
     assert values['setpoints_not_compared']['without_measurement'] == 3
     assert values['legs']['leg_1'] == dict.fromkeys(values['legs']['leg_1'])
-    assert values['wrench']['force_x'] == dict.fromkeys(values['wrench']['force_x'])
+    force = values['external_wrench']['force_x']
+    assert force == dict.fromkeys(force)
     assert values['mass'] == {'unmodelled_kg': None, 'share': None}
-    assert values['touches']['count'] == 0
+    assert values['contacts']['count'] == 0
 
 
 def test_standing_still_tells_no_friction() -> None:

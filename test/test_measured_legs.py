@@ -28,7 +28,7 @@ import pytest
 from test_external_wrench import (
     BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, six, swing)
 
-from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
@@ -180,7 +180,7 @@ def test_a_machine_that_is_singular_everywhere_is_rejected() -> None:
     similar = MACHINE.replaced({
         'geometry.base_joints': (1.5 * MACHINE['geometry.platform_joints']).ravel()})
     followed = Followed(similar)
-    lengths = StewartPlatform(similar).inverse_kinematics([0.0, 0.0, 1.1], np.eye(3))
+    lengths = StewartPlatform(similar).inverse_kinematics(Pose([0.0, 0.0, 1.1], np.eye(3)))
     followed.rejects(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
 
 

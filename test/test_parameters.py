@@ -29,8 +29,8 @@ from referees import ROOT
 import yaml
 
 from stewart_dynamics import (
-    MotionError, ParameterError, Parameters, PoseError, StewartError, StewartPlatform)
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+    MotionError, ParameterError, Parameters, Pose, PoseError, StewartError, StewartPlatform)
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.parameter_files import flat, other_nodes, read_yaml
 from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.parameters_yaml import read_document
@@ -180,7 +180,7 @@ def test_the_package_s_own_files_hold_sections_that_can_be_read(file: str) -> No
 
 def test_the_hexapod_of_the_package_can_be_computed() -> None:
     platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
-    lengths = platform.inverse_kinematics([0.0, 0.0, 1.0], np.eye(3))
+    lengths = platform.inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
     assert np.all(lengths > 0.0)
 
 
@@ -665,7 +665,8 @@ def test_an_error_about_an_argument_is_a_value_error() -> None:
 
 @pytest.mark.parametrize('file', ['platform.yaml', 'simulator.yaml', 'trajectory_sine.yaml'])
 def test_a_whole_file_is_written_that_reads_back_equal(tmp_path: Path, file: str) -> None:
-    kind: Any = {'p': Parameters, 's': SimulatorParameters, 't': TrajectoryParameters}[file[0]]
+    kind: Any = {'p': Parameters, 's': SimulatorParameters,
+                 't': ReferenceMotionParameters}[file[0]]
     config = ROOT / 'config'
     hexapod = read_yaml(config / 'platform.yaml', kind.node) if file[0] == 's' else {}
     parameters = kind({**hexapod, **read_yaml(config / file, kind.node)})

@@ -27,14 +27,13 @@ from simulated import simulated, UNLIMITED
 from trajectories import (
     Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.rotation import from_euler, to_quaternion
+from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
-from stewart_dynamics.runtime.planned_trajectory import (
-    check_planned_trajectory, PlannedTrajectory)
+from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory, PlannedTrajectory
 from stewart_dynamics.runtime.planned_trajectory_checks import LIMIT, SINGULAR
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.step import Setpoint, Step
@@ -85,6 +84,7 @@ def test_at_the_points_the_legs_are_those_of_inverse_dynamics() -> None:
     ({'times': [0.0, 1.0, 2.0]}, 'times: shape (3,): must end in (4,)'),
     ({'times': [[0.0, 1.0, 2.0, 3.0]]}, 'times: shape (1, 4): must be (4,)'),
     ({'motion': Motion([0.0, 0.0, 1.1], np.eye(3))}, 'motion: shape (): must be (N,)'),
+    ({'motion': np.zeros((4, 24))}, 'motion: a value of type ndarray: must be a Motion'),
     ({'wrench': np.zeros((4, 6))}, 'wrench: shape (4, 6): must be (6,)'),
     ({'wrench': np.zeros(5)}, 'wrench: shape (5,)')], ids=str)
 def test_arguments_that_do_not_fit_are_errors(change: dict[str, object], said: str) -> None:
@@ -323,7 +323,7 @@ def test_where_the_legs_fold_up_on_a_wide_way_is_found() -> None:
 def test_a_hexapod_on_its_end_stops_may_leave_them() -> None:
     platform = StewartPlatform(PARAMETERS)
     parked = platform.forward_kinematics(
-        PARAMETERS['limits.length_min'], ([0.0, 0.0, 0.8], np.eye(3)))
+        PARAMETERS['limits.length_min'], Pose([0.0, 0.0, 0.8], np.eye(3)))
     for digits, accepted in ((12, True), (3, False)):  # 1e-3 m below is no rounding
         position = [*parked.position.round(15).tolist()[:2],
                     math.floor(parked.position[2] * 10.0 ** digits) / 10.0 ** digits]
@@ -375,7 +375,7 @@ def test_where_the_legs_lead_the_platform_to_a_singularity_is_found() -> None:
     squares = cubic_between(times, rows)[1] ** 2
     apart = np.abs(squares[:, ::2].sum(axis=1) - squares[:, 1::2].sum(axis=1))
     limit = StewartPlatform(UNBOUND).inverse_kinematics(
-        [0.0, 0.0, 0.8], from_euler([0.0, 0.0, np.pi / 2.0])) ** 2
+        Pose.from_euler([0.0, 0.0, 0.8], [0.0, 0.0, np.pi / 2.0])) ** 2
     assert apart.max() > abs(limit[::2].sum() - limit[1::2].sum())
     result = check((times, rows), UNBOUND)
     assert result.reason == SINGULAR

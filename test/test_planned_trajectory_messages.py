@@ -30,7 +30,8 @@ from trajectories import (
 
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
-from stewart_dynamics.runtime import planned_trajectory, planned_trajectory_messages as planned
+from stewart_dynamics.runtime import planned_trajectory
+from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.planned_trajectory import NOT_INCREASING, PIECE, TOO_FAR
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 

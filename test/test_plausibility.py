@@ -25,8 +25,9 @@ import numpy as np
 import pytest
 from referees import random_parameters, ROOT, symmetric_parameters
 
-from stewart_dynamics import Motion, ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.plausibility import doubts, homes
+from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
+from stewart_dynamics.mechanics.home_pose import homes
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.rotation import from_euler
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -102,18 +103,18 @@ MACHINES = {
 
 
 @pytest.mark.parametrize('name', MACHINES)
-def test_good_machines_give_no_doubts(name: str) -> None:
-    assert doubts(Parameters(MACHINES[name])) == ()
+def test_good_machines_give_no_warnings(name: str) -> None:
+    assert likely_mistakes(Parameters(MACHINES[name])) == ()
 
 
 def test_the_machine_of_the_package_gives_none() -> None:
-    assert doubts(PLATFORM) == ()
-    assert doubts(symmetric_parameters()) == ()
+    assert likely_mistakes(PLATFORM) == ()
+    assert likely_mistakes(symmetric_parameters()) == ()
 
 
 def test_random_machines_give_none() -> None:
     for seed in range(100):
-        assert doubts(random_parameters(np.random.default_rng(seed))) == ()
+        assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
 
 
 # Slips: what is changed in the package's machine, and what of it is said, word for word
@@ -206,11 +207,11 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
 @pytest.mark.parametrize('name', SLIPS)
 def test_a_slip_is_said(name: str) -> None:
     changes, texts = SLIPS[name]
-    found = doubts(PLATFORM.replaced({
+    found = likely_mistakes(PLATFORM.replaced({
         name: np.ravel(value) if np.ndim(value) else value for name, value in changes.items()}))
     for text in texts:
-        assert any(text in doubt for doubt in found), found
-    assert all(doubt.isprintable() for doubt in found)
+        assert any(text in mistake for mistake in found), found
+    assert all(mistake.isprintable() for mistake in found)
 
 
 def test_one_slip_is_said_once() -> None:
@@ -219,7 +220,7 @@ def test_one_slip_is_said_once() -> None:
     for name in set(SLIPS) - several:
         changes = {key: np.ravel(value) if np.ndim(value) else value
                    for key, value in SLIPS[name][0].items()}
-        assert len(doubts(PLATFORM.replaced(changes))) == 1, name
+        assert len(likely_mistakes(PLATFORM.replaced(changes))) == 1, name
 
 
 def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:
@@ -228,10 +229,10 @@ def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:
         'singularity.warn_condition': 10.0, 'singularity.stop_condition': 12.0,
         'geometry.zero_length': 1.3,
         'limits.length_min': (), 'limits.length_max': ()})
-    (doubt,) = doubts(turned)
-    assert doubt.startswith(
+    (mistake,) = likely_mistakes(turned)
+    assert mistake.startswith(
         'geometry: nearly singular at home (the axes parallel, a mean leg of 1.3 m)')
-    figure = float(doubt.split('condition number is ')[1].split(',')[0])
+    figure = float(mistake.split('condition number is ')[1].split(',')[0])
     # At home the mean leg has the zero length: found again by the lengths themselves.
     platform = StewartPlatform(turned)
     heights = np.linspace(0.1, 2.0, 19001)
@@ -248,9 +249,10 @@ def test_a_home_that_is_turned_is_found_by_the_limits() -> None:
     platform = np.roll(there, 1, axis=0) @ from_euler([0.0, 0.0, -np.pi / 2.0]).T
     good = machine(ring(0.9, 12.0), platform, 150.0, 20.0, limits__length_min=1.15,
                    limits__length_max=1.25)
-    assert doubts(Parameters(good)) == ()
-    (doubt,) = doubts(Parameters({**good, 'limits.length_min': (), 'limits.length_max': ()}))
-    assert 'singular at home (the axes parallel, at any height)' in doubt
+    assert likely_mistakes(Parameters(good)) == ()
+    (mistake,) = likely_mistakes(Parameters(
+        {**good, 'limits.length_min': (), 'limits.length_max': ()}))
+    assert 'singular at home (the axes parallel, at any height)' in mistake
 
 
 def test_home_is_where_the_mean_leg_is_halfway_between_its_limits() -> None:
@@ -260,7 +262,7 @@ def test_home_is_where_the_mean_leg_is_halfway_between_its_limits() -> None:
     assert positions[0, 2] == -positions[1, 2] > 0.9
     assert np.allclose(positions[:, :2], 0.0, atol=1e-9)
     assert np.allclose(rotations, np.eye(3), atol=1e-12)
-    lengths = StewartPlatform(machine).inverse_kinematics(positions, rotations)
+    lengths = StewartPlatform(machine).inverse_kinematics(Pose(positions, rotations))
     assert np.allclose(np.mean(lengths, axis=1), 1.3, rtol=0.0, atol=1e-9)
 
 
@@ -285,14 +287,14 @@ def test_of_whatever_passes_the_rules_there_are_words(
             **changes})
     except ParameterError:
         assume(False)
-    for doubt in doubts(parameters):
-        assert doubt.isprintable()
-        assert len(doubt) < 500
+    for mistake in likely_mistakes(parameters):
+        assert mistake.isprintable()
+        assert len(mistake) < 500
 
 
 def test_of_a_payload_what_is_said_is_what_is_said_of_the_machine() -> None:
     p = PLATFORM.replaced({'platform.inertia': [1e9, 0.0, 0.0, 1e9, 0.0, 1e9],
                            'limits.length_max': 0.165, 'limits.length_min': ()})
-    said, of_payload = doubts(p), doubts(p, geometry=False)
+    said, of_payload = likely_mistakes(p), likely_mistakes(p, geometry=False)
     assert len(said) > len(of_payload) == 1
     assert said[:1] == of_payload

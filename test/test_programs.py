@@ -23,13 +23,13 @@ import sys
 import pytest
 from referees import ROOT
 
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.nodes.programs import usage
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
-            'trajectory': TrajectoryParameters}
+            'trajectory': ReferenceMotionParameters}
 HEAVY = ('numba', 'scipy', 'rclpy', 'rosbags')
 
 # Without ROS: none of what it brings can be imported. The last line says what was loaded.

@@ -27,8 +27,7 @@ import pytest
 
 from stewart_dynamics.nodes import simulator_messages
 from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.runtime import input_topics, output_messages
-from stewart_dynamics.runtime import planned_trajectory_messages as planned
+from stewart_dynamics.runtime import input_topics, output_messages, planned_trajectory_messages
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])
@@ -68,8 +67,8 @@ def test_a_table_without_its_comments_is_an_error(tables: ModuleType) -> None:
 def test_topics_are_those_of_the_code() -> None:
     node = {**input_topics.INPUT_TYPES, **output_messages.OUTPUT_TYPES,
             'markers': 'visualization_msgs/msg/MarkerArray',
-            planned.INPUT: planned.INPUT_TYPE,
-            planned.OUTPUT: planned.OUTPUT_TYPE}
+            planned_trajectory_messages.INPUT: planned_trajectory_messages.INPUT_TYPE,
+            planned_trajectory_messages.OUTPUT: planned_trajectory_messages.OUTPUT_TYPE}
     for pages, topics in ((('README.md', 'docs/node.md'), node),
                           (('docs/simulator.md',), {
                               **simulator_messages.INPUT_TYPES,

@@ -19,18 +19,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from io import BytesIO
 import math
 import os
 from pathlib import Path
 import random
 import sqlite3
+import tempfile
 import tracemalloc
 from typing import Any, NamedTuple
 import zlib
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import lz4.frame
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
@@ -41,12 +44,16 @@ from messages import STORE
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
 import zstandard
 
 from stewart_dynamics import BagError, Parameters
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.one import BAD_INPUT, DONE, NODE, Options, PARTLY_READ, replay
+from stewart_dynamics.replay.mcap_layout import LARGEST_CHUNK
+from stewart_dynamics.replay.one_bag import replay as replay_one
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, NODE, Options, PARTLY_READ
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.input_topics import ACCEL, INPUT_TYPES, POSE, TWIST
 
@@ -272,7 +279,8 @@ def test_no_bit_of_the_chain_of_records_can_mislead(kind: str, tmp_path: Path) -
             spoiled[at + bit // 8] ^= 1 << bit % 8
             file.write_bytes(spoiled)
             whole += check(file, given_)
-    assert whole > 300
+    # without an index the chain is read up to where it breaks
+    assert whole > (300 if kind == 'plain' else 150)
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -283,13 +291,14 @@ def test_a_bag_cut_by_twenty_bytes_is_read_to_its_end(kind: str, tmp_path: Path)
     found = read(file)
     assert found.messages == given_
     assert found.missing
-    replayed = replay(file, PARAMETERS, tmp_path / 'out', Options(report=False))
+    replayed = replay_one(file, PARAMETERS, tmp_path / 'out', Options(report=False))
     assert replayed.code == PARTLY_READ
     assert replayed.summary['setpoints']['answered'] == 60
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_a_damage_costs_no_more_than_its_chunk(kind: str, tmp_path: Path) -> None:
+def test_a_damage_costs_its_chunk_or_what_follows_without_an_index(
+        kind: str, tmp_path: Path) -> None:
     given_ = motion(60)
     content = mcap(given_, **KINDS[kind])
     file = tmp_path / 'bag.mcap'
@@ -304,7 +313,12 @@ def test_a_damage_costs_no_more_than_its_chunk(kind: str, tmp_path: Path) -> Non
         assert is_part(found.messages, given_)
         lost = [n for n, each in enumerate(given_) if each not in found.messages]
         assert lost == list(range(lost[0], lost[-1] + 1))
-        assert len(lost) < 2 * len(given_) / len(chunks)
+        in_its_head = at <= chunks[2] + 45
+        if 'without' in kind and in_its_head:
+            assert lost[-1] == len(given_) - 1
+            assert len(given_) / len(chunks) < lost[0] < 3 * len(given_) / len(chunks)
+        else:
+            assert len(lost) < 2 * len(given_) / len(chunks)
         assert any(f'byte {chunks[2]}' in said for said in found.missing)
 
 
@@ -562,6 +576,55 @@ def test_what_a_chunk_says_of_its_size_is_not_believed(
         assert peak_of(file) < 10_000_000
 
 
+def test_messages_that_become_large_do_not_fill_the_memory(tmp_path: Path) -> None:
+    zeros = zstandard.ZstdCompressor().compress(bytes(1 << 24))
+    small = zstandard.ZstdCompressor().compress(bytes(1 << 20))
+    file = tmp_path / 'bag.mcap'
+    for frame, size in ((zeros, len(zeros)), (small, 1 << 20)):
+        given_ = [(f'{NODE}/{POSE}', RECORDED + n, frame) for n in range(150)]
+        file.write_bytes(mcap(given_, compression=CompressionType.ZSTD))
+        assert file.stat().st_size < 100_000
+        found = read(file)
+        assert [len(data) for _, _, data in found.messages] == [size] * 150
+        found.messages.clear()
+        assert peak_of(file) < 80_000_000
+
+
+@pytest.mark.parametrize('compression', ['', 'zstd', 'lz4'])
+def test_a_chunk_that_is_too_large_is_missing(compression: str, tmp_path: Path) -> None:
+    whole = message(1, 2, bytes(LARGEST_CHUNK))
+    packed = {'': lambda data: data, 'zstd': zstandard.ZstdCompressor().compress,
+              'lz4': lz4.frame.compress}[compression](whole)
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(file_of(
+        schema(1, 'a/msg/A'), channel(1, '/a'), chunk(message(1, 1), 1),
+        chunk(whole, 2, compression=compression, packed=packed), chunk(message(1, 3), 3)))
+    del whole, packed
+    found = read(file)
+    assert [when for _, when, _ in found.messages] == [1, 3]
+    assert len(found.missing) == 1
+    assert f'at most {LARGEST_CHUNK} are read' in found.missing[0]
+    assert peak_of(file) < 10_000_000
+
+
+def test_a_compressed_file_is_not_unpacked_without_a_bound(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    packer = zstandard.ZstdCompressor().compressobj()
+    packed = packer.compress(mcap(motion(5)))
+    for _ in range(300):
+        packed += packer.compress(bytes(1 << 20))
+    file = tmp_path / 'bag.mcap.zstd'
+    file.write_bytes(packed + packer.flush())
+    assert file.stat().st_size < 60_000
+    recording = Recording(file)
+    unpacked = [path for path in tmp_path.rglob('*') if path.is_file() and path != file]
+    assert sum(path.stat().st_size for path in unpacked) <= 1 << 26
+    recording.close()
+    assert list(tmp_path.iterdir()) == [file]
+    assert 'unpacks to more than 1000 times its size' in recording.missing[0]
+
+
 # Whatever bytes
 
 @given(st.binary(max_size=300), st.sampled_from([MAGIC, b'SQLite format 3\0', b'']),
@@ -659,7 +722,7 @@ def test_sqlite3_that_has_lost_rows_says_so(tmp_path: Path) -> None:
     file = storage(write_bag(tmp_path / 'bag', given_))
     content = file.read_bytes()
     chance = random.Random(6)
-    lost = 0
+    lost = rejected = 0
     for _ in range(200):
         # the head of a page: how many rows are in it, and where
         at = 4096 * chance.randrange(1, len(content) // 4096) + chance.randrange(8)
@@ -668,10 +731,12 @@ def test_sqlite3_that_has_lost_rows_says_so(tmp_path: Path) -> None:
         try:
             found = read(file)
         except BagError:
+            rejected += 1
             continue
         assert found.messages == given_ or found.missing
         lost += len(found.messages) < len(given_)
-    assert lost > 20
+    assert lost > 10
+    assert rejected > 10
 
 
 def test_rows_that_are_no_messages_are_missing(tmp_path: Path) -> None:
@@ -686,7 +751,7 @@ def test_rows_that_are_no_messages_are_missing(tmp_path: Path) -> None:
     database.close()
     found = read(file)
     assert found.messages == given_
-    assert found.missing == [f'{file.name}: 4 messages that are none']
+    assert found.missing == [f'{file.name}: 4 rows that are not messages']
 
 
 @pytest.mark.parametrize('suffix', ['-wal', '-journal'])
@@ -700,6 +765,73 @@ def test_what_a_killed_recorder_left_beside_sqlite3_is_said(suffix: str, tmp_pat
     assert len(found.messages) == 6
     assert len(found.missing) == 1
     assert journal.name in found.missing[0]
+
+
+# ROS 1
+
+def write_ros_1(file: Path, of: Iterable[Recorded], compression: Writer1.CompressionFormat | None,
+                ) -> Path:
+    """Write a bag of ROS 1, whose headers have a number more."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    writer = Writer1(file)
+    if compression is not None:
+        writer.set_compression(compression)
+    with writer:
+        connections: dict[str, Any] = {}
+        for n, (topic, when, data) in enumerate(of):
+            kind = TYPES[topic]
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            read = STORE.deserialize_cdr(data, kind)
+            header = store.types['std_msgs/msg/Header'](n, read.header.stamp,
+                                                        read.header.frame_id)
+            writer.write(connections[topic], when, store.serialize_ros1(
+                replace(read, header=header), kind))
+    return file
+
+
+@pytest.mark.parametrize('compression', [None, *Writer1.CompressionFormat])
+def test_bags_of_ros_1_are_converted(
+        compression: Writer1.CompressionFormat | None, tmp_path: Path) -> None:
+    given_ = motion(200)
+    folder = tmp_path / 'a folder, 50% of it? #1'
+    folder.mkdir()
+    files = [write_ros_1(folder / f'bag_{n}.bag', given_[300 * n:300 * n + 300], compression)
+             for n in range(2)]
+    found = read(files[0])
+    assert found[:2] == (given_[:300], [])
+    assert 'no checksums' in found.notices[0]
+    assert read(folder)[:2] == (given_, [])
+    assert read(files[0], f'{NODE}/{TWIST}').messages == given_[1:300:3]
+    # a topic that is not there is not all of them
+    assert read(files[0], '/none').messages == []
+
+
+def test_damaged_bags_of_ros_1_are_never_a_crash(tmp_path: Path) -> None:
+    given_ = motion(60)
+    file = write_ros_1(tmp_path / 'bag.bag', given_, Writer1.CompressionFormat.LZ4)
+    content = file.read_bytes()
+    chance = random.Random(7)
+    for n in range(200):
+        file.write_bytes((cut, flipped, zeroed, shifted)[n % 4](content, chance))
+        try:
+            found = read(file)
+        except BagError as exc:
+            assert '\n' not in str(exc)
+        else:
+            assert all('\n' not in said for said in found.missing)
+
+
+def test_a_type_of_ros_1_with_another_definition_is_another_type(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Writer1(tmp_path / 'bag.bag') as writer:
+        writer.add_connection('/a', TYPES[f'{NODE}/{POSE}'], msgdef='float64 x\n', md5sum='0' * 32)
+        writer.add_connection('/b', TYPES[f'{NODE}/{POSE}'], typestore=store)
+        writer.write(writer.connections[0], 1, bytes(8))
+    recording = Recording(tmp_path / 'bag.bag')
+    recording.close()
+    assert recording.topics == {'/a': 'geometry_msgs/msg/PoseStamped of another definition',
+                                '/b': 'geometry_msgs/msg/PoseStamped'}
 
 
 # Folders

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 import csv
+from dataclasses import replace
 import json
 import math
 import os
@@ -49,16 +50,15 @@ from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.force_breakdown import CAUSES
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.one import (
-    BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ, replay, Replayed)
+from stewart_dynamics.replay.one_bag import replay, Replayed
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
-from stewart_dynamics.runtime.rejections import (
-    MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE)
+from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -321,7 +321,7 @@ def expected_of(name: str) -> tuple[list[int], Counter[tuple[str, str]]]:
 
 def refusals(result: Replayed) -> dict[tuple[str, str], int]:
     return {(each['topic'], each['reason']): each['count']
-            for each in result.summary['refused']}
+            for each in result.summary['rejected']}
 
 
 def test_the_flaws_are_counted_as_they_are_in_the_bag(tmp_path: Path) -> None:
@@ -402,7 +402,8 @@ def test_a_combined_bag_gives_the_numbers_of_the_separate_one(tmp_path: Path) ->
     assert outputs_of(out / 'combined').rows == outputs_of(out / 'separate').rows
 
 
-def test_a_bag_of_poses_is_quasi_static(tmp_path: Path) -> None:
+def test_a_bag_of_poses_is_quasi_static(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_bag(tmp_path / 'poses', motion(30)[::3])
     params = parameter_file(tmp_path, 'setpoint: {source: pose}')
     assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out')]) == DONE
@@ -411,6 +412,36 @@ def test_a_bag_of_poses_is_quasi_static(tmp_path: Path) -> None:
     rows = outputs_of(tmp_path / 'out' / 'poses').rows
     assert [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']]
             for row in rows] == still.forces.tolist()
+    # what poses cannot tell is not known, and not zero
+    assert {row[f'{leg} rate (m/s)'] for row in rows for leg in PARAMETERS['joints']} == {''}
+    assert {row['d(det(J))/dt (m^3/s)'] for row in rows} == {''}
+    capsys.readouterr()
+    for options, code in (((), LIMIT_MET), (('--differentiate', '--cutoff', '5'), DONE)):
+        assert main([str(bag), '--params', str(params), '--output', str(tmp_path / f'{code}'),
+                     '--strict', '--no-report', *options]) == code
+        said = capsys.readouterr().out
+        assert ('limits.velocity_max could not be checked' in said) is (code == LIMIT_MET)
+        assert ('all limits held' in said) is (code == DONE)
+
+
+def test_names_of_a_bag_do_not_control_the_terminal(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hostile = '/a\x1b[2J\rb'
+    bag = write_bag(tmp_path / 'bag', [*motion(3), (hostile, RECORDED, messages.wrench(0))],
+                    **{hostile[1:]: INPUT_TYPES[WRENCH]})
+    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    said = capsys.readouterr().out
+    assert '/a\\x1b[2J\\rb' in said
+    assert not set(said) & {'\x1b', '\r'}
+
+
+@pytest.mark.parametrize('name', ['', '/', 'a b', '1st', 'a//b'])
+def test_a_name_that_no_node_can_have_is_rejected(
+        name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), '--node', name])
+    assert caught.value.code == BAD_INPUT
+    assert 'not a name of a node' in capsys.readouterr().err
 
 
 def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
@@ -452,7 +483,7 @@ def test_a_time_that_no_stamp_can_hold_is_counted(
         (topic, late + n, write(0)) for n in (-1, 0) for topic, write in (
             (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))])
     assert run(bag, tmp_path / 'out') == DONE
-    assert 'refused, setpoint: 1 out of range' in capsys.readouterr().out
+    assert 'setpoint: 1 rejected: out of range' in capsys.readouterr().out
     assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 1
 
 
@@ -463,7 +494,7 @@ def test_a_bag_that_loops_is_followed_and_said(
     assert run(bag, tmp_path / 'out') == DONE
     printed = capsys.readouterr().out
     assert printed.count('followed as a restart') == 1
-    assert 'refused' not in printed
+    assert 'rejected' not in printed
     assert '100 setpoints in 0.98 s, 1 restart' in printed
     assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 100
 
@@ -507,7 +538,7 @@ def test_nothing_that_can_be_answered_is_said(
     printed = capsys.readouterr().out
     assert 'no setpoint could be answered' in printed
     for topic in TOPICS:
-        assert f'refused, {topic}: 3 {MALFORMED}' in printed
+        assert f'{topic}: 3 rejected: {MALFORMED}' in printed
     assert not outputs_of(tmp_path / 'out' / 'bag').rows
 
 
@@ -638,13 +669,27 @@ def test_an_output_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out')
 
 
-def test_a_bag_of_ros_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bag_of_ros_1_gives_the_same(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = motion(30)
+    assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
     store = get_typestore(Stores.ROS1_NOETIC)
     with Writer1(tmp_path / 'old.bag') as writer:
-        for topic in TOPICS:
-            writer.add_connection(f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store)
-    assert 'ROS 1' in refused(capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output',
-                              tmp_path / 'out')
+        connections = {topic: writer.add_connection(
+            f'{NODE}/{topic}', INPUT_TYPES[topic], typestore=store) for topic in TOPICS}
+        for n, (topic, when, data) in enumerate(of):
+            read = STORE.deserialize_cdr(data, INPUT_TYPES[topic])
+            header = store.types['std_msgs/msg/Header'](n, read.header.stamp, 'base')
+            writer.write(connections[topic], when, store.serialize_ros1(
+                replace(read, header=header), INPUT_TYPES[topic]))
+    assert run(tmp_path / 'old.bag', tmp_path / 'out') == DONE
+    old, new = outputs_of(tmp_path / 'out' / 'old'), outputs_of(tmp_path / 'out' / 'bag')
+    assert len(new.rows) == 30
+    assert old.rows == new.rows
+    capsys.readouterr()
+    assert 'has no topic /none' in refused(
+        capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output', tmp_path / 'again',
+        '--pose', '/none')
 
 
 @pytest.mark.parametrize('arguments', [
@@ -888,7 +933,7 @@ def test_limits_that_are_broken_are_named(
     text = PARAMS.read_text(encoding='utf-8')
     file.write_text(text.replace('force_max: 6000.0', 'force_max: 500.0'))
     for params, said in ((PARAMS, 'all limits held'),
-                         (file, 'limits.force_max, 500, broken by leg_4 in ')):
+                         (file, 'limits.force_max, 500, exceeded by leg_4 in ')):
         assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
                      '--output', str(tmp_path / params.stem)]) == 0
         assert said in capsys.readouterr().out
@@ -991,7 +1036,7 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
         assert abs(found['force_peak_n']) == np.max(np.abs(forces))
         lengths = [float(row[f'{leg} length (m)']) for row in rows]
         assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
-    assert set(summary['causes']['leg_1']) == set(CAUSES)
+    assert set(summary['force_breakdown']['leg_1']) == set(SOURCES)
     assert summary['parameters']['platform.mass'] == 150.0
 
 
@@ -1010,7 +1055,7 @@ def test_without_a_report(tmp_path: Path) -> None:
     assert run(ROOT / 'bags' / 'clear', tmp_path, '--no-report') == DONE
     assert sorted(path.name for path in (tmp_path / 'clear').iterdir()) == [
         'bag', 'legs.csv', 'summary.json']
-    assert json.loads((tmp_path / 'clear' / 'summary.json').read_text())['causes'] is None
+    assert json.loads((tmp_path / 'clear' / 'summary.json').read_text())['force_breakdown'] is None
 
 
 def test_parquet_has_the_columns_and_numbers_of_csv(tmp_path: Path) -> None:
@@ -1147,15 +1192,15 @@ def joint_state(stamp: int, names: Sequence[str], efforts: Sequence[float]) -> b
                                             np.array(efforts)), 'sensor_msgs/msg/JointState'))
 
 
-def test_measured_forces_tell_what_touched_the_platform(tmp_path: Path) -> None:
+def test_measured_forces_tell_the_external_load(tmp_path: Path) -> None:
     load = np.array([30.0, -10.0, -200.0, 5.0, 8.0, -4.0])
     of = motion(200)
     heave = Motion(
         [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 201)], np.eye(3),
         [(0.0, 0.0, 0.05 * math.cos(0.01 * n)) for n in range(1, 201)], None,
         [(0.0, 0.0, -0.05 * math.sin(0.01 * n)) for n in range(1, 201)])
-    touched = np.where((np.arange(200) >= 100)[:, None], load, np.zeros(6))
-    forces = PLATFORM.inverse_dynamics(heave, touched).forces
+    loads = np.where((np.arange(200) >= 100)[:, None], load, np.zeros(6))
+    forces = PLATFORM.inverse_dynamics(heave, loads).forces
     names = list(PARAMETERS['joints'])[::-1]
     for n in range(200):
         stamp = (n + 1) * 10 * MS
@@ -1166,10 +1211,10 @@ def test_measured_forces_tell_what_touched_the_platform(tmp_path: Path) -> None:
     assert run(bag, tmp_path / 'out', '--measured', '/machine/state') == DONE
     found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
     assert found['setpoints_compared'] == 200
-    # half of the time it was there: the peaks of the residual are its negative
+    # with the sign of the load
     for axis, value in zip(('x', 'y', 'z'), load, strict=False):
-        peak = found['wrench'][f'force_{axis}']
-        assert peak['peak_n'] == pytest.approx(-value, rel=1e-9)
+        peak = found['external_wrench'][f'force_{axis}']
+        assert peak['peak_n'] == pytest.approx(value, rel=1e-9)
         assert peak['peak_at_s'] >= 0.99
     documented = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
     summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())

@@ -34,12 +34,12 @@ from numpy.typing import NDArray
 import pytest
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_euler
-from stewart_dynamics.replay.measured import Comparison
 from stewart_dynamics.replay.report import Report
+from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
@@ -70,25 +70,25 @@ class Given:
         self.setpoints = Batch(
             stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps)
         self.outputs: Outputs = Step(parameters).many(self.setpoints, None)
-        self.causes = ForceCauses(parameters)(motions, self.setpoints.wrenches)
+        self.breakdown = ForceBreakdownRows(parameters)(motions, self.setpoints.wrenches)
 
     def summary(self, **changes: Any) -> dict[str, Any]:
         """Return what summary.json would hold."""
         summary = Summary(self.parameters)
-        summary.add(self.seconds, self.setpoints, self.outputs, self.causes)
+        summary.add(self.seconds, self.setpoints, self.outputs, self.breakdown)
         return {
             'version': 1, 'software': 'stewart_dynamics 0.1.0', 'bag': 'bags/example', 'run': '',
             'complete': True, 'missing': [], 'notices': [],
             'inputs': {'node': '/stewart_dynamics', 'topics': {'setpoint/pose': '/a/pose'},
                        'differentiated_cutoff_hz': None, 'measured': None},
-            'refused': [], 'measured': None, **summary.values(),
+            'rejected': [], 'measured': None, **summary.values(),
             'parameters': {name: value.ravel().tolist() if isinstance(value, np.ndarray) else value
                            for name, value in self.parameters.items()}, **changes}
 
     def report(self, measured: bool = False) -> Report:
         report = Report(self.parameters, measured)
         if len(self.seconds):
-            report.add(self.seconds, self.setpoints, self.outputs, self.causes)
+            report.add(self.seconds, self.setpoints, self.outputs, self.breakdown)
         return report
 
     def write(self, path: Path, **changes: Any) -> dict[str, Any]:
@@ -99,7 +99,7 @@ class Given:
 
 def trajectory(name: str, parameters: Parameters = PARAMETERS) -> Given:
     """Return a motion of config/, as it is recorded in bags/."""
-    p = TrajectoryParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
+    p = ReferenceMotionParameters.from_yaml(CONFIG / f'trajectory_{name}.yaml')
     seconds = sample_times(p) * 1e-9
     return Given(seconds, motion_at(p, seconds).rows, parameters)
 
@@ -169,7 +169,7 @@ def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).standard_normal((4, 5000, 6))
     for n in range(200):
         seconds = 5.0 * n + block.seconds
-        report.add(seconds, block.setpoints, block.outputs, block.causes)
+        report.add(seconds, block.setpoints, block.outputs, block.breakdown)
         report.add_measured(seconds, *noise[:3])
     path = tmp_path / 'report.html'
     report.write(path, block.summary())
@@ -200,8 +200,8 @@ def test_what_is_drawn_are_the_samples_and_every_peak(tmp_path: Path) -> None:
                           ('rates', 'rate_peak_m_s')):
             _, values = curve_of(data, plot, n)
             assert np.abs(values).max() == abs(np.float32(leg[key]))
-        parts = sum(curve_of(data, 'causes', 1 + c, n)[1] for c in range(len(CAUSES)))
-        whole = curve_of(data, 'causes', 0, n)[1]
+        parts = sum(curve_of(data, 'force_breakdown', 1 + c, n)[1] for c in range(len(SOURCES)))
+        whole = curve_of(data, 'force_breakdown', 0, n)[1]
         assert np.abs(parts - whole).max() <= 1e-6 * np.abs(whole).max()
 
 
@@ -213,7 +213,7 @@ def test_angles_are_the_papers_and_go_on_past_half_a_turn(tmp_path: Path) -> Non
     report = Report(PARAMETERS)
     for part in (slice(0, 150), slice(150, 151), slice(151, 400)):
         report.add(seconds[part], Batch(*(each[part] for each in given.setpoints)),
-                   Outputs(*(each[part] for each in given.outputs)), given.causes[part])
+                   Outputs(*(each[part] for each in given.outputs)), given.breakdown[part])
     report.write(tmp_path / 'report.html', given.summary())
     data = data_of(tmp_path / 'report.html')
     drawn = np.stack([curve_of(data, 'angles', n)[1] for n in range(3)], axis=1)
@@ -225,13 +225,14 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
     plain = trajectory('clear')
     paths = tmp_path / 'hostile.html', tmp_path / 'plain.html'
     bag = '/a/</script><script>window.hacked=1</script>\udcff/<!--=plotly-->'
-    refused = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2]}]
+    rejected = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2]}]
     given.write(paths[0], bag=bag, notices=[HOSTILE[1]], complete=False, missing=[HOSTILE[0]],
-                refused=refused, run='<i>', inputs={
+                rejected=rejected, run='<i>', inputs={
                     'node': '/n', 'topics': {'setpoint/pose': HOSTILE[0]},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
     plain.write(paths[1], bag='/a/b/c', notices=['n'], complete=False, missing=['m'],
-                refused=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': ''}], run='r', inputs={
+                rejected=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': ''}], run='r',
+                inputs={
                     'node': '/n', 'topics': {'setpoint/pose': '/p'},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
     hostile, harmless = (_Elements(path.read_text(encoding='utf-8')) for path in paths)
@@ -249,16 +250,16 @@ def test_what_is_wrong_with_a_bag_is_told(tmp_path: Path) -> None:
     trajectory('singular').write(
         tmp_path / 'report.html', complete=False, missing=['chunk 3: its CRC is wrong'],
         notices=['the bag has no checksums'],
-        refused=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234,
+        rejected=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234,
                   'first': 'nan'}])
     text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
     for told in ('Only a part could be read', 'chunk 3: its CRC is wrong', 'not finite', '1,234',
-                 'Limits are broken', 'limits.force_max', 'A singularity is met',
+                 'Limits are exceeded', 'limits.force_max', 'A singularity is met',
                  'crosses zero once', 'the bag has no checksums', 'reflected_mass'):
         assert told in text, told
 
 
-def test_measured_forces_and_touches_are_told_and_drawn(tmp_path: Path) -> None:
+def test_measured_forces_and_contacts_are_shown_and_drawn(tmp_path: Path) -> None:
     given = trajectory('clear')
     write_measured(given, tmp_path / 'report.html')
     data = data_of(tmp_path / 'report.html')
@@ -266,12 +267,12 @@ def test_measured_forces_and_touches_are_told_and_drawn(tmp_path: Path) -> None:
     assert np.array_equal(at, given.seconds)
     assert residual[:200].mean() == pytest.approx(0.0, abs=0.5)
     assert residual[200:260].mean() == pytest.approx(300.0, abs=1.0)
-    (begun, ended), = data['touches']
+    (begun, ended), = data['contacts']
     assert begun == pytest.approx(2.0, abs=0.1)
     assert ended == pytest.approx(2.6, abs=0.1)
     text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
     assert 'Measured against computed' in text
-    assert 'Touched, most in' in text
+    assert 'Contact, most in' in text
 
 
 def test_plotly_that_is_missing_is_told_in_one_line(tmp_path: Path) -> None:
@@ -447,11 +448,11 @@ def test_zooming_one_plot_zooms_all(opened: Callable[..., Opened]) -> None:
     report.until(f'{ranges.format("forces")}[0] > 0.5')
     zoomed = report.page.evaluate(ranges.format('forces'))
     assert 0.5 < zoomed[0] < zoomed[1] < 9.5
-    for plot in ('rates', 'lengths', 'position', 'causes'):
+    for plot in ('rates', 'lengths', 'position', 'force_breakdown'):
         report.see(f'plot_{plot}')
         report.until(f'sameRange({ranges.format(plot)}, {zoomed})')
     report.page.locator('#whole').click()
-    report.until(f'sameRange({ranges.format("causes")}, [0, 10])')
+    report.until(f'sameRange({ranges.format("force_breakdown")}, [0, 10])')
     report.see('plot_forces')
     report.until(f'sameRange({ranges.format("forces")}, [0, 10])')
     report.check()
@@ -487,13 +488,13 @@ def test_a_time_in_a_table_moves_the_cursor_there(opened: Callable[..., Opened])
 def test_the_shown_leg_can_be_chosen_and_a_curve_hidden(opened: Callable[..., Opened]) -> None:
     given = trajectory('clear')
     report = opened(given)
-    report.see('plot_causes')
-    plot = report.page.locator('.plot:has(#plot_causes)')
+    report.see('plot_force_breakdown')
+    plot = report.page.locator('.plot:has(#plot_force_breakdown)')
     plot.locator('select').select_option(label='leg_4')
-    first = "document.getElementById('plot_causes').data[0].y[0]"
+    first = "document.getElementById('plot_force_breakdown').data[0].y[0]"
     report.until(f'{first} === {float(np.float32(given.outputs.demanded_forces[0, 3]))!r}')
     plot.locator('.readout button').nth(1).click()
-    report.until("document.getElementById('plot_causes').data[1].visible === false")
+    report.until("document.getElementById('plot_force_breakdown').data[1].visible === false")
     report.check()
 
 

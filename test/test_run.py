@@ -39,7 +39,7 @@ from rosgraph_msgs.msg import Clock
 
 from stewart_dynamics import ParameterError, Parameters
 from stewart_dynamics.mechanics.reference_motion_parameters import (
-    TRAJECTORY_PARAMETERS, TrajectoryParameters)
+    REFERENCE_MOTION_PARAMETERS, ReferenceMotionParameters)
 from stewart_dynamics.nodes.rclpy_workarounds import reject_impossible_times
 from stewart_dynamics.nodes.run import declare_parameters
 from stewart_dynamics.parameter_set import ParameterSet
@@ -186,8 +186,8 @@ def test_what_ros_declares_is_described_by_ros(declared: Any) -> None:
 
 
 def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
-    ask = declared(Node, TrajectoryParameters, 'trajectory_sine.yaml')
-    for name, parameter in TRAJECTORY_PARAMETERS.items():
+    ask = declared(Node, ReferenceMotionParameters, 'trajectory_sine.yaml')
+    for name, parameter in REFERENCE_MOTION_PARAMETERS.items():
         (each,) = described(ask, name)
         assert each.read_only
         assert each.description.startswith(parameter.text)
@@ -217,7 +217,7 @@ def set_messages(ask: Ask, *messages: ParameterMessage) -> tuple[bool, str]:
 
 NODES = pytest.mark.parametrize('kind, parameters, file, name, value', [
     (LifecycleNode, Parameters, 'platform.yaml', 'platform.mass', 150.0),
-    (Node, TrajectoryParameters, 'trajectory_sine.yaml', 'rate', 100.0)],
+    (Node, ReferenceMotionParameters, 'trajectory_sine.yaml', 'rate', 100.0)],
     ids=['lifecycle', 'plain'])
 
 

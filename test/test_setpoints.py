@@ -39,10 +39,12 @@ from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
 from stewart_dynamics.runtime.joining import WAITING
 from stewart_dynamics.runtime.rejections import (
-    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, TOO_OLD, TWICE, WRONG_FRAME)
+    DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
+    WRONG_FRAME)
 from stewart_dynamics.runtime.samples import SampleReader
 from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Setpoint
+from stewart_dynamics.runtime.wrench_input import WrenchInput
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)
@@ -281,6 +283,27 @@ def test_a_wrench_holds_until_the_next() -> None:
         feed.setpoints.take_wrench(messages.wrench(0, values))
         assert feed.setpoints.wrench == values
     assert not feed.counts
+
+
+def test_a_wrench_is_read_without_setpoints() -> None:
+    rejections = Rejections(lambda rejection, details: None)
+    wrench_input = WrenchInput(PARAMETERS, rejections)
+    assert wrench_input.wrench == NO_WRENCH
+    for _ in range(2):
+        wrench_input.take(messages.wrench(5, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)))
+        wrench_input.take(messages.wrench(5, (NAN, 2.0, 3.0, 4.0, 5.0, 6.0)))
+        wrench_input.take(messages.wrench(5, frame='map'))
+        assert wrench_input.wrench == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert rejections.counts == {Rejection(WRENCH, NOT_FINITE): 2,
+                                 Rejection(WRENCH, WRONG_FRAME): 2}
+
+
+@pytest.mark.parametrize(('reason', 'said'), [
+    (NOT_FINITE, 'setpoint/pose rejected: not finite: nan'),
+    (NOT_JOINED, 'setpoint/pose dropped: not all topics had its stamp: nan'),
+    (DROPPED, 'setpoint/pose dropped: more came at once than can be answered: nan')])
+def test_what_is_dropped_is_not_called_rejected(reason: str, said: str) -> None:
+    assert Rejection(POSE, reason).words('nan') == said
 
 
 @pytest.mark.parametrize('topic', TOPICS)

@@ -40,7 +40,7 @@ from running import (
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from stewart_dynamics import StewartError, StewartPlatform
+from stewart_dynamics import Pose, StewartError, StewartPlatform
 from stewart_dynamics.nodes.simulator_messages import OUTPUT_TYPES, StateMessages
 from stewart_dynamics.nodes.simulator_node import SimulatorNode
 from stewart_dynamics.parameter_files import read_yaml
@@ -250,10 +250,9 @@ def holding() -> list[float]:
     """Return the forces that hold the machine in its initial pose."""
     plant = Plant(SimulatorParameters(GIVEN))
     platform = StewartPlatform(plant.parameters)
-    position, rotation = plant.state.pose[:3], np.eye(3)
+    pose = Pose(plant.state.pose[:3], np.eye(3))
     forces: list[float] = np.linalg.solve(
-        platform.jacobian(position, rotation).T,
-        platform.gravity_vector(position, rotation)).tolist()
+        platform.inverse_jacobian(pose).T, platform.gravity_vector(pose)).tolist()
     return forces
 
 
@@ -330,7 +329,7 @@ def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> 
     simulator.until(lambda: len(simulator.raw['accel']) > 100, 'it goes on')
     assert simulator.raw['clock'] == []
     home = StewartPlatform(SimulatorParameters(GIVEN)).inverse_kinematics(
-        [0.0, 0.0, 1.1], np.eye(3)) - 0.95
+        Pose([0.0, 0.0, 1.1], np.eye(3))) - 0.95
     for state in simulator.states():
         assert np.allclose(state.position, home, rtol=0.0, atol=1e-15)
         assert not np.any([*state.velocity, *state.effort])
@@ -508,7 +507,7 @@ def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
     simulator.until(future.done, 'it answers')
     assert not future.result().result.successful
     assert future.result().result.reason == (
-        'platform.mass: only read when the node starts: start it anew')
+        'platform.mass: only read when the node starts: restart it')
 
 
 def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:

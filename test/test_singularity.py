@@ -111,14 +111,14 @@ def test_a_stop_ends_below_a_part_of_where_it_began() -> None:
     assert not after((0.2, 0.0, 400.1), start=left).stopped
 
 
-def test_a_crossing_is_foretold_within_its_time_and_no_longer() -> None:
+def test_a_crossing_is_predicted_within_its_time_and_no_longer() -> None:
     # det 0.2 falling by 0.4 a second: zero in 0.5 s
     assert not after((0.2, -0.4, 3.0)).warning
-    foretold = after((0.2, -0.41, 3.0))
-    assert foretold.cause is Cause.FORETOLD
-    assert foretold.time_to_crossing == pytest.approx(0.2 / 0.41, rel=1e-15)
-    assert after((0.2, -0.33, 3.0), start=foretold).warning  # 0.606 s < 0.5 s / 0.8
-    assert not after((0.2, -0.31, 3.0), start=foretold).warning
+    predicted = after((0.2, -0.41, 3.0))
+    assert predicted.cause is Cause.PREDICTED
+    assert predicted.time_to_crossing == pytest.approx(0.2 / 0.41, rel=1e-15)
+    assert after((0.2, -0.33, 3.0), start=predicted).warning  # 0.606 s < 0.5 s / 0.8
+    assert not after((0.2, -0.31, 3.0), start=predicted).warning
     assert after((-0.2, 0.41, 3.0)).warning
     moving_away = after((0.2, 0.41, 3.0))
     assert not moving_away.warning
@@ -137,7 +137,7 @@ def test_time_to_crossing_is_the_same_for_one_and_for_many() -> None:
 
 
 @pytest.mark.parametrize('rate', [0.5, -2.0])
-def test_the_foretold_time_nears_the_true_one_along_a_quarter_turn(rate: float) -> None:
+def test_the_predicted_time_nears_the_true_one_along_a_quarter_turn(rate: float) -> None:
     parameters = symmetric_parameters()
     platform = StewartPlatform(parameters)
     axis = np.array([0.0, 0.0, 1.0])
@@ -153,7 +153,7 @@ def test_the_foretold_time_nears_the_true_one_along_a_quarter_turn(rate: float) 
     assert errors[-1] < 0.51 * errors[-2]
 
 
-def test_the_foretold_time_nears_the_true_one_on_machines_without_symmetry() -> None:
+def test_the_predicted_time_nears_the_true_one_on_machines_without_symmetry() -> None:
     random = rng()
     crossed = 0
     while crossed < 5:
@@ -165,7 +165,7 @@ def test_the_foretold_time_nears_the_true_one_on_machines_without_symmetry() -> 
         def det(time: float, p: Parameters = parameters, platform: StewartPlatform = platform,
                 axis: np.ndarray = axis) -> float:
             motion = turning(p, axis, 1.0, time)
-            return float(np.linalg.det(platform.jacobian(motion.position, motion.rotation)))
+            return float(np.linalg.det(platform.inverse_jacobian(motion)))
 
         low, high = 0.0, 2.5
         if det(low) * det(high) > 0.0:

@@ -34,10 +34,12 @@ from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.force_breakdown import CAUSES, ForceCauses
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME
-from stewart_dynamics.replay.summary import Summary, TOLD
+from stewart_dynamics.replay.gathering import LISTED
+from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
@@ -51,7 +53,7 @@ LIMITS = {
 
 
 def machine(**changes: Any) -> Parameters:
-    """Return a machine whose first leg has a name with a blank."""
+    """Return a hexapod whose first leg has a name with a blank."""
     return symmetric_parameters().replaced({
         'joints': ['front left', 'b', 'c', 'd', 'e', 'f'], 'setpoint.timeout': 0.5, **changes})
 
@@ -89,7 +91,7 @@ class Samples:
         self.det, self.condition = numbers('det'), numbers('condition')
         self.time_to_crossing = numbers('time_to_crossing', default=math.inf)
         self.warnings = numbers('warnings', default=0.0) > 0.0
-        self.causes = numbers('causes', 6, 6) if 'causes' in given else None
+        self.breakdown = numbers('breakdown', 6, 6) if 'breakdown' in given else None
         assert not given
 
     def outputs(self) -> Outputs:
@@ -117,8 +119,13 @@ class Samples:
             part = slice(first, end)
             summary.add(self.seconds[part], Batch(*(each[part] for each in setpoints)),
                         Outputs(*(each[part] for each in outputs)),
-                        None if self.causes is None else self.causes[part])
+                        None if self.breakdown is None else self.breakdown[part])
         return summary
+
+
+def table_of(samples: Samples, parameters: Parameters) -> str:
+    """Return the summary as a person reads it."""
+    return '\n'.join(summary_lines(samples.summary(parameters).values(), parameters))
 
 
 def values(many: int, **given: Any) -> dict[str, Any]:
@@ -142,11 +149,11 @@ def random_samples(seed: int, many: int) -> Samples:
     unsolved = random.random(many) < random.choice([0.0, 0.2, 1.0], p=[0.4, 0.5, 0.1])
     demanded = random.integers(-100, 101, (many, 6)) * 1.0
     demanded[unsolved] = math.nan
-    causes = random.normal(size=(many, 6, 6))
-    causes[unsolved] = math.nan
+    breakdown = random.normal(size=(many, 6, 6))
+    breakdown[unsolved] = math.nan
     return Samples(
         many, seconds=np.cumsum(steps) - steps[0], restarts=restarts, demanded=demanded,
-        forces=np.clip(demanded, -50.0, 50.0), causes=causes,
+        forces=np.clip(demanded, -50.0, 50.0), breakdown=breakdown,
         suppressed=random.random(many) < 0.2, lengths=random.uniform(0.4, 1.6, (many, 6)),
         rates=random.integers(-10, 11, (many, 6)) * 0.1,
         unit_load=random.integers(1, 9, (many, 6)), det=random.integers(-2, 3, many),
@@ -191,7 +198,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
     forward = [b - a for a, b in zip(t[:999], t[1:1000], strict=False) if b > a]
     gap = max(p['setpoint.timeout'], 10.0 * statistics.median(forward) if forward else 0.0)
     steps = [b - a for a, b in zip(t, t[1:], strict=False)]
-    legs, limits, causes = {}, [], {}
+    legs, limits, breakdown = {}, [], {}
     for leg, name in enumerate(p['joints']):
         length, rate = s.lengths[:, leg].tolist(), s.rates[:, leg].tolist()
         force = s.demanded[:, leg].tolist()
@@ -215,17 +222,17 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'length_margin_m': min(min(length) - low, high - max(length)),
             'rate_margin_m_s': fastest - max(map(abs, rate)),
             'force_margin_n': None if none else strongest - abs(peak[0])}
-        causes[name] = {}
-        for n, cause in enumerate(CAUSES):
-            of_cause = s.causes[:, n, leg].tolist()
-            causes[name][cause] = {
-                'peak_n': first_peak(of_cause, t)[0],
-                'rms_n': root(over_time([f * f for f in of_cause], t, gap)[1])}
+        breakdown[name] = {}
+        for n, source in enumerate(SOURCES):
+            forces = s.breakdown[:, n, leg].tolist()
+            breakdown[name][source] = {
+                'peak_n': first_peak(forces, t)[0],
+                'rms_n': root(over_time([f * f for f in forces], t, gap)[1])}
     for limit, broken, numbers in (
-            ('limits.length_min', lambda x, bound: x < bound, s.lengths),
-            ('limits.length_max', lambda x, bound: x > bound, s.lengths),
-            ('limits.velocity_max', lambda x, bound: abs(x) > bound, s.rates),
-            ('limits.force_max', lambda x, bound: abs(x) > bound, s.demanded)):
+            ('limits.length_min', lambda x, bound: x < bound * (1.0 - 1e-9), s.lengths),
+            ('limits.length_max', lambda x, bound: x > bound * (1.0 + 1e-9), s.lengths),
+            ('limits.velocity_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.rates),
+            ('limits.force_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.demanded)):
         for leg, name in enumerate(p['joints']):
             bound = p[limit][leg]
             found = [n for n, x in enumerate(numbers[:, leg]) if broken(x, bound)]
@@ -257,16 +264,17 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
     unsolved = np.isnan(s.demanded[:, 0])
     most_loaded = int(np.argmax(s.unit_load.max(axis=0)))
     return {
+        'quasi_static': False,
         'setpoints': {
             'answered': len(t), 'first_stamp_ns': int(s.stamps[0]),
             'last_stamp_ns': int(s.stamps[-1]), 'duration_s': t[-1],
             'gaps': sum(step > gap for step in steps),
             'gaps_s': math.fsum(step for step in steps if step > gap),
             'restarts': sum(s.restarts.tolist())},
-        'legs': legs, 'limits': limits,
+        'legs': legs, 'limits': limits, 'limits_not_checked': [],
         'singularity': {
             'determinant_nearest_m3': s.det[nearest], 'determinant_nearest_at_s': t[nearest],
-            'crossings': len(crossings), 'crossings_at_s': crossings[:TOLD],
+            'crossings': len(crossings), 'crossings_at_s': crossings[:LISTED],
             'condition_max': s.condition[worst], 'condition_max_at_s': t[worst],
             'unsolved': int(unsolved.sum()),
             'suppressed': int((np.isnan(s.forces[:, 0]) & ~unsolved).sum()),
@@ -274,10 +282,10 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'time_to_crossing_min_at_s': t[soonest] if ever else None,
             'unit_load_force_max': s.unit_load.max(),
             'unit_load_force_leg': p['joints'][most_loaded],
-            'warnings': len(spans), 'warnings_from_to_s': spans[:TOLD],
+            'warnings': len(spans), 'warnings_from_to_s': spans[:LISTED],
             'warning_s': math.fsum(step for n, step in enumerate(steps)
                                    if s.warnings[n] and step <= gap)},
-        'causes': causes,
+        'force_breakdown': breakdown,
         'limit_met': bool(limits) or bool(spans)}
 
 
@@ -314,7 +322,7 @@ def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> 
     samples, parameters = random_samples(seed, many), machine(**LIMITS)
     whole, split = samples.summary(parameters), samples.summary(parameters, edges)
     assert_same(split.values(), whole.values())
-    assert split.table() == whole.table()
+    assert_same(split.values(), whole.values())
 
 
 @pytest.mark.parametrize('size', [1, 7, 999, 1000, 1001, 2500])
@@ -324,8 +332,9 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
     samples.seconds[1500:] += np.arange(1500) * 0.4
     found = samples.summary(parameters, range(size, 3000, size)).values()
     assert found['setpoints']['gaps'] > 500
-    assert found['singularity']['crossings'] > len(found['singularity']['crossings_at_s']) == TOLD
-    assert found['singularity']['warnings'] > TOLD
+    crossings = found['singularity']['crossings_at_s']
+    assert found['singularity']['crossings'] > len(crossings) == LISTED
+    assert found['singularity']['warnings'] > LISTED
     assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
 
 
@@ -350,7 +359,7 @@ def test_it_sums_up_what_the_step_answers() -> None:
     outputs = Step(p).many(setpoints, None)
     summary = Summary(p)
     summary.add(np.arange(200) * 1.0, setpoints, outputs,
-                ForceCauses(p)(setpoints.motions, setpoints.wrenches))
+                ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches))
     found = summary.values()
     assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
                                               axis=0).sum()
@@ -363,7 +372,7 @@ def test_it_sums_up_what_the_step_answers() -> None:
         assert of_leg['force_rms_n'] == pytest.approx(
             math.sqrt((forces ** 2)[1:-1].sum() / 199.0
                       + 0.5 * (forces[0] ** 2 + forces[-1] ** 2) / 199.0), rel=1e-12)
-        assert set(found['causes'][name]) == set(CAUSES)
+        assert set(found['force_breakdown'][name]) == set(SOURCES)
     assert found['singularity']['condition_max'] == outputs.conditions.max()
 
 
@@ -377,7 +386,7 @@ def test_it_keeps_no_samples() -> None:
         for n in range(blocks):
             # new arrays: what is kept of them would be seen
             summary.add(samples.seconds + n, Batch(*map(np.copy, setpoints)),
-                        Outputs(*map(np.copy, outputs)), samples.causes.copy())
+                        Outputs(*map(np.copy, outputs)), samples.breakdown.copy())
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
@@ -400,15 +409,16 @@ def test_every_key_is_documented() -> None:
     found = keys(samples.summary(parameters).values())
     for leg in parameters['joints']:
         found = {key.replace(f'legs.{leg}.', 'legs.NAME.').replace(
-            f'causes.{leg}.', 'causes.NAME.') for key in found}
-    for cause in CAUSES:
-        found = {key.replace(f'.{cause}.', '.CAUSE.') for key in found}
+            f'force_breakdown.{leg}.', 'force_breakdown.NAME.') for key in found}
+    for source in SOURCES:
+        found = {key.replace(f'.{source}.', '.SOURCE.') for key in found}
     text = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
     documented = set(re.findall(r'^\| `([^`]+)` \|', text, flags=re.MULTILINE))
     assert found <= documented
-    parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'causes.')
-    assert {key for key in documented if key.startswith(parts)} == found - {'limit_met'}
-    assert set(CAUSES) <= documented
+    parts = ('setpoints.', 'legs.', 'limits[]', 'singularity.', 'force_breakdown.')
+    assert {key for key in documented if key.startswith(parts)} == found - {
+        'limit_met', 'limits_not_checked', 'quasi_static'}
+    assert set(SOURCES) <= documented
 
 
 # Energy
@@ -454,8 +464,8 @@ def test_without_a_setpoint_there_is_nothing() -> None:
         'answered': 0, 'first_stamp_ns': None, 'last_stamp_ns': None, 'duration_s': 0.0,
         'gaps': 0, 'gaps_s': 0.0, 'restarts': 0}
     assert set(found['legs']['front left'].values()) == {None}
-    assert (found['limits'], found['causes'], found['limit_met']) == ([], None, False)
-    assert summary.table() == 'no setpoint could be answered'
+    assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
+    assert summary_lines(summary.values(), machine()) == ['no setpoint could be answered']
     assert_same(Samples(0).summary(machine()).values(), Summary(machine()).values())
 
 
@@ -520,16 +530,17 @@ def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
 
 def test_a_small_example() -> None:
     nan = math.nan
-    summary = Samples(
+    samples = Samples(
         4, seconds=[0.0, 1.0, 2.0, 4.0],
         lengths=[[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [1.5, 1.0, 3.0, 4.0, 5.0, 6.0],
                  [0.5, 3.0, 3.0, 4.0, 5.0, 6.0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]],
         demanded=[[10.0, -20.0, 5.0, 0.0, 1.0, 2.0], [-30.0, 15.0, 5.0, 0.0, 1.0, 2.0],
                   [20.0, 25.0, 5.0, 0.0, 1.0, 3.0], [nan] * 6],
         rates=0.25, det=[3.0, 1.0, -1.0, -2.0], condition=[1.0, 2.0, 3.0, 2.0],
-        warnings=[False, True, True, False]).summary(machine(**{
-            'limits.length_min': 0.75, 'limits.length_max': 10.0, 'limits.force_max': 25.0}))
-    assert summary.table().splitlines() == [
+        warnings=[False, True, True, False])
+    assert table_of(samples, machine(**{
+        'limits.length_min': 0.75, 'limits.length_max': 10.0, 'limits.force_max': 25.0,
+    })).splitlines() == [
         '4 setpoints in 4.00 s',
         '',
         '            --------------force [N]-------------- power [W] ------length [m]------- '
@@ -548,10 +559,10 @@ def test_a_small_example() -> None:
         '   0.2500',
         'f                 3.0      2.00      2.3     22.0       0.8  6.0000  6.0000  4.0000'
         '   0.2500',
-        '* at limits.force_max or beyond: published clipped to it, the leg would need more',
-        'limits.length_min, 0.75, broken by front left in 1 setpoint from t = 2.00 s on: 0.5 at '
+        '* reaches limits.force_max: published clipped to it, the leg would need more',
+        'limits.length_min, 0.75, exceeded by front left in 1 setpoint from t = 2.00 s on: 0.5 at '
         'worst',
-        'limits.force_max, 25, broken by front left in 1 setpoint from t = 1.00 s on: -30 at '
+        'limits.force_max, 25, exceeded by front left in 1 setpoint from t = 1.00 s on: -30 at '
         'worst',
         '',
         'det(J) crossed zero at t = 1.500 s: forces grow without bound there',
@@ -568,7 +579,7 @@ def test_the_table_is_no_wider_than_100_columns(
     samples = random_samples(seed, many) if many else Samples(0)
     samples.demanded *= scale
     samples.forces *= scale
-    table = samples.summary(machine(**LIMITS) if limited else machine()).table()
+    table = table_of(samples, machine(**LIMITS) if limited else machine())
     assert all(len(line) <= 100 and line == line.rstrip() for line in table.splitlines())
     assert 'nan' not in table
     assert 'inf' not in table
@@ -576,38 +587,69 @@ def test_the_table_is_no_wider_than_100_columns(
 
 
 def test_a_leg_without_forces_has_no_columns_of_them() -> None:
-    table = Samples(3, demanded=math.nan).summary(machine(**LIMITS)).table()
+    table = table_of(Samples(3, demanded=math.nan), machine(**LIMITS))
     assert 'force [N]' not in table
     assert 'length [m]' in table
     assert 'no forces were published in 3 setpoints' in table
 
 
 def test_it_says_when_all_limits_hold_and_nothing_warned() -> None:
-    held = Samples(1).summary(machine(**{'limits.force_max': 5.0})).table()
+    held = table_of(Samples(1), machine(**{'limits.force_max': 5.0}))
     assert 'all limits held' in held
     assert '1 setpoint in 0.00 s' in held
     assert 'det(J) did not cross zero' in held
     assert 'no singularity warning' in held
-    assert 'all limits held' not in Samples(1).summary(machine()).table()
+    assert 'all limits held' not in table_of(Samples(1), machine())
     # published forces that are clipped do not tell how much was demanded
-    clipped = Samples(1).summary(machine(**{'limits.force_max': 1.0})).table()
+    clipped = table_of(Samples(1), machine(**{'limits.force_max': 1.0}))
     assert 'all limits held' not in clipped
     assert '1.0*' in clipped
 
 
 def test_it_says_how_long_before_a_crossing_the_warning_came_and_not_all_of_many() -> None:
-    table = Samples(5, det=[2.0, 1.0, -1.0, -2.0, -3.0],
-                    warnings=[0, 1, 0, 1, 1]).summary(machine()).table()
+    table = table_of(Samples(5, det=[2.0, 1.0, -1.0, -2.0, -3.0],
+                             warnings=[0, 1, 0, 1, 1]), machine())
     assert 'warning from t = 1.00 s to 2.00 s: 0.50 s before the crossing' in table
     assert table.endswith('warning from t = 3.00 s to the end')
     many = np.arange(40)
-    table = Samples(40, det=(-1.0) ** many, warnings=many % 2).summary(machine()).table()
+    table = table_of(Samples(40, det=(-1.0) ** many, warnings=many % 2), machine())
     assert 't = 4.500 s and 34 times more: forces' in ' '.join(table.split())
     assert table.endswith('and 15 singularity warnings more, for 19.00 s in all')
 
 
 def test_gaps_and_restarts_stand_in_the_first_line() -> None:
-    summary = Samples(5, seconds=[0.0, 0.1, 0.2, 3.2, 3.2], restarts=[0, 0, 0, 0, 1]).summary(
-        machine())
-    assert summary.table().startswith(
+    samples = Samples(5, seconds=[0.0, 0.1, 0.2, 3.2, 3.2], restarts=[0, 0, 0, 0, 1])
+    assert table_of(samples, machine()).startswith(
         '5 setpoints in 3.20 s, of them 3.00 s in 1 gap, 1 restart\n')
+
+
+def test_what_only_poses_cannot_tell_is_not_known() -> None:
+    samples = Samples(3, rates=0.0, breakdown=1.0)
+    parameters = machine(**LIMITS)
+    summary = Summary(parameters, quasi_static=True)
+    summary.add(samples.seconds, batch(samples.stamps), samples.outputs(), samples.breakdown)
+    found = summary.values()
+    leg = found['legs']['b']
+    assert {key for key, value in leg.items() if value is None} == {
+        'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
+        'power_mean_w', 'energy_driving_j', 'energy_braking_j'}
+    assert {source for source, value in found['force_breakdown']['b'].items()
+            if value['peak_n'] is not None} == {'gravity', 'wrench'}
+    assert found['singularity']['time_to_crossing_min_s'] is None
+    # a limit that cannot be checked does not hold
+    assert (found['limits'], found['limits_not_checked']) == ([], ['limits.velocity_max'])
+    assert found['limit_met']
+    text = '\n'.join(summary_lines(found, parameters))
+    assert 'limits.velocity_max could not be checked' in text
+    assert 'all limits held' not in text
+    without = Summary(machine(**{'limits.force_max': 5.0}), quasi_static=True)
+    without.add(samples.seconds, batch(samples.stamps), samples.outputs())
+    assert not without.values()['limit_met']
+
+
+def test_a_limit_is_exceeded_beyond_its_tolerance_alone() -> None:
+    bound = 5.0
+    for factor, exceeded in ((1.0 + 5e-10, False), (1.0 + 5e-9, True)):
+        found = Samples(1, demanded=bound * factor).summary(
+            machine(**{'limits.force_max': bound})).values()
+        assert bool(found['limits']) is exceeded

@@ -32,12 +32,12 @@ from rclpy.task import Future
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, executable, INPUTS, Inside, log_lines, nanoseconds, Peer, Program,
-    ROOT, SEPARATE)
+    assert_only_log_lines, executable, INPUTS, Inside, log_lines, nanoseconds, Peer, Program, ROOT,
+    SEPARATE)
 
 from stewart_dynamics import ParameterError
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.nodes.trajectory_node import TrajectoryNode
 
@@ -172,7 +172,7 @@ def _row(position: Any, quaternion: Any, twist: Any, accel: Any) -> list[float]:
             quaternion.w, *(number for v in vectors for number in (v.x, v.y, v.z))]
 
 
-def _expected(parameters: TrajectoryParameters, times: Any) -> NDArray[np.float64]:
+def _expected(parameters: ReferenceMotionParameters, times: Any) -> NDArray[np.float64]:
     motion = motion_at(parameters, np.asarray(times) * 1e-9)
     return np.concatenate([
         motion.position, to_quaternion(motion.rotation), motion.linear_velocity,
@@ -184,7 +184,7 @@ def _expected(parameters: TrajectoryParameters, times: Any) -> NDArray[np.float6
 def test_what_is_sent_is_the_motion_and_then_it_is_done(
         begin: Start, tmp_path: Path, output: str, kind: str) -> None:
     trajectory = begin(MOTION.format(kind=kind, more=f'output: {output}'))
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     times = sample_times(parameters)
     assert len(times) == 301
     topics = ('setpoint/combined',) if output == 'combined' else SEPARATE
@@ -210,7 +210,7 @@ def test_looped_it_goes_to_and_fro_until_it_is_told_to_stop(
     assert_only_log_lines(trajectory.program.stderr)
     assert trajectory.program.stdout == ''
     assert 'until stopped' in trajectory.program.stderr
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     # What was on its way when it ended may lack a topic.
     whole = min(len(trajectory.received(topic)) for topic in SEPARATE)
     for topic in SEPARATE:
@@ -259,7 +259,7 @@ def test_in_simulated_time_what_is_due_comes_with_the_clock(begin: Start, tmp_pa
     trajectory.at(2 * SECOND, 21, topics)
     assert trajectory.program.wait() == 0
     stamps, rows = _combined(trajectory)
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     times = sample_times(parameters)[:21]
     assert stamps == (SECOND + times).tolist()
     np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
@@ -282,7 +282,7 @@ def test_it_begins_anew_where_the_clock_does(begin: Start, tmp_path: Path) -> No
     stamps, rows = _separate(trajectory)
     times = np.array([0, 1, 2, 3, 4, 0, 1, 0, 1]) * PERIOD
     assert stamps == (np.repeat([7, 1], [5, 4]) * SECOND + times).tolist()
-    parameters = TrajectoryParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
     warnings = log_lines(trajectory.program.stderr, 'WARN')
     assert len(warnings) == 2
@@ -323,7 +323,7 @@ def test_a_broken_rule_is_said_in_one_line(start: Start, tmp_path: Path) -> None
         assert good in text
         file.write_text(text.replace(good, bad), encoding='utf-8')
         with pytest.raises(ParameterError, match='^' + re.escape(f'{file}: {said}')):
-            TrajectoryParameters.from_yaml(file)
+            ReferenceMotionParameters.from_yaml(file)
     # In these two the executable finds it in different places.
     for case in ('no end', 'not YAML'):
         good, bad, said = BROKEN[case]
@@ -336,7 +336,7 @@ def test_a_broken_rule_is_said_in_one_line(start: Start, tmp_path: Path) -> None
 
 def test_the_files_of_the_package_are_good(start: Start) -> None:
     for file in sorted((ROOT / 'config').glob('trajectory_*.yaml')):
-        TrajectoryParameters.from_yaml(file)
+        ReferenceMotionParameters.from_yaml(file)
     trajectory = start((ROOT / 'config/trajectory_clear.yaml').read_text(encoding='utf-8'))
     trajectory.until(dict.fromkeys(SEPARATE, 10))
     assert trajectory.program.stop() == 0

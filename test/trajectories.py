@@ -22,7 +22,7 @@ from referees import rng, ROOT
 
 from stewart_dynamics import Motion, Parameters
 from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ def motion_of(rows: Array) -> Motion:
 
 def sampled(name: str, step: int) -> tuple[list[int], Array]:
     """Return times [ns] and rows of a motion in config/."""
-    motion = TrajectoryParameters.from_yaml(ROOT / 'config' / f'trajectory_{name}.yaml')
+    motion = ReferenceMotionParameters.from_yaml(ROOT / 'config' / f'trajectory_{name}.yaml')
     times = np.arange(0, 10 * SECOND + 1, step)
     return times.tolist(), rows_of(motion_at(motion, times * 1e-9))
 
@@ -64,7 +64,7 @@ def some(points: int) -> tuple[list[int], Array]:
     """Return a smooth motion whose points are at uneven times."""
     random = rng()
     times = np.cumsum(random.integers(1_000_000, 20_000_000, points))
-    motion = TrajectoryParameters({
+    motion = ReferenceMotionParameters({
         'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
         'motion.amplitude': (0.03, 0.03, 0.04, 0.04, 0.04, 0.06),
         'motion.frequency': (0.25, 0.5, 0.25, 0.5, 0.25, 0.25)})

@@ -36,7 +36,8 @@ from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.one import NODE, replay
+from stewart_dynamics.replay.one_bag import replay
+from stewart_dynamics.replay.options import NODE
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.setpoints import Setpoints
 from stewart_dynamics.runtime.step import Batch, Outputs, Step

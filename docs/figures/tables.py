@@ -28,7 +28,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
@@ -144,7 +144,7 @@ def pages() -> dict[Path, dict[str, str]]:
             'accuracy and speed': accuracy_and_speed()},
         ROOT / 'docs' / 'parameters.md': {
             'parameters of stewart_dynamics': parameters_of(Parameters),
-            'parameters of stewart_trajectory': parameters_of(TrajectoryParameters),
+            'parameters of stewart_trajectory': parameters_of(ReferenceMotionParameters),
             'parameters of stewart_simulator': parameters_of(SimulatorParameters)},
         ROOT / 'docs' / 'simulator.md': {'errors in the loop': loop(figures)}}
 

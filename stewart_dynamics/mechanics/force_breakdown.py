@@ -12,72 +12,116 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-What a leg's force is for: gravity, inertia, velocity, friction or the load on the platform.
+Force breakdown by source: gravity, inertia, velocity, friction and external wrench.
 
-The force is linear in them: ``J_inv^T f = M X'' + C X' + G - wrench``, and friction adds to it
-along the leg. So the runtime path gives each part alone, from a motion and a machine that
-have only what causes it.
+The leg forces are linear in them: ``J_inv^T f = M X'' + C X' + G - wrench``, and friction adds
+to f along the leg. So the inverse dynamics gives each part alone, from a motion and a hexapod
+that have only its source.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics import kernel
-from stewart_dynamics.mechanics.rows import ACCELERATION, CONDITION, FORCES, RATES, TWIST
+from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.friction import friction
+from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.rows import ACCELERATION, CONDITION, FORCES, MOTION, RATES, TWIST
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
-from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
 
-CAUSES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench')
+
+class ForceBreakdown(NamedTuple):
+    """
+    Leg forces by source, (..., 6) [N] each; they sum to the forces of the inverse dynamics.
+
+    Attributes
+    ----------
+    gravity : (..., 6)
+        Holds platform and legs at rest.
+    platform_inertia : (..., 6)
+        Accelerates the platform.
+    leg_inertia : (..., 6)
+        Accelerates the legs and their actuators.
+    velocity : (..., 6)
+        Centrifugal and Coriolis terms.
+    friction : (..., 6)
+        Overcomes the friction of the actuators.
+    wrench : (..., 6)
+        Balances the external wrench.
+
+    """
+
+    gravity: Array
+    platform_inertia: Array
+    leg_inertia: Array
+    velocity: Array
+    friction: Array
+    wrench: Array
+
+    @property
+    def total(self) -> Array:
+        """Return the sum of all (..., 6) [N]."""
+        total: Array = sum(self[1:], self[0])
+        return total
+
+    def __repr__(self) -> str:
+        """Return the shape, not the arrays."""
+        return f'<ForceBreakdown of shape {self.gravity.shape[:-1]}: {", ".join(self._fields)}>'
+
+
+# In words, in the order of ForceBreakdown.
+SOURCES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench')
 
 _NO_GRAVITY = {'gravity': [0.0, 0.0, 0.0]}
 _NO_FRICTION = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
-# The inertia of the legs has the actuators' in it: they turn as a leg changes its length.
+# The inertia of the legs includes the actuators': they turn as a leg changes its length.
 _NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
             'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0}
 
-# Samples that are split together: few enough for the processor's cache.
+# Samples that are computed together: few enough for the processor's cache.
 _TOGETHER = 1024
 
 
-class ForceCauses:
+class ForceBreakdownRows:
     """
-    The split of leg forces by what causes them, for a machine with given parameters.
+    The force breakdown of rows of motion, as one array.
 
     Parameters
     ----------
     parameters : Parameters
-        The machine's.
+        Of the hexapod.
 
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._viscous = parameters['actuator.viscous_friction']
-        self._coulomb = parameters['actuator.coulomb_friction']
-        self._machine = StewartPlatform(parameters)
-        self._weightless = StewartPlatform(parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
-        self._platform_only = StewartPlatform(
+        self._viscous = parameters['actuator.viscous_friction'].copy()
+        self._coulomb = parameters['actuator.coulomb_friction'].copy()
+        self._whole = hexapod_constants(parameters)
+        self._weightless = hexapod_constants(
+            parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
+        self._platform_only = hexapod_constants(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION, **_NO_LEGS}))
 
     def __call__(self, motions: Array, wrenches: Array) -> Array:
         """
-        Return the forces (N, 6, 6) [N]: sample, cause in the order of CAUSES, leg.
+        Return the forces (N, 6, 6) [N]: sample, source in the order of SOURCES, leg.
 
         They sum to the demanded forces. nan where J_inv cannot be solved.
 
         Parameters
         ----------
-        motions : (N, 24)
-            Rows of motion, laid out as ``inverse_dynamics`` says.
-        wrenches : (N, 6) or (1, 6)
-            Loads on the platform at its origin, base axes [N, N m]; one row for all.
+        motions : (N, MOTION)
+            Rows of motion, laid out as ``rows`` says.
+        wrenches : (N, WRENCH) or (1, WRENCH)
+            External wrenches at the platform's origin, base axes [N, N m]; one row for all.
 
         """
-        forces = np.empty((len(motions), len(CAUSES), 6))
+        forces = np.empty((len(motions), len(SOURCES), 6))
         loaded = bool(wrenches.any())
         for first in range(0, len(motions), _TOGETHER):
             part = slice(first, first + _TOGETHER)
@@ -86,25 +130,26 @@ class ForceCauses:
         return forces
 
     def _split(self, motions: Array, wrenches: Array | None, forces: Array) -> None:
-        gravity, platform_inertia, leg_inertia, velocity_terms, friction, wrench = (
-            forces[:, n] for n in range(len(CAUSES)))
+        by = ForceBreakdown(*(forces[:, n] for n in range(len(SOURCES))))
         rows = motions.copy()
-        rows[:, 12:] = 0.0  # at rest
-        results = self._machine.solve(rows)
-        gravity[:] = results[:, FORCES]
+        rows[:, TWIST.start:MOTION] = 0.0  # at rest
+        results = batch.solve(self._whole, rows)
+        by.gravity[:] = results[:, FORCES]
         unsolvable = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
-        wrench[:] = 0.0 if wrenches is None else self._weightless.solve(rows, wrenches)[:, FORCES]
+        by.wrench[:] = 0.0 if wrenches is None else batch.solve(
+            self._weightless, rows, wrenches)[:, FORCES]
 
         rows[:, ACCELERATION] = motions[:, ACCELERATION]
-        platform_inertia[:] = self._platform_only.solve(rows)[:, FORCES]
-        leg_inertia[:] = self._weightless.solve(rows)[:, FORCES] - platform_inertia
+        by.platform_inertia[:] = batch.solve(self._platform_only, rows)[:, FORCES]
+        by.leg_inertia[:] = (batch.solve(self._weightless, rows)[:, FORCES]
+                             - by.platform_inertia)
 
         rows[:, ACCELERATION] = 0.0
         rows[:, TWIST] = motions[:, TWIST]
-        results = self._weightless.solve(rows)
-        velocity_terms[:] = results[:, FORCES]
+        results = batch.solve(self._weightless, rows)
+        by.velocity[:] = results[:, FORCES]
         # The law itself: what it adds would drown in the other forces near a singularity.
-        rates = results[:, RATES]
-        friction[:] = self._viscous * rates + self._coulomb * np.clip(
-            rates / kernel.COULOMB_RATE, -1.0, 1.0)
+        own = np.empty((len(rows), 6))
+        friction(results[:, RATES].copy(), self._viscous, self._coulomb, own)
+        by.friction[:] = own
         forces[unsolvable] = np.nan

@@ -16,11 +16,11 @@
 Forward dynamics: how the platform accelerates under given leg forces.
 
 ``X'' = M^-1 (J_inv^T (f - friction) + wrench - C X' - G)``, on the vectors of the inverse path:
-what the legs would have to carry without acceleration comes from it, and M is made of sums
-over the legs, ``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with J_i = [1,
--skew(a_i)], j_i the leg's row of J_inv and e_i what resists motion across the leg. M is positive
-definite for every machine, so Cholesky solves it without a pivot (Golub and Van Loan, Matrix
-Computations, 4th ed., 4.2).
+the load without acceleration comes from it, and M is made of sums over the legs,
+``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with J_i = [1, -skew(a_i)], j_i
+the leg's row of J_inv and e_i what resists motion across the leg. M is positive definite for
+every hexapod, so Cholesky solves it without a pivot (Golub and Van Loan, Matrix Computations,
+4th ed., 4.2).
 """
 
 from __future__ import annotations
@@ -30,11 +30,15 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.hexapod_constants import (
+    characteristic_length_of, leg_of, platform_of)
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.kernel import (
-    BODY, LEG, leg_dynamics, leg_inertia, leg_line, platform_dynamics)
+from stewart_dynamics.mechanics.kernel import leg_dynamics, platform_dynamics
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION,
+    ROTATION)
 from stewart_dynamics.mechanics.vectors import (
-    add, Matrix3, rotate, scale, subtract, symmetric, Symmetric3, Vector3)
+    add, Matrix3, read3, read9, rotate, scale, subtract, symmetric, Symmetric3, Vector3)
 
 # Scratch memory: the lower triangle of M, and what becomes the acceleration.
 _RIGHT = 36
@@ -61,22 +65,30 @@ def _turned(rotation: Matrix3, inertia: Symmetric3) -> Symmetric3:
 
 
 @inlined
-def _put_body(work: Array, mass: float, moment: Vector3, inertia: Symmetric3, size: float,
-              ) -> None:
-    """Store the M of a rigid body with this moment of mass [kg m] and inertia about the origin."""
-    i = 1.0 / size
-    x, y, z = scale(i, moment)
+def _sum6(a: Symmetric3, b: Symmetric3) -> Symmetric3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+@inlined
+def _add_body(work: Array, mass: float, moment: Vector3, inertia: Symmetric3,
+              inverse_size: float) -> None:
+    """Add the M of a rigid body with this moment of mass [kg m] and inertia about the origin."""
+    x, y, z = scale(inverse_size, moment)
     for n in range(3):
-        for k in range(n):
-            work[6 * n + k] = 0.0
-        work[7 * n] = mass
-    work[18], work[19], work[20] = 0.0, -z, y
-    work[24], work[25], work[26] = z, 0.0, -x
-    work[30], work[31], work[32] = -y, x, 0.0
-    i *= i
-    work[21] = i * inertia[0]
-    work[27], work[28] = i * inertia[1], i * inertia[3]
-    work[33], work[34], work[35] = i * inertia[2], i * inertia[4], i * inertia[5]
+        work[7 * n] += mass
+    work[19] -= z
+    work[20] += y
+    work[24] += z
+    work[26] -= x
+    work[30] -= y
+    work[31] += x
+    i = inverse_size * inverse_size
+    work[21] += i * inertia[0]
+    work[27] += i * inertia[1]
+    work[28] += i * inertia[3]
+    work[33] += i * inertia[2]
+    work[34] += i * inertia[4]
+    work[35] += i * inertia[5]
 
 
 @inlined
@@ -103,85 +115,68 @@ def _solve(work: Array) -> None:
 
 
 @compiled
-def acceleration(machine: Array, motion: Array, forces: Array, wrench: Array, work: Array,
+def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, work: Array,
                  ) -> None:
     """
     Write the acceleration of a motion under leg forces.
 
     Parameters
     ----------
-    machine : (MACHINE,)
-        The machine's numbers as ``inverse_dynamics`` has them.
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
     motion : (MOTION,)
-        A row of motion, SI units, base axes; its last six numbers are written.
+        A row of motion, SI units, base axes; its acceleration is written.
     forces : (6,)
-        Of the actuators [N], + pushes; their friction is taken off here.
+        Of the actuators [N], + pushes; their friction is subtracted here.
     wrench : (6,)
         Force [N] and moment [N m] on the platform at its origin, base axes.
     work : (WORK,)
         Scratch memory.
 
     """
-    gravity = machine[0], machine[1], machine[2]
-    size = machine[3]
-    inverse_size = 1.0 / size
-    position = motion[0], motion[1], motion[2]
-    rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
-                motion[10], motion[11])
-    velocity = motion[12], motion[13], motion[14]
-    omega = motion[15], motion[16], motion[17]
+    inverse_size = 1.0 / characteristic_length_of(constants)
+    position = read3(motion, POSITION.start)
+    rotation = read9(motion, ROTATION.start)
+    velocity = read3(motion, LINEAR_VELOCITY.start)
+    omega = read3(motion, ANGULAR_VELOCITY.start)
 
     # In coordinates [v; size w] all entries of M are masses.
-    mass = machine[4]
-    com = rotate(rotation, (machine[5], machine[6], machine[7]))
+    mass, center, platform_inertia = platform_of(constants)
+    com = rotate(rotation, center)
     moment = scale(mass, com)
-    inertia = _turned(rotation, (machine[8], machine[9], machine[10], machine[11], machine[12],
-                                 machine[13]))
-    p = _point_inertia(mass, com)
-    xx, xy, xz, yy, yz, zz = (inertia[0] + p[0], inertia[1] + p[1], inertia[2] + p[2],
-                              inertia[3] + p[3], inertia[4] + p[4], inertia[5] + p[5])
-    across_mass = mass
-    for leg in range(6):
-        a, length, inverse_length, _ = leg_line(machine, leg, position, rotation)
-        across = leg_inertia(machine, leg, length, inverse_length)[1]
-        across_mass += across
-        moment = add(moment, scale(across, a))
-        p = _point_inertia(across, a)
-        xx, xy, xz, yy, yz, zz = xx + p[0], xy + p[1], xz + p[2], yy + p[3], yz + p[4], zz + p[5]
-    _put_body(work, across_mass, moment, (xx, xy, xz, yy, yz, zz), size)
-
-    body_force, body_moment = platform_dynamics(
-        machine, rotation, omega, _REST, _REST, gravity)
-    force = subtract((wrench[0], wrench[1], wrench[2]), body_force)
-    torque = subtract((wrench[3], wrench[4], wrench[5]), body_moment)
+    inertia = _sum6(_turned(rotation, platform_inertia), _point_inertia(mass, com))
+    body_force, body_moment = platform_dynamics(constants, rotation, omega, _REST, _REST)
+    force = subtract(read3(wrench, 0), body_force)
+    torque = subtract(read3(wrench, 3), body_moment)
+    for n in range(WORK):
+        work[n] = 0.0
     for n in range(6):
-        work[_RIGHT + n] = 0.0
-    for leg in range(6):
-        length, _, leg_force, leg_moment, actuator, row, _ = leg_dynamics(
-            machine, leg, position, rotation, velocity, omega, _REST, _REST, gravity,
-            inverse_size)
-        force = subtract(force, leg_force)
-        torque = subtract(torque, leg_moment)
-        push = forces[leg] - actuator
-        o = BODY + leg * LEG
-        along = machine[o + 6] + machine[o + 10] - leg_inertia(
-            machine, leg, length, 1.0 / length if length > 0.0 else 0.0)[1]
-        for n in range(6):
-            work[_RIGHT + n] += push * row[n]
-            for k in range(n + 1):
-                work[6 * n + k] += along * row[n] * row[k]
+        leg = leg_dynamics(constants, n, position, rotation, velocity, omega, _REST, _REST)
+        mass += leg.inertia
+        moment = add(moment, scale(leg.inertia, leg.arm))
+        inertia = _sum6(inertia, _point_inertia(leg.inertia, leg.arm))
+        force = subtract(force, leg.force)
+        torque = subtract(torque, leg.moment)
+        push = forces[n] - leg.actuator
+        own = leg_of(constants, n)
+        along = own.piston_mass + own.reflected_mass - leg.inertia
+        for i in range(6):
+            work[_RIGHT + i] += push * leg.row[i]
+            for k in range(i + 1):
+                work[6 * i + k] += along * leg.row[i] * leg.row[k]
+    _add_body(work, mass, moment, inertia, inverse_size)
     for n in range(3):
         work[_RIGHT + n] += force[n]
         work[_RIGHT + 3 + n] += inverse_size * torque[n]
 
     _solve(work)
     for n in range(3):
-        motion[18 + n] = work[_RIGHT + n]
-        motion[21 + n] = inverse_size * work[_RIGHT + 3 + n]
+        motion[LINEAR_ACCELERATION.start + n] = work[_RIGHT + n]
+        motion[ANGULAR_ACCELERATION.start + n] = inverse_size * work[_RIGHT + 3 + n]
 
 
 @entry_point
-def solve(machine: Array, motions: Array, forces: Array, wrenches: Array) -> None:
+def solve(constants: Array, motions: Array, forces: Array, wrenches: Array) -> None:
     """
     Write the accelerations of motions (N, MOTION) under forces (N, 6), see ``acceleration``.
 
@@ -190,4 +185,4 @@ def solve(machine: Array, motions: Array, forces: Array, wrenches: Array) -> Non
     work = np.empty(WORK)
     one_wrench = len(wrenches) == 1
     for n in range(len(motions)):
-        acceleration(machine, motions[n], forces[n], wrenches[0 if one_wrench else n], work)
+        acceleration(constants, motions[n], forces[n], wrenches[0 if one_wrench else n], work)

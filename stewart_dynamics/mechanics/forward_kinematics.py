@@ -16,10 +16,10 @@
 Forward kinematics: the pose that belongs to six leg lengths, and the twist to six leg rates.
 
 Up to forty poses have the same six lengths (Dietmaier, The Stewart-Gough platform of general
-geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess says which
-one is meant: the last pose, or the one that is commanded. Newton's method on ``L(X) = L``
-with the exact J_inv goes from it to the pose, and never to where det(J) has the other sign:
-another assembly lies beyond a singularity.
+geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess tells which
+one: the last pose, or the one commanded. Newton's method on ``L(X) = L`` with the exact J_inv
+goes from it to the pose, and never to where det(J) has the other sign: another assembly is on
+the other side of a singularity.
 """
 
 from __future__ import annotations
@@ -27,33 +27,36 @@ from __future__ import annotations
 import math
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.mechanics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.matrix6 import inverse_and_determinant, Rows
+from stewart_dynamics.mechanics.rows import ANGULAR_VELOCITY, LINEAR_VELOCITY, POSITION, ROTATION
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
-from stewart_dynamics.mechanics.vectors import add, cross, dot6, Matrix3, scale, Vector3, Vector6
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, dot6, Matrix3, read3, read9, scale, Vector3, Vector6)
 
-# The lengths of a pose that is found differ by no more than this from those given [m].
+# The lengths of a pose that is found differ by at most this from those given [m].
 RESIDUAL = 1e-12
 
-# What became of a guess.
+# The outcome of a search.
 FOUND, NO_POSE, SINGULAR = range(3)
 
 # Newton's method takes 6 steps at most from nearly everywhere (benchmarks/README.md). A step to
-# the other side of a singularity is halved, and one that leads away by this (of the sum of
-# squares: a first step from afar may overshoot and yet be the fastest way). Where even so small a
-# part of one does, and after so many, there is no pose to be found.
+# the other side of a singularity is halved, and one that increases the sum of squares by this
+# factor (a first step from afar may overshoot and yet be the fastest). Where so small a part of a
+# step still does, and after so many steps, it did not converge.
 _FARTHER = 16.0
 _LEAST_PART = 1e-3
 MOST_STEPS = 50
 
 
 @inlined
-def _row(machine: Array, leg: int, position: Vector3, rotation: Matrix3,
+def _row(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
          ) -> tuple[float, Vector6]:
     """Return a leg's length and row of J_inv, its right half by the characteristic length."""
-    a, length, _, s = leg_line(machine, leg, position, rotation)
-    m = scale(1.0 / machine[3], cross(a, s))
+    a, length, _, s = leg_line(constants, leg, position, rotation)
+    m = scale(1.0 / characteristic_length_of(constants), cross(a, s))
     return length, (s[0], s[1], s[2], m[0], m[1], m[2])
 
 
@@ -87,7 +90,7 @@ def _turned(turn: Vector3, r: Matrix3) -> Matrix3:
     """
     Return R turned about ``turn`` by 2 atan(|turn| / 2): Cayley's map, a rotation exactly.
 
-    It is the turn by |turn| but for the third order, which Newton's method does not feel.
+    It is the turn by |turn| but for the third order, which does not slow Newton's method.
     """
     x, y, z = scale(0.5, turn)
     k = 2.0 / (1.0 + x * x + y * y + z * z)
@@ -104,14 +107,14 @@ def _turned(turn: Vector3, r: Matrix3) -> Matrix3:
 
 
 @compiled
-def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float]:
+def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, float]:
     """
     Find the pose of six lengths.
 
     Parameters
     ----------
-    machine : (MACHINE,)
-        The machine's numbers as ``inverse_dynamics`` has them.
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
     lengths : (6,)
         [m]
     motion : (MOTION,)
@@ -123,23 +126,21 @@ def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float
         FOUND, NO_POSE or SINGULAR; the steps taken; the largest difference in length [m].
 
     """
-    position = motion[0], motion[1], motion[2]
-    # Twice, for a guess may be off by 1e-6; the pose found does not hand on what rounding adds.
-    rotation = _orthonormal(_orthonormal((
-        motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9], motion[10],
-        motion[11])))
-    per_size = 1.0 / machine[3]
+    position = read3(motion, POSITION.start)
+    # Twice, for a guess may be off by 1e-6; rounding does not add up from pose to pose.
+    rotation = _orthonormal(_orthonormal(read9(motion, ROTATION.start)))
+    per_size = 1.0 / characteristic_length_of(constants)
     side = 0.0
     # The last pose that was good to go on from, by how much it missed, and the step from there.
     from_position, from_rotation, before, residual = position, rotation, math.inf, math.inf
     way, turn, part = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
     for steps in range(MOST_STEPS):
-        l0, r0 = _row(machine, 0, position, rotation)
-        l1, r1 = _row(machine, 1, position, rotation)
-        l2, r2 = _row(machine, 2, position, rotation)
-        l3, r3 = _row(machine, 3, position, rotation)
-        l4, r4 = _row(machine, 4, position, rotation)
-        l5, r5 = _row(machine, 5, position, rotation)
+        l0, r0 = _row(constants, 0, position, rotation)
+        l1, r1 = _row(constants, 1, position, rotation)
+        l2, r2 = _row(constants, 2, position, rotation)
+        l3, r3 = _row(constants, 3, position, rotation)
+        l4, r4 = _row(constants, 4, position, rotation)
+        l5, r5 = _row(constants, 5, position, rotation)
         miss = (lengths[0] - l0, lengths[1] - l1, lengths[2] - l2, lengths[3] - l3,
                 lengths[4] - l4, lengths[5] - l5)
         missed = dot6(miss, miss)
@@ -165,40 +166,39 @@ def pose(machine: Array, lengths: Array, motion: Array) -> tuple[int, int, float
         rotation = _turned(scale(part, turn), from_rotation)
         if residual <= RESIDUAL:
             for n in range(3):
-                motion[n] = position[n]
+                motion[POSITION.start + n] = position[n]
             for n in range(9):
-                motion[3 + n] = rotation[n]
+                motion[ROTATION.start + n] = rotation[n]
             return FOUND, steps, residual
     return NO_POSE, MOST_STEPS, residual
 
 
 @compiled
-def twist(machine: Array, rates: Array, motion: Array) -> None:
+def twist(constants: Array, rates: Array, motion: Array) -> None:
     """Write the twist of a row of motion (MOTION,) that leg rates (6,) [m/s] belong to."""
-    position = motion[0], motion[1], motion[2]
-    rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
-                motion[10], motion[11])
+    position = read3(motion, POSITION.start)
+    rotation = read9(motion, ROTATION.start)
     inverse, _ = inverse_and_determinant(
-        _row(machine, 0, position, rotation)[1], _row(machine, 1, position, rotation)[1],
-        _row(machine, 2, position, rotation)[1], _row(machine, 3, position, rotation)[1],
-        _row(machine, 4, position, rotation)[1], _row(machine, 5, position, rotation)[1])
+        _row(constants, 0, position, rotation)[1], _row(constants, 1, position, rotation)[1],
+        _row(constants, 2, position, rotation)[1], _row(constants, 3, position, rotation)[1],
+        _row(constants, 4, position, rotation)[1], _row(constants, 5, position, rotation)[1])
     rate = rates[0], rates[1], rates[2], rates[3], rates[4], rates[5]
-    per_size = 1.0 / machine[3]
+    per_size = 1.0 / characteristic_length_of(constants)
     for n in range(3):
-        motion[12 + n] = dot6(inverse[n], rate)
-        motion[15 + n] = per_size * dot6(inverse[3 + n], rate)
+        motion[LINEAR_VELOCITY.start + n] = dot6(inverse[n], rate)
+        motion[ANGULAR_VELOCITY.start + n] = per_size * dot6(inverse[3 + n], rate)
 
 
 @entry_point
-def poses(machine: Array, lengths: Array, motions: Array, codes: Integers, steps: Integers,
+def poses(constants: Array, lengths: Array, motions: Array, codes: Integers, steps: Integers,
           residuals: Array) -> None:
     """Find the poses of lengths (N, 6), see ``pose``; the rest is (N, MOTION) and (N,)."""
     for n in range(len(motions)):
-        codes[n], steps[n], residuals[n] = pose(machine, lengths[n], motions[n])
+        codes[n], steps[n], residuals[n] = pose(constants, lengths[n], motions[n])
 
 
 @entry_point
-def twists(machine: Array, rates: Array, motions: Array) -> None:
+def twists(constants: Array, rates: Array, motions: Array) -> None:
     """Write the twists of motions (N, MOTION) that leg rates (N, 6) belong to."""
     for n in range(len(motions)):
-        twist(machine, rates[n], motions[n])
+        twist(constants, rates[n], motions[n])

@@ -32,7 +32,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.end_stops import stiffness_and_damping
-from stewart_dynamics.mechanics.kernel import COULOMB_RATE
+from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by

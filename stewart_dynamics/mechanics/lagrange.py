@@ -18,9 +18,9 @@ The Lagrange equations as the paper assembles them: the readable reference.
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
 base axes. Numbers in brackets are equations of Alwan and Sarhan, Dynamic Analysis of Gough
 Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng. Sci. 26(10),
-2018, in the form that holds: docs/misprints.md says what their print has instead. The runtime
-path in ``inverse_dynamics`` computes the same forces without a matrix; a test holds the two
-together. Every function takes any leading shape of samples.
+2018, in their correct form: docs/misprints.md lists what is printed instead. ``kernel`` computes
+the same forces without a matrix and is validated against these. Every function takes any
+leading shape of samples.
 """
 
 from __future__ import annotations
@@ -57,24 +57,30 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
 
     Raises MotionError where a leg has no length, or one that overflows.
     """
+    with np.errstate(all='ignore'):
+        at = unchecked_legs(parameters, position, rotation)
+    bad = ~((at.lengths > 0.0) & np.isfinite(at.lengths))
+    if bad.any():
+        where = tuple(map(int, np.argwhere(bad)[0]))
+        raise MotionError(f'leg {where[-1] + 1} would have a length of {at.lengths[where]} m'
+                          + (f' in sample {list(where[:-1])}' if where[:-1] else ''))
+    return at
+
+
+def unchecked_legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
+    """Return the same; directions are not finite where a leg has no length."""
     arms = np.einsum('...jk,ik->...ij', rotation, parameters['geometry.platform_joints'])
     vectors = position[..., None, :] + arms - parameters['geometry.base_joints']
-    with np.errstate(over='ignore'):
-        lengths = np.linalg.norm(vectors, axis=-1)
-    bad = ~((lengths > 0.0) & np.isfinite(lengths))
-    if bad.any():
-        at = tuple(map(int, np.argwhere(bad)[0]))
-        raise MotionError(f'leg {at[-1] + 1} would have a length of {lengths[at]} m'
-                          + (f' in sample {list(at[:-1])}' if at[:-1] else ''))
+    lengths = np.linalg.norm(vectors, axis=-1)
     return Legs(lengths, vectors / lengths[..., None], arms)
 
 
-def jacobian(at: Legs) -> Array:
+def inverse_jacobian(at: Legs) -> Array:
     """Return J_inv (..., 6, 6), row i [s_i, a_i x s_i]: leg rates = J_inv [v; w]: (3)."""
     return np.concatenate([at.directions, np.cross(at.arms, at.directions)], axis=-1)
 
 
-def jacobian_rate(at: Legs, velocity: Array, omega: Array) -> Array:
+def inverse_jacobian_rate(at: Legs, velocity: Array, omega: Array) -> Array:
     """Return dJ_inv/dt (..., 6, 6) under a twist."""
     arm_rates = np.cross(omega[..., None, :], at.arms)
     joint_rates = velocity[..., None, :] + arm_rates
@@ -189,7 +195,7 @@ def mass_matrix(parameters: Parameters, position: Array, rotation: Array) -> Arr
     at = legs(parameters, position, rotation)
     j_com = _joint_jacobian(_center_of_mass(parameters, rotation))
     j = _joint_jacobian(at.arms)
-    j_inv = jacobian(at)
+    j_inv = inverse_jacobian(at)
     m: Array = (
         parameters['platform.mass'] * _transposed(j_com) @ j_com
         + _turning(_platform_inertia(parameters, rotation))
@@ -215,8 +221,9 @@ def coriolis_matrix(
         parameters['platform.mass'] * _transposed(_joint_jacobian(com)) @ j_com_rate
         + _turning(skew(omega) @ _platform_inertia(parameters, rotation))
         + np.sum(_transposed(j) @ (leg_mass(parameters, at) @ j_rate + c @ j), axis=-3)
-        + _transposed(jacobian(at)) @ (parameters['actuator.reflected_mass'][:, None]
-                                       * jacobian_rate(at, velocity, omega)))
+        + _transposed(inverse_jacobian(at)) @ (
+            parameters['actuator.reflected_mass'][:, None]
+            * inverse_jacobian_rate(at, velocity, omega)))
     return coriolis
 
 

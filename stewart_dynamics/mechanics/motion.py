@@ -20,26 +20,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import rotation as rotations
-from stewart_dynamics.mechanics.rows import MOTION
-
-# A rotation matrix further from orthogonal than this is refused.
-ORTHOGONALITY = 1e-6
-
-
-# Where they stand in a row.
-_PLACES = {'position': slice(0, 3), 'rotation': slice(3, 12), 'linear_velocity': slice(12, 15),
-           'angular_velocity': slice(15, 18), 'linear_acceleration': slice(18, 21),
-           'angular_acceleration': slice(21, 24)}
+from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
+from stewart_dynamics.mechanics.pose import as_rotation, matrix_of_quaternion, Pose, Samples
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
+    POSITION, ROTATION)
 
 
-class Motion:
+class Motion(Samples):
     """
     Pose, twist and acceleration of the platform in one sample or any leading shape of samples.
 
-    The arrays are copied, and read-only as properties; ``rows`` (..., MOTION) holds them as the
-    runtime path takes them.
+    Leading shapes broadcast against each other. The arrays are copied; ``motion[3]``,
+    ``motion[::10]`` and ``len(motion)`` work as for an array of samples.
 
     Parameters
     ----------
@@ -52,11 +46,25 @@ class Motion:
     linear_acceleration, angular_acceleration : (..., 3), optional
         Their time derivatives, base axes [m/s^2, rad/s^2]; zero by default.
 
+    Attributes
+    ----------
+    position, rotation, quaternion : (..., 3), (..., 3, 3), (..., 4)
+        Read-only; the quaternion is x y z w.
+    linear_velocity, angular_velocity : (..., 3)
+        Read-only.
+    linear_acceleration, angular_acceleration : (..., 3)
+        Read-only.
+    pose : Pose
+        The pose alone.
+    rows : (..., 24)
+        All numbers as the compiled functions take them, see ``mechanics.rows``.
+    shape : tuple of int
+        The leading shape; () for one sample.
+
     Raises
     ------
     MotionError
-        The leading shapes cannot be broadcast against each other, a number is not finite, or a
-        matrix is not a rotation.
+        The shapes do not fit, a number is not finite, or a matrix is not a rotation.
 
     """
 
@@ -67,37 +75,46 @@ class Motion:
             linear_acceleration: ArrayLike | None = None,
             angular_acceleration: ArrayLike | None = None,
     ) -> None:
-        parts = {
-            'position': as_array('position', position, (3,)),
-            'rotation': as_array('rotation', rotation, (3, 3)),
-            **{name: as_array(name, part, (3,)) for name, part in (
-                ('linear_velocity', linear_velocity), ('angular_velocity', angular_velocity),
-                ('linear_acceleration', linear_acceleration),
-                ('angular_acceleration', angular_acceleration)) if part is not None}}
-        self.shape = common_shape(**{
-            name: part.shape[:-2] if name == 'rotation' else part.shape[:-1]
-            for name, part in parts.items()})
-        r = parts['rotation']
-        with np.errstate(over='ignore', invalid='ignore'):
-            error = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1))
-            good = (error <= ORTHOGONALITY) & (np.linalg.det(r) > 0.0)
-        if not good.all():
-            at = tuple(map(int, np.argwhere(~good)[0]))
-            raise MotionError(
-                f'rotation{list(at) if at else ""}: {r[at].tolist()}: not a rotation: '
-                f'R^T R is {error[at]:.3g} off the identity, at most {ORTHOGONALITY:g}, with a '
-                'determinant of +1')
-        parts['rotation'] = r.reshape(*r.shape[:-2], 9)
+        turn = as_rotation(rotation)
+        parts = {'position': (POSITION, as_array('position', position, (3,)))}
+        for name, where, part in (
+                ('linear_velocity', LINEAR_VELOCITY, linear_velocity),
+                ('angular_velocity', ANGULAR_VELOCITY, angular_velocity),
+                ('linear_acceleration', LINEAR_ACCELERATION, linear_acceleration),
+                ('angular_acceleration', ANGULAR_ACCELERATION, angular_acceleration)):
+            if part is not None:
+                parts[name] = where, as_array(name, part, (3,))
+        self.shape = common_shape(rotation=turn.shape[:-2], **{
+            name: part.shape[:-1] for name, (_, part) in parts.items()})
         self.rows = np.zeros((*self.shape, MOTION))
-        for name, part in parts.items():
-            self.rows[..., _PLACES[name]] = part
+        self.rows[..., ROTATION] = turn.reshape(*turn.shape[:-2], 9)
+        for where, array in parts.values():
+            self.rows[..., where] = array
 
     @classmethod
-    def of_rows(cls, rows: Array) -> Motion:
-        """Return the motion that rows (..., MOTION) of checked numbers are; they are its own."""
-        motion = cls.__new__(cls)
-        motion.rows, motion.shape = rows, rows.shape[:-1]
-        return motion
+    def from_pose(
+            cls, pose: Pose | Motion, linear_velocity: ArrayLike | None = None,
+            angular_velocity: ArrayLike | None = None,
+            linear_acceleration: ArrayLike | None = None,
+            angular_acceleration: ArrayLike | None = None,
+    ) -> Motion:
+        """Return the motion through a pose, at rest by default; the rest is as in Motion."""
+        if not isinstance(pose, Pose | Motion):
+            raise wrong_type('pose', pose, 'a Pose or a Motion')
+        return cls(pose.position, pose.rotation, linear_velocity, angular_velocity,
+                   linear_acceleration, angular_acceleration)
+
+    @classmethod
+    def from_quaternion(
+            cls, position: ArrayLike, quaternion: ArrayLike,
+            linear_velocity: ArrayLike | None = None,
+            angular_velocity: ArrayLike | None = None,
+            linear_acceleration: ArrayLike | None = None,
+            angular_acceleration: ArrayLike | None = None,
+    ) -> Motion:
+        """Return the motion with a quaternion x y z w (..., 4), see Pose.from_quaternion."""
+        return cls(position, matrix_of_quaternion(quaternion), linear_velocity,
+                   angular_velocity, linear_acceleration, angular_acceleration)
 
     @classmethod
     def from_euler(
@@ -119,84 +136,42 @@ class Motion:
 
         """
         angle = as_array('angles', angles, (3,))
-        rate = as_array('angle_rates', angle_rates, (3,))
-        acceleration = as_array('angle_accelerations', angle_accelerations, (3,))
-        try:
+        rate = optional_array('angle_rates', angle_rates, (3,))
+        acceleration = optional_array('angle_accelerations', angle_accelerations, (3,))
+        common_shape(angles=angle.shape[:-1], angle_rates=rate.shape[:-1],
+                     angle_accelerations=acceleration.shape[:-1])
+        with np.errstate(over='ignore', invalid='ignore'):
             e = rotations.euler_rate_matrix(angle)
             omega = _apply(e, rate)
             alpha = _apply(e, acceleration) + _apply(
                 rotations.euler_rate_matrix_rate(angle, rate), rate)
-        except ValueError as exc:
-            raise MotionError(
-                f'angles {angle.shape}, angle_rates {rate.shape} and angle_accelerations '
-                f'{acceleration.shape} do not fit each other') from exc
         return cls(position, rotations.from_euler(angle), linear_velocity, omega,
                    linear_acceleration, alpha)
 
     @property
-    def position(self) -> Array:
-        """Origin of the platform frame in the base frame, (..., 3) [m]."""
-        return self._view('position')
-
-    @property
-    def rotation(self) -> Array:
-        """Platform axes to base axes, (..., 3, 3)."""
-        return self._view('rotation').reshape(*self.shape, 3, 3)
+    def pose(self) -> Pose:
+        """The pose alone; it shares the motion's memory."""
+        return Pose.of_rows(self.rows[..., POSE])
 
     @property
     def linear_velocity(self) -> Array:
         """Velocity of the platform's origin, base axes, (..., 3) [m/s]."""
-        return self._view('linear_velocity')
+        return self._part(LINEAR_VELOCITY)
 
     @property
     def angular_velocity(self) -> Array:
         """Angular velocity, base axes, (..., 3) [rad/s]."""
-        return self._view('angular_velocity')
+        return self._part(ANGULAR_VELOCITY)
 
     @property
     def linear_acceleration(self) -> Array:
         """Acceleration of the platform's origin, base axes, (..., 3) [m/s^2]."""
-        return self._view('linear_acceleration')
+        return self._part(LINEAR_ACCELERATION)
 
     @property
     def angular_acceleration(self) -> Array:
         """Angular acceleration, base axes, (..., 3) [rad/s^2]."""
-        return self._view('angular_acceleration')
-
-    def __repr__(self) -> str:
-        """Return the shape, and the numbers of a single sample."""
-        if self.shape:
-            return f'Motion of shape {self.shape}'
-        return f'Motion(position={self.position.tolist()}, rotation={self.rotation.tolist()}, ...)'
-
-    def _view(self, name: str) -> Array:
-        view = self.rows[..., _PLACES[name]]
-        view.setflags(write=False)
-        return view
-
-
-def as_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
-    """Return a finite array whose shape ends so, zeros for none; else MotionError names it."""
-    if value is None:
-        return np.zeros(tail)
-    try:
-        array = np.asarray(value, dtype=float)
-    except (OverflowError, TypeError, ValueError) as exc:
-        raise MotionError(f'{name}: not an array of numbers: {exc}') from exc
-    if array.shape[-len(tail):] != tail:
-        raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')
-    if not np.isfinite(array).all():
-        at = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
-        raise MotionError(f'{name}{list(at)}: {array[at]}: must be finite')
-    return array
-
-
-def common_shape(**shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the leading shape that all of these broadcast to; else MotionError names them."""
-    try:
-        return np.broadcast_shapes(*shapes.values())
-    except ValueError as exc:
-        raise MotionError(f'the leading shapes do not fit each other: {shapes}') from exc
+        return self._part(ANGULAR_ACCELERATION)
 
 
 def _apply(matrix: Array, vector: Array) -> Array:

@@ -35,7 +35,8 @@ from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import ACCELERATION, consecutive, MOTION, ROTATION, TWIST
-from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, scale, Vector3
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, dot, Matrix3, read3, scale, Vector3)
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
 STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
@@ -57,11 +58,6 @@ _matrix = inlined(from_quaternion)
 
 
 @inlined
-def _vector3(numbers: Array, at: int) -> Vector3:
-    return numbers[at], numbers[at + 1], numbers[at + 2]
-
-
-@inlined
 def _rotation(state: Array) -> Matrix3:
     """Return R of the quaternion, which within a step is not of unit length."""
     at = STATE_QUATERNION.start
@@ -72,14 +68,14 @@ def _rotation(state: Array) -> Matrix3:
 
 @inlined
 def _twist(state: Array) -> tuple[Vector3, Vector3]:
-    return _vector3(state, STATE_TWIST.start), _vector3(state, STATE_TWIST.start + 3)
+    return read3(state, STATE_TWIST.start), read3(state, STATE_TWIST.start + 3)
 
 
 @compiled
-def _slope(machine: Array, stops: Array, state: Array, loads: Array, motion: Array,
+def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: Array,
            forces: Array, work: Array, slope: Array) -> None:
     """Write a state's time derivative under its loads; motion, forces and work are memory."""
-    position, rotation = _vector3(state, 0), _rotation(state)
+    position, rotation = read3(state, 0), _rotation(state)
     velocity, omega = _twist(state)
     for n in range(3):
         motion[n] = state[n]
@@ -88,12 +84,12 @@ def _slope(machine: Array, stops: Array, state: Array, loads: Array, motion: Arr
     for n in range(6):
         motion[TWIST.start + n] = state[STATE_TWIST.start + n]
     for leg in range(6):
-        a, length, _, s = leg_line(machine, leg, position, rotation)
+        a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
         forces[leg] = loads[leg] + stop_force(stops, leg, length, rate)
-    acceleration(machine, motion, forces, loads[6:], work)
+    acceleration(constants, motion, forces, loads[6:], work)
     at = STATE_QUATERNION.start
-    vector, scalar = _vector3(state, at), state[at + 3]
+    vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))
     for n in range(3):
         slope[n] = velocity[n]
@@ -104,18 +100,18 @@ def _slope(machine: Array, stops: Array, state: Array, loads: Array, motion: Arr
 
 
 @compiled
-def _write_legs(machine: Array, state: Array, result: Array) -> float:
+def _write_legs(constants: Array, state: Array, result: Array) -> float:
     """
     Write lengths and rates of the legs.
 
     Return the largest of the angular speed and the speeds of the platform joints relative to
     their legs' lengths [1/s]; infinite where a leg has no length.
     """
-    position, rotation = _vector3(state, 0), _rotation(state)
+    position, rotation = read3(state, 0), _rotation(state)
     velocity, omega = _twist(state)
     fastest = math.sqrt(dot(omega, omega))
     for leg in range(6):
-        a, length, inverse_length, s = leg_line(machine, leg, position, rotation)
+        a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
         joint_velocity = add(velocity, cross(omega, a))
         moving = inverse_length * math.sqrt(dot(joint_velocity, joint_velocity))
         result[leg] = length
@@ -125,23 +121,23 @@ def _write_legs(machine: Array, state: Array, result: Array) -> float:
 
 
 @compiled
-def _next_state(machine: Array, stops: Array, loads: Array, state: Array, h: float,
+def _next_state(constants: Array, stops: Array, loads: Array, state: Array, h: float,
                 motion: Array, forces: Array, work: Array, slope: Array, mean: Array,
                 after: Array) -> bool:
     """Write the state one step later, and return whether it is finite; the rest is memory."""
-    _slope(machine, stops, state, loads, motion, forces, work, slope)
+    _slope(constants, stops, state, loads, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] = slope[n]
         after[n] = state[n] + 0.5 * h * slope[n]
-    _slope(machine, stops, after, loads, motion, forces, work, slope)
+    _slope(constants, stops, after, loads, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] += 2.0 * slope[n]
         after[n] = state[n] + 0.5 * h * slope[n]
-    _slope(machine, stops, after, loads, motion, forces, work, slope)
+    _slope(constants, stops, after, loads, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] += 2.0 * slope[n]
         after[n] = state[n] + h * slope[n]
-    _slope(machine, stops, after, loads, motion, forces, work, slope)
+    _slope(constants, stops, after, loads, motion, forces, work, slope)
     finite = True
     square = 0.0
     for n in range(STATE):
@@ -155,15 +151,15 @@ def _next_state(machine: Array, stops: Array, loads: Array, state: Array, h: flo
 
 
 @entry_point
-def advance(machine: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
+def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
             result: Array, steps: int, h: float) -> None:
     """
     Take steps of h [s] and write the state and, beside it, the result.
 
     Parameters
     ----------
-    machine : (MACHINE,)
-        The constants of the hexapod as ``kernel`` takes them.
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
     stops : (STOPS,)
         The end stops, see ``end_stops``.
     largest_forces : (6,)
@@ -185,17 +181,17 @@ def advance(machine: Array, stops: Array, largest_forces: Array, loads: Array, s
         most = largest_forces[leg]
         loads[leg] = min(max(loads[leg], -most), most)
         result[RESULT_FORCES.start + leg] = loads[leg]
-    sound = h * _write_legs(machine, state, result) <= LARGEST_MOVE
+    sound = h * _write_legs(constants, state, result) <= LARGEST_MOVE
     for _step in range(steps):
         finite = _next_state(
-            machine, stops, loads, state, h, motion, forces, work, slope, mean, after)
+            constants, stops, loads, state, h, motion, forces, work, slope, mean, after)
         sound = (sound and finite
-                 and h * _write_legs(machine, after, result) <= LARGEST_MOVE)
+                 and h * _write_legs(constants, after, result) <= LARGEST_MOVE)
         if not sound:
             break
         for n in range(STATE):
             state[n] = after[n]
-    _slope(machine, stops, state, loads, motion, forces, work, slope)
+    _slope(constants, stops, state, loads, motion, forces, work, slope)
     for n in range(6):
         sound = sound and math.isfinite(slope[STATE_TWIST.start + n])
     for n in range(6):
@@ -204,5 +200,5 @@ def advance(machine: Array, stops: Array, largest_forces: Array, loads: Array, s
             result[RESULT_FORCES.start + n] = 0.0
         result[RESULT_ACCELERATION.start + n] = (
             slope[STATE_TWIST.start + n] if sound else 0.0)
-    _write_legs(machine, state, result)
+    _write_legs(constants, state, result)
     result[RESULT_SOUND] = 1.0 if sound else 0.0

@@ -28,7 +28,7 @@ from stewart_dynamics.parameter_set import Parameter, ParameterSet
 
 _POSE = 'X Y Z alpha beta gamma'
 
-TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
+REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('target', 'string', 'node that gets the setpoints, on <target>/setpoint/...',
               default='stewart_dynamics'),
     Parameter('base_frame', 'string', 'frame of the setpoints', default='base'),
@@ -57,10 +57,10 @@ TRAJECTORY_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for
 )})
 
 
-class TrajectoryParameters(ParameterSet):
+class ReferenceMotionParameters(ParameterSet):
     """A reference motion, and how it is published."""
 
-    table = TRAJECTORY_PARAMETERS
+    table = REFERENCE_MOTION_PARAMETERS
     node = 'stewart_trajectory'
 
     def _check_together(self, source: str) -> None:

@@ -16,13 +16,14 @@
 How near a singularity a motion is, and the warning of it.
 
 Near det(J) = 0 leg forces grow as 1 / det. A crossing may fall between two samples, so a
-change of sign counts as one; and since d(det)/dt is known, it is foretold.
+change of sign counts as one; and since d(det)/dt is known, it is predicted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from enum import Enum
+from enum import IntEnum
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,68 +37,94 @@ from stewart_dynamics.parameters import Parameters
 # forces are neither computed nor published.
 UNSOLVABLE_CONDITION = 1e12
 
-# A warning or stop ends below this part of the condition at which it began, a foretold
-# crossing beyond the time divided by it.
+# Hysteresis: a warning or stop ends below this part of the condition number at which it began,
+# or when the predicted time to the crossing exceeds the time divided by it.
 LEAVING = 0.8
 
 
+class Cause(IntEnum):
+    """Why the warning is on."""
+
+    NONE = 0
+    CONDITION = 1
+    PREDICTED = 2
+    CROSSED = 3
+
+    @property
+    def text(self) -> str:
+        """The cause in words."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Cause.NONE: 'none',
+    Cause.CONDITION: 'condition number above warn_condition',
+    Cause.PREDICTED: 'crossing of det(J) = 0 predicted within warn_time',
+    Cause.CROSSED: 'det(J) changed its sign since the last sample',
+}
+
+# The state after a sample as an array: the cause, whether the condition number is inside
+# stop_condition, the last det(J) that was not zero, time to crossing, changes of sign so far.
+CAUSE, STOPPED, LAST, TIME, CROSSINGS, STATE = range(6)
+
+# The thresholds as an array, in this order.
+WARN_CONDITION, STOP_CONDITION, WARN_TIME, THRESHOLDS = range(4)
+
+
 def time_to_crossing(determinant: ArrayLike, determinant_rate: ArrayLike) -> NDArray[Any]:
-    """Return after how long det(J) is zero if it goes on at its rate [s]; inf where never."""
+    """Return after what time det(J) is zero at its present rate [s]; inf where never."""
     det, rate = np.asarray(determinant, dtype=float), np.asarray(determinant_rate, dtype=float)
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         time = -det / rate
     return np.where(time >= 0.0, time, np.inf)
 
 
-class Cause(Enum):
-    """Why the warning is on."""
-
-    NONE = 'none'
-    CONDITION = 'condition number above warn_condition'
-    FORETOLD = 'crossing of det(J) = 0 foretold within warn_time'
-    CROSSED = 'det(J) changed its sign since the last sample'
-
-
-WARNING_CAUSES = tuple(Cause)
-_CODES = {cause: code for code, cause in enumerate(WARNING_CAUSES)}
-
-
-# A state as numbers: the cause's place in WARNING_CAUSES, whether it is inside
-# stop_condition, the last det(J) that was not zero, time to crossing, changes of sign so far.
-CAUSE, STOPPED, LAST, TIME, CROSSINGS, STATE = range(6)
-
-_NONE, _CONDITION, _FORETOLD, _CROSSED = range(4)
+def thresholds(parameters: Parameters) -> Array:
+    """Return the thresholds that parameters give, (THRESHOLDS,)."""
+    values = np.empty(THRESHOLDS)
+    values[WARN_CONDITION] = parameters['singularity.warn_condition']
+    values[STOP_CONDITION] = parameters['singularity.stop_condition']
+    values[WARN_TIME] = parameters['singularity.warn_time']
+    return values
 
 
 @inlined
-def advance(state: Array, thresholds: Array, determinant: float, determinant_rate: float,
+def forget(state: Array) -> None:
+    """Forget the samples so far: the next one is the first, but for the count of crossings."""
+    state[CAUSE] = Cause.NONE.value
+    state[STOPPED] = 0.0
+    state[LAST] = 0.0
+
+
+@inlined
+def advance(state: Array, limits: Array, determinant: float, determinant_rate: float,
             condition: float) -> None:
     """
-    Bring a state on by one more sample.
+    Update a state by one more sample.
 
     Parameters
     ----------
     state : (STATE,)
         Written.
-    thresholds : (3,)
-        warn_condition, stop_condition, warn_time.
+    limits : (THRESHOLDS,)
+        The thresholds; what follows them in the array is not read.
     determinant, determinant_rate, condition : float
         Of the sample.
 
     """
     leaving = LEAVING if state[CAUSE] > 0.0 else 1.0
-    time = -determinant / determinant_rate if determinant_rate != 0.0 else np.inf
+    time = -determinant / determinant_rate if determinant_rate != 0.0 else math.inf
     if not time >= 0.0:
-        time = np.inf
-    cause = _NONE
+        time = math.inf
+    cause = Cause.NONE.value
     if determinant * state[LAST] < 0.0:
-        cause = _CROSSED
+        cause = Cause.CROSSED.value
         state[CROSSINGS] += 1.0
-    elif condition >= thresholds[0] * leaving:
-        cause = _CONDITION
-    elif time < thresholds[2] / leaving:
-        cause = _FORETOLD
-    stop = thresholds[1] * (LEAVING if state[STOPPED] > 0.0 else 1.0)
+    elif condition >= limits[WARN_CONDITION] * leaving:
+        cause = Cause.CONDITION.value
+    elif time < limits[WARN_TIME] / leaving:
+        cause = Cause.PREDICTED.value
+    stop = limits[STOP_CONDITION] * (LEAVING if state[STOPPED] > 0.0 else 1.0)
     state[CAUSE], state[STOPPED], state[TIME] = cause, condition >= stop, time
     if determinant != 0.0:
         state[LAST] = determinant
@@ -111,7 +138,7 @@ class Singularity(NamedTuple):
     """Inside stop_condition."""
     determinant: float = 0.0
     """The last that was not zero."""
-    time_to_crossing: float = np.inf
+    time_to_crossing: float = math.inf
     crossings: int = 0
     """Changes of sign of det(J) so far."""
 
@@ -122,26 +149,21 @@ class Singularity(NamedTuple):
 
     @classmethod
     def of(cls, numbers: Iterable[float]) -> Singularity:
-        """Return the state that is in STATE numbers."""
+        """Return the state that STATE numbers hold."""
         cause, stopped, determinant, time, crossings = numbers
-        return cls(WARNING_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
+        return cls(_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The state in STATE numbers."""
-        return (_CODES[self.cause], self.stopped, self.determinant, self.time_to_crossing,
-                self.crossings)
+        """The state as STATE numbers."""
+        return self.cause, self.stopped, self.determinant, self.time_to_crossing, self.crossings
 
     def after(self, parameters: Parameters, determinant: float, determinant_rate: float,
               condition: float) -> Singularity:
         """Return the state after one more sample."""
-        state = np.array(self.numbers)
+        state = np.array(self.numbers, dtype=float)
         advance(state, thresholds(parameters), determinant, determinant_rate, condition)
         return Singularity.of(state.tolist())
 
 
-def thresholds(parameters: Parameters) -> Array:
-    """Return warn_condition, stop_condition and warn_time (3,)."""
-    return np.array([parameters['singularity.warn_condition'],
-                     parameters['singularity.stop_condition'],
-                     parameters['singularity.warn_time']])
+_CAUSES = tuple(Cause)  # far faster to look up by number than Cause(number)

@@ -12,98 +12,87 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A Gough-Stewart platform: what the library's user calls."""
+"""A Gough-Stewart platform: the calls of the library."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics, kernel, lagrange
-from stewart_dynamics.mechanics.jit import COMPILED
-from stewart_dynamics.mechanics.motion import as_array, common_shape, Motion
+from stewart_dynamics.errors import PoseError, SingularityError
+from stewart_dynamics.mechanics import (
+    batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility, stiffness)
+from stewart_dynamics.mechanics.arguments import (
+    as_array, check_finite, common_shape, optional_array, wrong_type)
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows
+from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.inverse_dynamics import InverseDynamics
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.platform_arguments import (
+    check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
+from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
-    UNIT_LOAD_FORCES, WRENCH)
-from stewart_dynamics.mechanics.singularity import time_to_crossing, UNSOLVABLE_CONDITION
+    FORCES, LENGTHS, MOTION, POSE, POSITION, RESULT, TWIST, WRENCH)
+from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters import Parameters
-
-# A thread gets no fewer samples than this: a millisecond's work, far more than starting it costs.
-_SAMPLES_FOR_A_THREAD = 4096
-_PARTS_OF_A_THREAD = 8
-_CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
-
-
-class InverseDynamics(NamedTuple):
-    """What the six legs do in a motion; (...) is the motion's leading shape."""
-
-    lengths: Array
-    """Lengths (..., 6) [m]."""
-    rates: Array
-    """Their time derivatives (..., 6) [m/s], + extends."""
-    forces: Array
-    """Forces of the actuators (..., 6) [N], + pushes."""
-    unit_load_forces: Array
-    """
-    Largest force of each leg under a unit load on the platform (..., 6).
-
-    The load is any force F and moment M with F^2 + (M / l)^2 = 1, l the characteristic length.
-    """
-    determinant: Array
-    """det(J) := det(J_inv), (...) [m^3]."""
-    determinant_rate: Array
-    """d(det(J))/dt, (...) [m^3/s]."""
-    condition_number: Array
-    """
-    Ratio of the largest to the smallest singular value of J_inv, (...), at least 1.
-
-    The right three columns of J_inv are divided by the characteristic length first.
-    """
-
-    @property
-    def time_to_crossing(self) -> Array:
-        """Time after which det(J) is zero if it goes on as it does, (...) [s]; inf: never."""
-        return time_to_crossing(self.determinant, self.determinant_rate)
-
-
-class Pose(NamedTuple):
-    """Where the platform is; (...) is the leading shape."""
-
-    position: Array
-    """Origin of the platform frame in the base frame, (..., 3) [m]."""
-    rotation: Array
-    """Platform axes to base axes, (..., 3, 3)."""
 
 
 class StewartPlatform:
     """
-    A machine with given parameters, and the mechanics of it.
+    A hexapod with given parameters, and its mechanics.
 
     All poses are of the platform frame in the base frame, all vectors in base axes, all units
-    SI. Every call takes one sample or any leading shape of samples.
+    SI. Every call takes one sample or any leading shape (...) of samples; the leading shapes of
+    its arguments broadcast against each other. Where a Pose is taken, a Motion will do.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+
+    Attributes
+    ----------
+    parameters : Parameters
+        As given.
+    constants : (CONSTANTS,)
+        The hexapod as the compiled functions take it, see ``mechanics.hexapod_constants``.
+
+    Raises
+    ------
+    MotionError
+        By all calls: an argument has another type or shape, is not finite, or numbers overflow.
+
     """
 
     def __init__(self, parameters: Parameters) -> None:
+        if not isinstance(parameters, Parameters):
+            raise wrong_type('parameters', parameters, 'Parameters; StewartPlatform.from_yaml '
+                             'reads a file, Parameters takes a dict')
         self.parameters = parameters
-        self.machine = _machine_numbers(parameters)
-        """Its numbers (MACHINE,) as ``inverse_dynamics`` (the module) takes them."""
-        self._no_wrench = np.zeros((1, WRENCH))
+        self.constants = hexapod_constants(parameters)
+        self._breakdown: ForceBreakdownRows | None = None
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> StewartPlatform:
-        """Return the machine of a parameter file; ParameterError says what is wrong in it."""
+        """Return the hexapod of a parameter file; ParameterError says what is wrong in it."""
         return cls(Parameters.from_yaml(path))
 
+    def __repr__(self) -> str:
+        """Return what tells hexapods apart: mass and sizes."""
+        p = self.parameters
+        base, platform = (
+            float(np.mean(np.linalg.norm(p[name] - p[name].mean(axis=0), axis=1)))
+            for name in ('geometry.base_joints', 'geometry.platform_joints'))
+        return (f'<StewartPlatform: {p["platform.mass"]:g} kg, joints on {base:.3g} m (base) and '
+                f'{platform:.3g} m (platform)>')
+
     def inverse_dynamics(
-            self, motion: Motion, wrench: ArrayLike | None = None) -> InverseDynamics:
+            self, motion: Motion, wrench: ArrayLike | None = None, *,
+            singular: Literal['raise', 'nan'] = 'raise') -> InverseDynamics:
         """
         Return leg lengths, rates and forces of a motion, and how near a singularity it is.
 
@@ -112,78 +101,86 @@ class StewartPlatform:
         motion : Motion
             Of any leading shape (...).
         wrench : (..., 6), optional
-            Force [N] and moment [N m] that the surroundings put on the platform at its
-            origin, base axes. None by default. The leading shapes of motion and wrench
-            broadcast against each other.
+            External wrench on the platform at its origin: force [N] and moment [N m], base
+            axes; zero by default.
+        singular : 'raise' or 'nan'
+            What to do where J_inv cannot be solved: raise, or return nan as forces there.
 
         Raises
         ------
-        MotionError
-            The wrench does not fit the motion or is not finite, or numbers overflow.
         SingularityError
             J_inv cannot be solved in a sample: it names the sample.
 
         """
-        rows, wrenches, shape = self._rows(motion, wrench)
+        rows, wrenches, shape = loaded(motion, wrench)
         results = self.solve(rows, wrenches)
-        _check_finite(rows, results)
-        _check_solvable(rows, results)
-        return self._named(results.reshape(*shape, RESULT))
+        check_finite('motion', results.reshape(*shape, RESULT), len(shape))
+        results[find_unsolvable(rows, results, shape, singular), FORCES] = np.nan
+        return InverseDynamics.of_rows(results.reshape(*shape, RESULT))
 
     def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
         """
-        Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
+        Return rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
-        This is the runtime path itself, laid out as ``inverse_dynamics`` (the module) says;
-        large batches use all processors.
+        They are laid out as ``mechanics.rows`` says. The wrenches are (N, 6), or (1, 6) for all
+        samples. Large batches use all processors.
         """
-        # Another layout in memory would be compiled for anew, for seconds.
-        rows = _compiled_for(rows)
-        wrenches = self._no_wrench if wrenches is None else _compiled_for(wrenches)
-        results = np.empty((len(rows), RESULT))
-        _in_parts(len(rows), lambda part: kernel.solve(
-            self.machine, rows[part], wrenches if len(wrenches) == 1 else wrenches[part],
-            results[part]))
-        return results
+        return batch.solve(self.constants, rows, wrenches)
+
+    def force_breakdown(
+            self, motion: Motion, wrench: ArrayLike | None = None, *,
+            singular: Literal['raise', 'nan'] = 'raise') -> ForceBreakdown:
+        """Return the leg forces by source; arguments and errors are ``inverse_dynamics``'s."""
+        rows, wrenches, shape = loaded(motion, wrench)
+        results = self.solve(rows, wrenches)
+        check_finite('motion', results.reshape(*shape, RESULT), len(shape))
+        unsolvable = find_unsolvable(rows, results, shape, singular)
+        if self._breakdown is None:
+            self._breakdown = ForceBreakdownRows(self.parameters)
+        forces = self._breakdown(rows, wrenches)
+        check_finite('motion', np.where(unsolvable[:, None, None], 0.0, forces).reshape(
+            *shape, -1, 6), len(shape))
+        return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(-1, *shape, 6))
 
     def forward_dynamics(
             self, motion: Motion, forces: ArrayLike, wrench: ArrayLike | None = None) -> Motion:
         """
         Return a motion with the accelerations that leg forces give it.
 
-        ``inverse_dynamics`` of what is returned gives the forces back.
+        ``inverse_dynamics`` of the result gives the forces again. No pose is singular here:
+        J_inv is not inverted.
 
         Parameters
         ----------
         motion : Motion
-            Of any leading shape (...); its own accelerations are not looked at.
+            Its own accelerations are ignored.
         forces : (..., 6)
-            Of the actuators [N], + pushes. What friction takes is taken off them.
+            Of the actuators [N], + pushes. Their friction is subtracted.
         wrench : (..., 6), optional
-            Load on the platform, as in ``inverse_dynamics``.
-
-        Raises
-        ------
-        MotionError
-            The arguments do not fit each other, are not finite or overflow. No pose is singular
-            here: J_inv is not inverted.
+            External wrench on the platform, as in ``inverse_dynamics``.
 
         """
+        check_kind(motion, Motion)
         pushes = as_array('forces', forces, (6,))
-        load = as_array('wrench', wrench, (WRENCH,))
+        load = optional_array('wrench', wrench, (WRENCH,))
         shape = common_shape(motion=motion.shape, forces=pushes.shape[:-1],
                              wrench=load.shape[:-1])
-        rows = _copies(motion.rows, shape)
-        pushes, load = _copies(pushes, shape), _copies(load, shape)
-        _in_parts(len(rows), lambda part: forward_dynamics.solve(
-            self.machine, rows[part], pushes[part], load[part]))
-        _check_finite(rows, rows)
-        return Motion.of_rows(rows.reshape(*shape, MOTION))
+        rows = copies(motion.rows, shape)
+        pushes, load = copies(pushes, shape), copies(load, shape)
+        batch.in_parts(len(rows), lambda part: forward_dynamics.solve(
+            self.constants, rows[part], pushes[part], load[part]))
+        rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
+        return Motion.of_rows(rows)
 
-    def forward_kinematics(
-            self, lengths: ArrayLike, guess: Motion | Pose | tuple[ArrayLike, ArrayLike]) -> Pose:
+    def inverse_kinematics(self, pose: Pose | Motion) -> Array:
+        """Return the six leg lengths at a pose, (..., 6) [m]."""
+        rows = motion_rows(pose)
+        lengths = self.solve(rows)[:, LENGTHS].reshape(*pose.shape, 6).copy()
+        return check_finite('leg lengths', lengths, len(pose.shape))
+
+    def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion) -> Pose:
         """
-        Return the pose that six leg lengths belong to, on the guess's side of singularities.
+        Return the pose of six leg lengths, on the guess's side of singularities.
 
         The leading shapes of lengths and guess broadcast against each other. The lengths of the
         pose returned differ by less than 1e-12 m from those given.
@@ -192,186 +189,148 @@ class StewartPlatform:
         ----------
         lengths : (..., 6)
             [m]
-        guess : Motion, Pose or (position, rotation)
-            Where to begin: the last pose, or the one commanded. From 20 % of the machine's
-            height and 0.2 rad away it is found from nearly everywhere (benchmarks/README.md).
+        guess : Pose or Motion
+            Where to begin: the last pose, or the one commanded. From 20 % of the platform's
+            height and 0.2 rad away it converges nearly always (benchmarks/README.md).
 
         Raises
         ------
         PoseError
-            The lengths belong to no pose on the guess's side of singularities.
+            It did not converge: no pose on the guess's side of singularities has the lengths.
         SingularityError
             The guess is singular, or a pose on the way from it.
-        MotionError
-            What is given does not fit or is not finite.
 
         """
         wanted = as_array('lengths', lengths, (6,))
-        begin = guess if isinstance(guess, Motion) else Motion(*guess)
-        shape = common_shape(lengths=wanted.shape[:-1], guess=begin.shape)
-        wanted, rows = _copies(wanted, shape), _copies(begin.rows, shape)
+        check_kind(guess, Pose, Motion, name='guess')
+        shape = common_shape(lengths=wanted.shape[:-1], guess=guess.shape)
+        wanted, rows = copies(wanted, shape), motion_rows(guess, shape)
         codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
         residuals = np.empty(len(rows))
-        _in_parts(len(rows), lambda part: forward_kinematics.poses(
-            self.machine, wanted[part], rows[part], codes[part], steps[part], residuals[part]))
+        batch.in_parts(len(rows), lambda part: forward_kinematics.poses(
+            self.constants, wanted[part], rows[part], codes[part], steps[part], residuals[part]))
         if codes.any():
             at = int(np.argmax(codes > 0))
-            where = (f'sample {at}: lengths {wanted[at].tolist()} m: from the guess '
-                     f'{rows[at, :3].tolist()} m')
+            where = (f'sample {place(at, shape)}: lengths {wanted[at].tolist()} m from the guess '
+                     f'{rows[at, POSITION].tolist()} m')
             if codes[at] == forward_kinematics.SINGULAR:
-                raise SingularityError(f'{where} the way leads to a singular pose, in '
-                                       f'{steps[at]} steps: give a guess clear of it')
+                raise SingularityError(f'{where}: a singular pose after {steps[at]} iterations: '
+                                       'give a guess farther from singularities')
             raise PoseError(
-                f'{where} no pose is found that has them: after {steps[at]} steps a length is '
-                f'{residuals[at]:.3g} m off, must be {forward_kinematics.RESIDUAL:g}')
-        return Pose(rows[:, :3].reshape(*shape, 3).copy(),
-                    rows[:, 3:12].reshape(*shape, 3, 3).copy())
+                f'{where}: did not converge: residual {residuals[at]:.3g} m after {steps[at]} '
+                f'iterations, must be at most {forward_kinematics.RESIDUAL:g}')
+        return Pose.of_rows(rows[:, POSE].reshape(*shape, POSE.stop).copy())
 
-    def twist(self, position: ArrayLike, rotation: ArrayLike, rates: ArrayLike) -> Array:
+    def twist(self, pose: Pose | Motion, rates: ArrayLike) -> Array:
         """
         Return the twist [v; w] (..., 6) of leg rates (..., 6) [m/s] at a pose, base axes.
 
-        Raises SingularityError where J_inv cannot be solved, MotionError for what does not fit.
+        Raises SingularityError where J_inv cannot be solved.
         """
-        motion = Motion(position, rotation)
+        check_kind(pose, Pose, Motion)
         given = as_array('rates', rates, (6,))
-        shape = common_shape(pose=motion.shape, rates=given.shape[:-1])
-        given, rows = _copies(given, shape), _copies(motion.rows, shape)
-        _check_solvable(rows, self.solve(rows))
-        forward_kinematics.twists(self.machine, given, rows)
-        _check_finite(rows, rows)
-        return rows[:, 12:18].reshape(*shape, 6).copy()
+        shape = common_shape(pose=pose.shape, rates=given.shape[:-1])
+        given, rows = copies(given, shape), motion_rows(pose, shape)
+        find_unsolvable(rows, self.solve(rows), shape, 'raise')
+        forward_kinematics.twists(self.constants, given, rows)
+        return check_finite('twist', rows[:, TWIST].reshape(*shape, 6).copy(), len(shape))
 
-    def inverse_kinematics(self, position: ArrayLike, rotation: ArrayLike) -> Array:
-        """Return the six leg lengths at a pose, (..., 6) [m]; MotionError for what is none."""
-        motion = Motion(position, rotation)
-        results = self.solve(motion.rows.reshape(-1, MOTION))
-        lengths = results[:, LENGTHS]
-        if not np.isfinite(lengths).all():
-            raise MotionError('position: out of range, the leg lengths overflow')
-        return lengths.reshape(*motion.shape, 6).copy()
-
-    def jacobian(self, position: ArrayLike, rotation: ArrayLike) -> Array:
+    def inverse_jacobian(self, pose: Pose | Motion) -> Array:
         """Return J_inv (..., 6, 6): leg rates = J_inv [v; w], J_inv^T forces = wrench."""
-        return lagrange.jacobian(self._legs(Motion(position, rotation)))
+        return lagrange.inverse_jacobian(self._legs(pose))
 
-    def jacobian_rate(self, motion: Motion) -> Array:
+    def inverse_jacobian_rate(self, motion: Motion) -> Array:
         """Return dJ_inv/dt (..., 6, 6) in a motion."""
-        return lagrange.jacobian_rate(
-            self._legs(motion), motion.linear_velocity, motion.angular_velocity)
+        check_kind(motion, Motion)
+        with np.errstate(all='ignore'):
+            return check_finite('motion', lagrange.inverse_jacobian_rate(
+                self._legs(motion), motion.linear_velocity, motion.angular_velocity),
+                len(motion.shape))
 
-    def mass_matrix(self, position: ArrayLike, rotation: ArrayLike) -> Array:
+    def mass_matrix(self, pose: Pose | Motion) -> Array:
         """
         Return M (..., 6, 6) of M X'' + C X' + G = J_inv^T f + wrench, with X' = [v; w].
 
         Platform, both parts of each leg, and the actuators' reflected mass.
         """
-        motion = Motion(position, rotation)
-        return lagrange.mass_matrix(self.parameters, motion.position, motion.rotation)
+        check_kind(pose, Pose, Motion)
+        with np.errstate(all='ignore'):
+            return check_finite('pose', lagrange.mass_matrix(
+                self.parameters, pose.position, pose.rotation), len(pose.shape))
 
-    def coriolis_matrix(
-            self, position: ArrayLike, rotation: ArrayLike, linear_velocity: ArrayLike,
-            angular_velocity: ArrayLike, christoffel: bool = False) -> Array:
+    def coriolis_matrix(self, motion: Motion, christoffel: bool = False) -> Array:
         """
         Return C (..., 6, 6); without friction.
 
         C X' is the same either way. The paper's C has X'^T (M' - 2 C) X' = 0; with
         ``christoffel``, M' - 2 C is skew itself, which passivity-based controllers need.
         """
-        motion = Motion(position, rotation, linear_velocity, angular_velocity)
-        return lagrange.coriolis_matrix(
-            self.parameters, motion.position, motion.rotation, motion.linear_velocity,
-            motion.angular_velocity, christoffel)
+        check_kind(motion, Motion)
+        with np.errstate(all='ignore'):
+            return check_finite('motion', lagrange.coriolis_matrix(
+                self.parameters, motion.position, motion.rotation, motion.linear_velocity,
+                motion.angular_velocity, christoffel), len(motion.shape))
 
-    def gravity_vector(self, position: ArrayLike, rotation: ArrayLike) -> Array:
-        """Return G (..., 6) [N, N m]: the wrench that holds the machine at rest."""
-        motion = Motion(position, rotation)
-        return lagrange.gravity_vector(self.parameters, motion.position, motion.rotation)
+    def gravity_vector(self, pose: Pose | Motion) -> Array:
+        """Return G (..., 6) [N, N m]: the wrench that holds platform and legs at rest."""
+        check_kind(pose, Pose, Motion)
+        with np.errstate(all='ignore'):
+            return check_finite('pose', lagrange.gravity_vector(
+                self.parameters, pose.position, pose.rotation), len(pose.shape))
 
-    def _legs(self, motion: Motion) -> lagrange.Legs:
-        return lagrange.legs(self.parameters, motion.position, motion.rotation)
+    def stiffness(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> Array:
+        """
+        Return the stiffness K (..., 6, 6) of the platform at its origin, base axes.
 
-    def _rows(self, motion: Motion, wrench: ArrayLike | None,
-              ) -> tuple[Array, Array, tuple[int, ...]]:
-        """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
-        if wrench is None:
-            return motion.rows.reshape(-1, MOTION), self._no_wrench, motion.shape
-        load = as_array('wrench', wrench, (WRENCH,))
-        shape = common_shape(motion=motion.shape, wrench=load.shape[:-1])
-        rows = (_copies(motion.rows, shape) if shape != motion.shape
-                else motion.rows.reshape(-1, MOTION))
-        return rows, _copies(load, shape), shape
+        Parameters
+        ----------
+        pose : Pose or Motion
+            Of any leading shape (...).
+        leg_stiffness : float or (..., 6)
+            Of each leg along its axis [N/m], one number for all legs or one for each.
 
-    @staticmethod
-    def _named(results: Array) -> InverseDynamics:
-        return InverseDynamics(
-            results[..., LENGTHS],
-            results[..., RATES],
-            results[..., FORCES],
-            results[..., UNIT_LOAD_FORCES],
-            # [()] makes a number of an array without a shape
-            results[..., DETERMINANT][()], results[..., DETERMINANT_RATE][()],
-            results[..., CONDITION][()])
+        Returns
+        -------
+        (..., 6, 6)
+            ``J_inv^T k J_inv`` in [N/m], [N] and [N m/rad]; see ``mechanics.stiffness``.
 
+        """
+        legs = leg_stiffnesses(leg_stiffness)
+        j_inv = self.inverse_jacobian(pose)
+        shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
+        with np.errstate(all='ignore'):
+            return check_finite('stiffness', stiffness.platform_stiffness(j_inv, legs), len(shape))
 
-def _in_parts(many: int, do: Callable[[slice], None]) -> None:
-    """Do so many samples in parts, large batches on all processors."""
-    threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
-    if threads < 2:
-        do(slice(0, many))
-        return
-    # More parts than threads: a thread that is held up leaves more to the others.
-    edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(do, map(slice, edges[:-1], edges[1:])))
+    def natural_modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
+        """
+        Return natural frequencies (..., 6) [Hz] and mode shapes (..., 6, 6) at a pose.
 
+        Arguments are those of ``stiffness``. The mass matrix includes
+        ``actuator.reflected_mass``, as for compliance in the position control; for compliance
+        between held actuators and the platform, set it to zero (``parameters.replaced``).
+        """
+        legs = leg_stiffnesses(leg_stiffness)
+        mass, j_inv = self.mass_matrix(pose), self.inverse_jacobian(pose)
+        shape = common_shape(pose=pose.shape, leg_stiffness=legs.shape[:-1])
+        with np.errstate(all='ignore'):
+            modes = stiffness.natural_modes(mass, j_inv, legs)
+        check_finite('natural modes', modes.frequencies, len(shape))
+        check_finite('natural modes', modes.shapes, len(shape))
+        return modes
 
-def _copies(array: Array, shape: tuple[int, ...]) -> Array:
-    """Return rows (N, ...) of their own of an array that is broadcast to a leading shape."""
-    last = array.shape[-1]
-    if array.shape[:-1] != shape:
-        array = np.broadcast_to(array, (*shape, last))
-    return np.array(array, order='C').reshape(-1, last)
+    def home_pose(self) -> Pose:
+        """
+        Return the home pose: parallel axes, the mean leg halfway between its limits.
 
+        See ``mechanics.home_pose``. Raises ParameterError where the parameters do not tell how
+        high the platform is.
+        """
+        return home_pose.home_pose(self.parameters)
 
-def _check_finite(rows: Array, results: Array) -> None:
-    """Raise MotionError where the results (N, ...) of rows of motion are not finite."""
-    finite = np.isfinite(results).all(axis=-1)
-    if not finite.all():
-        at = int(np.argmin(finite))
-        raise MotionError(f'sample {at}: out of range, the numbers overflow; position '
-                          f'{rows[at, :3].tolist()} m')
+    def check(self) -> tuple[str, ...]:
+        """Return likely mistakes in the parameters, each in one line."""
+        return plausibility.likely_mistakes(self.parameters)
 
-
-def _check_solvable(rows: Array, results: Array) -> None:
-    """Raise SingularityError where the results of rows of motion say that J_inv is singular."""
-    condition = results[:, CONDITION]
-    unsolvable = condition >= UNSOLVABLE_CONDITION
-    if unsolvable.any():
-        at = int(np.argmax(unsolvable))
-        raise SingularityError(
-            f'sample {at}: J_inv cannot be solved: its condition number is '
-            f'{condition[at]:.3g}, must be under {UNSOLVABLE_CONDITION:g}; position '
-            f'{rows[at, :3].tolist()} m')
-
-
-def _compiled_for(array: Array) -> Array:
-    """Return the array, or a copy of it that the runtime path is compiled for."""
-    if array.flags.carray and array.dtype.char == 'd':
-        return array
-    return np.require(array, float, ['C', 'W'])
-
-
-def _machine_numbers(p: Parameters) -> Array:
-    """Return the machine's numbers in the order of the runtime path."""
-    cylinder_mass, cylinder_com = p['legs.cylinder.mass'], p['legs.cylinder.center_of_mass']
-    legs = np.column_stack([
-        p['geometry.base_joints'], p['geometry.platform_joints'],
-        p['legs.piston.mass'], p['legs.piston.center_of_mass'],
-        cylinder_mass * cylinder_com,
-        cylinder_mass * cylinder_com ** 2 + p['legs.cylinder.inertia'] + p['legs.piston.inertia'],
-        p['actuator.reflected_mass'], p['actuator.viscous_friction'],
-        p['actuator.coulomb_friction']])
-    return np.concatenate([
-        p['gravity'], [p['singularity.characteristic_length'], p['platform.mass']],
-        p['platform.center_of_mass'], p['platform.inertia'], legs.ravel()])
+    def _legs(self, pose: Pose | Motion) -> lagrange.Legs:
+        check_kind(pose, Pose, Motion)
+        return lagrange.legs(self.parameters, pose.position, pose.rotation)

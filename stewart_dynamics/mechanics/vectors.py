@@ -20,12 +20,26 @@ Tuples become registers when compiled. Every function is inlined into the loop o
 
 from __future__ import annotations
 
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.jit import inlined
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Matrix3 = tuple[float, float, float, float, float, float, float, float, float]  # row by row
 Symmetric3 = Vector6  # xx xy xz yy yz zz
+
+
+@inlined
+def read3(array: Array, at: int) -> Vector3:
+    """Return three numbers of an array from a place on."""
+    return array[at], array[at + 1], array[at + 2]
+
+
+@inlined
+def read9(array: Array, at: int) -> Matrix3:
+    """Return nine numbers of an array from a place on."""
+    return (array[at], array[at + 1], array[at + 2], array[at + 3], array[at + 4],
+            array[at + 5], array[at + 6], array[at + 7], array[at + 8])
 
 
 @inlined

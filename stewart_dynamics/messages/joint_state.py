@@ -239,7 +239,8 @@ class JointStateReader:
     def _judge(self, data: bytes, fields: _Fields) -> _Known:
         """Return what the layout of a message says."""
         names, many = fields.names, len(fields.names)
-        wanted = {field: fields.numbers[FIELDS.index(field)] for field in self._fields}
+        wanted = {field: fields.numbers[n] for n, field in enumerate(FIELDS)
+                  if field in self._fields}
         reason = details = ''
         if missing := [joint for joint in self._joints if joint not in names]:
             reason = MISSING_JOINTS
@@ -254,8 +255,9 @@ class JointStateReader:
         numbers = [] if reason else list(wanted.values())
         # What is not wanted may be anything.
         free = [slice(at, at + 8 * count) for at, count in fields.numbers]
-        columns = [] if reason else [part * many + names.index(joint)
-                                     for part in range(len(wanted)) for joint in self._joints]
+        columns = [] if reason else [
+            list(wanted).index(field) * many + names.index(joint)
+            for field in self._fields for joint in self._joints]
         return _Known(Layout(data, numbers, gaps=[*fields.gaps, *free]), columns,
                       itemgetter(*columns or [0]), reason, details)
 

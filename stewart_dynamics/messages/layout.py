@@ -42,7 +42,7 @@ class Layout:
     message : bytes
         One of them.
     numbers : sequence of (offset, count)
-        Where doubles stand in it, one part after the other.
+        Where doubles stand in it, in the order of their offsets.
     stamped : bool
         It has a header.
     gaps : sequence of slice

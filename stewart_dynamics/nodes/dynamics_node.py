@@ -30,7 +30,7 @@ from rclpy.parameter import Parameter as RosParameter
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics import jit
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes import parameter_changes
 from stewart_dynamics.nodes.diagnostics_publisher import DiagnosticsPublisher
@@ -174,7 +174,7 @@ class DynamicsNode(LifecycleNode):
         self._models.compile_ahead()
         how = 'compiled ' if jit.COMPILED else ''
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
-        for mistake in doubts(self._settings):
+        for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
         self._messages = OutputMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, {

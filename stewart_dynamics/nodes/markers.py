@@ -28,7 +28,7 @@ import numpy as np
 from visualization_msgs.msg import Marker
 
 from stewart_dynamics.arrays import Array, Six
-from stewart_dynamics.mechanics.plausibility import level_axes
+from stewart_dynamics.mechanics.home_pose import level_axes
 from stewart_dynamics.mechanics.rotation import quaternion_of
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.parameters import Parameters

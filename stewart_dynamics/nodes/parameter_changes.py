@@ -20,7 +20,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.report import LogLine, OK, WARN
 
@@ -63,7 +63,7 @@ def log_lines(before: Parameters, after: Parameters) -> Iterator[LogLine]:
                for name, value in after.given.items() if value != before.given.get(name)]
     if changes:
         yield LogLine(OK, '; '.join(changes))
-    known = doubts(before, geometry=False)
-    for mistake in doubts(after, geometry=False):
+    known = likely_mistakes(before, geometry=False)
+    for mistake in likely_mistakes(after, geometry=False):
         if mistake not in known:
             yield LogLine(WARN, mistake)

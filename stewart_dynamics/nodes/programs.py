@@ -26,7 +26,7 @@ import signal
 import sys
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
@@ -44,7 +44,7 @@ def simulator() -> int:
 
 def trajectory() -> int:
     """Run the node stewart_trajectory; return its exit code."""
-    return _run(TrajectoryParameters, 'trajectory_node')
+    return _run(ReferenceMotionParameters, 'trajectory_node')
 
 
 def parameter_files(arguments: Sequence[str]) -> list[str]:

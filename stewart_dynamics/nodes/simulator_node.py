@@ -32,7 +32,7 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.plausibility import doubts
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
@@ -86,8 +86,8 @@ class SimulatorNode(Node):
         begun = time.monotonic()
         self._plant = Plant(self._settings)
         self._state_messages = StateMessages(self._settings)
-        for doubt in doubts(self._settings):
-            self.get_logger().warning(doubt)
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
         self._rejections = Rejections(self._on_rejection)
         self._wrench_input = WrenchInput(self._settings, self._rejections)
         self._commands: Six | None = None

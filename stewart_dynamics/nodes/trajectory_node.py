@@ -32,7 +32,7 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_count, sample_time
-from stewart_dynamics.mechanics.reference_motion_parameters import TrajectoryParameters
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
@@ -65,7 +65,7 @@ class TrajectoryNode(Node):
         super().__init__(
             'stewart_trajectory', automatically_declare_parameters_from_overrides=True,
             allow_undeclared_parameters=True)
-        self._settings = declare_parameters(self, TrajectoryParameters)
+        self._settings = declare_parameters(self, ReferenceMotionParameters)
         self._done = done
         self._loop = self._settings['loop']
         self._samples = sample_count(self._settings)
@@ -209,4 +209,4 @@ def _quaternion(four: list[float]) -> Any:
 def main() -> int:
     """Run the node; exit code 0, or 1 where its parameters break a rule."""
     done = Future()
-    return run(lambda: TrajectoryNode(done), TrajectoryParameters, done)
+    return run(lambda: TrajectoryNode(done), ReferenceMotionParameters, done)

@@ -24,12 +24,10 @@ from pathlib import Path
 import re
 
 from stewart_dynamics.errors import BagError
+from stewart_dynamics.replay.bag_files import METADATA, STORAGES
 
 FLEET_TABLE, FLEET_PAGE = 'fleet.csv', 'index.html'
 
-_METADATA = 'metadata.yaml'
-# Files of a bag; those that are compressed as a whole too.
-STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 # rosbag2 numbers the files of a recording: <name of the bag>_0.mcap, ...
 _NUMBERED = re.compile(r'(.*)_\d+(\.\w+(?:\.zstd)?)')
 
@@ -41,7 +39,7 @@ def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
     A file is a bag, and so is a folder that holds metadata.yaml. One without, as a recording
     that was killed leaves it, is a bag if it holds the files of one recording, no other
     bag and no bags below it; else each of its files is a bag. Symbolic links, hidden names and
-    results of replays are passed over.
+    results of replays are skipped.
 
     Parameters
     ----------
@@ -57,7 +55,7 @@ def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
         return [path]
     bags = sorted(_below(path, leave_out.resolve() if leave_out else None))
     if not bags:
-        raise BagError(f'{path}: holds no bag: neither {_METADATA} nor files '
+        raise BagError(f'{path}: holds no bag: neither {METADATA} nor files '
                        f'{" or ".join("*" + suffix for suffix in STORAGES)}, in no folder below '
                        'it either (links and hidden folders are not followed)')
     return bags
@@ -73,7 +71,7 @@ def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
         return
     folders = [folder / entry.name for entry in seen if entry.is_dir()]
     files = [folder / entry.name for entry in seen if entry.is_file()]
-    if folder / _METADATA in files:
+    if folder / METADATA in files:
         yield folder
         return
     storages = [file for file in files if file.name.endswith(STORAGES)]
@@ -91,7 +89,7 @@ def _one_recording(files: Sequence[Path]) -> bool:
 
 def _holds_results(folder: Path) -> bool:
     try:
-        return (folder / 'summary.json').is_file() and (folder / 'bag' / _METADATA).is_file()
+        return (folder / 'summary.json').is_file() and (folder / 'bag' / METADATA).is_file()
     except PermissionError:
         return False
 

@@ -21,18 +21,16 @@ import argparse
 from collections.abc import Sequence
 import io
 from pathlib import Path
+import re
 import signal
 import sys
-
-from tqdm import tqdm
+from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics.plausibility import doubts
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, folders_of_results
-from stewart_dynamics.replay.fleet import replay_fleet
-from stewart_dynamics.replay.one import BAD_INPUT, DONE, LIMIT_MET, NODE, Options, replay
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, Options
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters import Parameters
 
 _INTERRUPTED = 130
 _CUTOFF = 10.0
@@ -78,11 +76,12 @@ def _arguments() -> argparse.ArgumentParser:
                'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
                'index.html.\n\nexit codes: 0 done; 1 with --strict, when a limit or singularity '
                'warning was met;\n2 bad arguments, parameters or bags; 3 part of a bag could not '
-               'be read, the rest is done;\nof several bags the gravest: 2, then 3, then 1')
+               'be read, the rest is done;\nof several bags the most severe: 2, then 3, then 1')
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
-                        help='rosbag2 folder, .mcap or .db3 file, or a folder with bags in it')
+                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
+                             'with bags in it')
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
-                        help='parameters of the machine, the file that the node takes')
+                        help='parameters of the hexapod, the file that the node takes')
     parser.add_argument('--output', type=Path, default=Path('replayed'), metavar='DIR',
                         help='folder of the results (default: replayed)')
     parser.add_argument('--force', action='store_true', help='replace results that exist')
@@ -90,7 +89,7 @@ def _arguments() -> argparse.ArgumentParser:
                         help='exit code 1 when a limit or singularity warning was met')
     topics = parser.add_argument_group(
         'topics', 'Setpoints are looked for under the usual names, then by their type.')
-    topics.add_argument('--node', default=NODE, metavar='NAME',
+    topics.add_argument('--node', default=NODE, metavar='NAME', type=_node,
                         help=f'name before the usual topics (default: {NODE})')
     for name, what in (
             ('pose', 'poses'), ('twist', 'twists'), ('accel', 'accelerations'),
@@ -121,7 +120,7 @@ def _arguments() -> argparse.ArgumentParser:
 def _options(given: argparse.Namespace) -> Options:
     names = ('pose', 'twist', 'accel', 'combined', 'wrench')
     return Options(
-        node='/' + given.node.strip('/'),
+        node=given.node,
         topics={name: getattr(given, name) for name in names if getattr(given, name)},
         cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
         measured=given.measured or None,
@@ -129,27 +128,39 @@ def _options(given: argparse.Namespace) -> Options:
 
 
 def _run(given: argparse.Namespace, options: Options) -> int:
+    # Not before: --help is to be answered at once.
+    from stewart_dynamics.mechanics import jit as compiled
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters import Parameters
+    from stewart_dynamics.replay.bags import FLEET_PAGE, folders_of_results
+    from stewart_dynamics.replay.many_bags import replay_fleet
+
     parameters = Parameters.from_yaml(given.params, given.node)
     bags = folders_of_results(given.bags, given.output)
     if compiled.HINT:
         print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
-    for doubt in doubts(parameters):
-        print(f'stewart_replay: {doubt}', file=sys.stderr)
+    for mistake in likely_mistakes(parameters):
+        print(f'stewart_replay: {mistake}', file=sys.stderr)
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(
         bags, parameters, given.output, options, given.jobs, given.scheduler)
     for ended in fleet.ended:
         if ended.text and len(bags) <= _FEW:
-            print(f'{ended.text}\n')
+            _say(f'{ended.text}\n')
         if ended.error:
             _complain(ended.error)
-    print(fleet.text().partition('\n')[0])
-    print(f'results: {given.output / FLEET_PAGE}')
+    _say(fleet.text().partition('\n')[0])
+    _say(f'results: {given.output / FLEET_PAGE}')
     return fleet.code(given.strict)
 
 
 def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, strict: bool) -> int:
+    from tqdm import tqdm
+
+    from stewart_dynamics.replay.bags import bytes_of
+    from stewart_dynamics.replay.one_bag import replay
+
     with tqdm(total=bytes_of(bag), unit='B', unit_scale=True, disable=None, leave=False,
               dynamic_ncols=True) as bar:
         done = 0
@@ -161,15 +172,31 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
             bar.update(read)
 
         replayed = replay(bag, parameters, folder, options, progress)
-    print(replayed.text)
-    print(f'results: {folder}')
+    _say(replayed.text)
+    _say(f'results: {folder}')
     if replayed.summary['missing']:
         _complain(f'{bag}: part of it could not be read: {"; ".join(replayed.summary["missing"])}')
     return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
 
 
+def _say(text: str) -> None:
+    print(_printable(text))
+
+
 def _complain(what: object) -> None:
-    print(f'stewart_replay: {" ".join(str(what).split())}', file=sys.stderr)
+    print(f'stewart_replay: {_printable(" ".join(str(what).split()))}', file=sys.stderr)
+
+
+def _printable(text: str) -> str:
+    """Return text in which control characters, as names in bags may hold, are escaped."""
+    return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)
+
+
+def _node(text: str) -> str:
+    name = '/' + text.strip('/')
+    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
+        raise argparse.ArgumentTypeError(f'{text!r}: not a name of a node')
+    return name
 
 
 def _frequency(text: str) -> float:

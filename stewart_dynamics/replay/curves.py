@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.replay.summary import FIRST, longest_step
+from stewart_dynamics.replay.gathering import FIRST, longest_step
 
 # More buckets than a plot has pixels across gain nothing. Even, since neighbours are merged.
 BUCKETS = 1024

@@ -17,22 +17,18 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import csv
-import hashlib
-from importlib.resources import files
-import json
 import math
 import os
 from pathlib import Path
-import re
 import tempfile
 from typing import Any, NamedTuple, TextIO
 from urllib.parse import quote
 
 from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
+from stewart_dynamics.replay.pages import page
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]
@@ -40,6 +36,8 @@ Row = Mapping[str, Cell]
 
 RESULTS = ('done', 'limit met', 'failed', 'partly read')
 """The exit codes in words."""
+NOTHING_ANSWERED = 'nothing answered'
+"""In place of partly read where no setpoint could be answered."""
 
 
 class Column(NamedTuple):
@@ -81,7 +79,7 @@ def _worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
     return of
 
 
-def _broken(summary: dict[str, Any]) -> str:
+def _exceeded(summary: dict[str, Any]) -> str:
     legs: dict[str, list[str]] = {}
     for each in summary['limits']:
         legs.setdefault(each['limit'].removeprefix('limits.'), []).append(each['leg'])
@@ -100,6 +98,7 @@ COLUMNS = (
     Column('bag', 'bag', number=False),
     Column('code', ''),
     Column('result', 'result', number=False),
+    Column('error', 'error', number=False),
     Column('complete', '', '', lambda summary: bool(summary['complete']), number=False),
     Column('setpoints', 'setpoints', '', lambda summary: summary['setpoints']['answered']),
     Column('duration_s', 'duration', 's', lambda summary: summary['setpoints']['duration_s']),
@@ -109,7 +108,7 @@ COLUMNS = (
     Column('force_margin_n', 'force margin', 'N', _legs('force_margin_n', min)),
     Column('length_margin_m', 'length margin', 'm', _legs('length_margin_m', min)),
     Column('rate_margin_m_s', 'rate margin', 'm/s', _legs('rate_margin_m_s', min)),
-    Column('limits_broken', 'limits broken', '', _broken, number=False),
+    Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
     Column('force_rms_n', 'RMS force', 'N', _legs('force_rms_n', max)),
     Column('power_peak_w', 'peak power', 'W', _legs('power_peak_w', _largest), size=True),
     Column('determinant_nearest_m3', 'det(J) nearest 0', 'm³',
@@ -117,9 +116,8 @@ COLUMNS = (
     Column('crossings', 'crossings', '', _singularity('crossings')),
     Column('condition_max', 'condition number', 'max', _singularity('condition_max')),
     Column('warnings', 'warnings', '', _singularity('warnings')),
-    Column('refused', 'refused', '',
-           lambda summary: sum(each['count'] for each in summary['refused'])),
-    Column('error', 'error', number=False),
+    Column('rejected', 'rejected', '',
+           lambda summary: sum(each['count'] for each in summary['rejected'])),
     Column('results', '', number=False),
 )
 
@@ -141,6 +139,8 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
     cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'error': error}
     if summary is not None:
         cells['software'] = summary['software']
+        if not summary['setpoints']['answered']:
+            cells['result'] = NOTHING_ANSWERED
         cells.update({column.key: column.of(summary) for column in COLUMNS if column.of})
     return cells
 
@@ -184,14 +184,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }
-    # Nothing in the data can end the element that holds it.
-    data = json.dumps(fleet, separators=(',', ':'), allow_nan=False).replace('<', '\\u003c')
-    template = files(__package__).joinpath('index.html').read_text(encoding='utf-8')
-    script = re.search(r'<script>(.*)</script>', template, re.DOTALL)
-    assert script is not None
-    # The browser is told to run this script and no other, and to load nothing.
-    digest = base64.b64encode(hashlib.sha256(script[1].encode()).digest()).decode()
-    return template.replace('SHA256', digest).replace('FLEET', data)
+    return page('index', fleet=fleet)
 
 
 def _shown(cell: Cell) -> Cell:

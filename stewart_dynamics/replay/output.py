@@ -36,7 +36,7 @@ import yaml  # type: ignore[import-untyped]
 from stewart_dynamics.arrays import Bytes, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.messages.layout import at_any_byte
-from stewart_dynamics.replay.mcap_file import MAGIC
+from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Outputs
 
@@ -215,17 +215,22 @@ def _columns(legs: Sequence[str]) -> list[str]:
             'det(J) (m^3)', 'd(det(J))/dt (m^3/s)', 'condition number', 'singularity warning']
 
 
-def _numbers(outputs: Outputs) -> Any:
-    """Return what stands between stamp and warning (N, 27), nan for what there is none of."""
-    return np.column_stack([
+def _numbers(outputs: Outputs, quasi_static: bool) -> Any:
+    """Return what stands between stamp and warning (N, 27), nan for what is not known."""
+    numbers = np.column_stack([
         outputs.lengths, outputs.rates, outputs.forces, outputs.demanded_forces,
         outputs.determinants, outputs.determinant_rates, outputs.conditions])
+    if quasi_static:
+        numbers[:, 6:12] = numbers[:, 25] = np.nan
+    return numbers
 
 
 class CsvTable:
     """legs.csv: each number in the fewest digits that give it back exactly."""
 
-    def __init__(self, folder: Path, legs: Sequence[str]) -> None:
+    def __init__(
+            self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
+        self._quasi_static = quasi_static
         self._file = (folder / 'legs.csv').open('wb')
         self._file.write(','.join(map(_quoted, _columns(legs))).encode() + b'\n')
 
@@ -233,7 +238,7 @@ class CsvTable:
         """Write the rows of these."""
         if not len(outputs.stamps):
             return
-        numbers = _numbers(outputs)
+        numbers = _numbers(outputs, self._quasi_static)
         text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
         if not np.isfinite(numbers).all():
             text = text.replace(b'null', b'')
@@ -259,7 +264,9 @@ def _quoted(text: str) -> str:
 class ParquetTable:
     """legs.parquet: the columns of legs.csv; null where there is no force."""
 
-    def __init__(self, folder: Path, legs: Sequence[str]) -> None:
+    def __init__(
+            self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
+        self._quasi_static = quasi_static
         try:
             import pyarrow
             import pyarrow.parquet
@@ -276,7 +283,7 @@ class ParquetTable:
 
     def write(self, outputs: Outputs) -> None:
         """Write the rows of these."""
-        columns = [outputs.stamps, *_numbers(outputs).T, outputs.warnings]
+        columns = [outputs.stamps, *_numbers(outputs, self._quasi_static).T, outputs.warnings]
         self._waiting.append(self._arrow.record_batch(
             [self._arrow.array(column, type=field.type, from_pandas=True)
              for column, field in zip(columns, self._schema, strict=True)], schema=self._schema))

@@ -52,8 +52,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.home_pose import homes
 from stewart_dynamics.mechanics.jit import entry_point, inlined
-from stewart_dynamics.mechanics.plausibility import homes
 from stewart_dynamics.mechanics.rows import consecutive, FORCES, MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
@@ -70,7 +71,7 @@ _OUT_OF_RANGE = 3
 _MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
     MOTION, WRENCH, 6, 1, 1, 1)
 (_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION,
- _WRITTEN) = consecutive(kernel.MACHINE, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, _CODE.stop)
+ _WRITTEN) = consecutive(CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, _CODE.stop)
 _MOTIONS = slice(_MOTION.start, _MOTION.start + 2 * MOTION)
 _GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
 _GIVES = Struct(f'{_CODE.stop}d')
@@ -168,7 +169,7 @@ def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: A
     wrenches = np.empty((len(motions), WRENCH))
     motions, model_forces, measured_forces = map(
         np.ascontiguousarray, (motions, model_forces, measured_forces))
-    _many(platform.machine, motions, model_forces, measured_forces, wrenches)
+    _many(platform.constants, motions, model_forces, measured_forces, wrenches)
     return wrenches
 
 
@@ -224,7 +225,7 @@ class ExternalWrench:
         self._parameters = parameters
         self._numbers = np.zeros(_WRITTEN.stop)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[_PLATFORM] = StewartPlatform(parameters).machine
+        self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
         self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
         self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
         self._most_force, self._most_moment = (

@@ -29,8 +29,7 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
-from stewart_dynamics.runtime.rejections import (
-    MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
+from stewart_dynamics.runtime.rejections import MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE
 
 # Under the node's name.
 MEASURED_LEGS = 'measured_legs'

@@ -34,10 +34,11 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import forward_kinematics
+from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
 from stewart_dynamics.mechanics.cubics import Cubics
 from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.jit import COMPILED
-from stewart_dynamics.mechanics.motion import as_array, Motion
+from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, MOTION, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
@@ -146,6 +147,8 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
         Shapes do not fit, numbers are not finite or times not strictly increasing.
 
     """
+    if not isinstance(motion, Motion):
+        raise wrong_type('motion', motion, 'a Motion')
     if len(motion.shape) != 1 or not motion.shape[0]:
         raise MotionError(f'motion: shape {motion.shape}: must be (N,), of N points')
     seconds = as_array('times', times, motion.shape)
@@ -159,7 +162,7 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     if (stuck := first_not_increasing(stamps)) is not None:
         raise MotionError(f'times[{stuck}]: {seconds[stuck]} s after {seconds[stuck - 1]} s: must '
                           'be strictly increasing, by at least a nanosecond')
-    load = as_array('wrench', wrench, (WRENCH,))
+    load = optional_array('wrench', wrench, (WRENCH,))
     if load.shape != (WRENCH,):
         raise MotionError(f'wrench: shape {load.shape}: must be ({WRENCH},)')
     *_, result = check_in_pieces(platform, stamps, motion.rows, load, _LARGE_PIECE)
@@ -205,10 +208,10 @@ def compile_ahead(parameters: Parameters) -> None:
     """Compile what a check calls, so that setpoints do not wait for the first trajectory."""
     platform, rows = StewartPlatform(parameters), np.zeros((1, MOTION))
     platform.solve(rows)
-    forward_kinematics.twists(platform.machine, np.zeros((1, 6)), rows)
+    forward_kinematics.twists(platform.constants, np.zeros((1, 6)), rows)
     codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
     forward_kinematics.poses(
-        platform.machine, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
+        platform.constants, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
 
 
 class _RejectedError(Exception):
@@ -292,9 +295,9 @@ class _Work:
         """
         poses, many = rows.copy(), len(rows)
         codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
-        machine = self._platform.machine
+        constants = self._platform.constants
         forward_kinematics.poses(
-            machine, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
+            constants, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
         lost = np.flatnonzero(codes != forward_kinematics.FOUND)
         found = int(lost[0]) if len(lost) else many
         if found < many:
@@ -302,7 +305,8 @@ class _Work:
         if found:
             poses = poses[:found]
             forward_kinematics.twists(
-                machine, legs.rate_at(fraction[:, None])[:found] / durations[:found, None], poses)
+                constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
+                poses)
             self._legs_checks.check_singularities(
                 times[:found], after[:found - 1], self._platform.solve(poses),
                 after[:found - 1] > 0.0)

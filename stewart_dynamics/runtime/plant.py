@@ -90,7 +90,7 @@ class Plant:
         self.steps = round(period / parameters['step']) * self.substeps
         """Steps in a period."""
         self._step = period / self.steps
-        self._machine = StewartPlatform(parameters).machine
+        self._constants = StewartPlatform(parameters).constants
         self._stops = stops_of(parameters)
         self._limits = Limits(parameters)
         self._loads = np.zeros(LOADS)
@@ -140,7 +140,7 @@ class Plant:
                               forces=numbers[RESULT_FORCES])
 
     def _run(self, steps: int) -> State:
-        advance(self._machine, self._stops, self._limits.force_max, self._loads, self._state,
+        advance(self._constants, self._stops, self._limits.force_max, self._loads, self._state,
                 self._result, steps, self._step)
         numbers = _NUMBERS.unpack_from(self._memory)
         state, result = numbers[:STATE], numbers[STATE:]
@@ -150,7 +150,7 @@ class Plant:
                 f'held at rest for good: after the position {list(state[STATE_POSITION])} m the '
                 'motion cannot be computed: numbers overflow, or within a step of '
                 f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
-                f'joint moves by more than that part of its leg; shortest leg '
+                'joint moves by more than that part of its leg; shortest leg '
                 f'{min(lengths):.3g} m')
         return State(lengths, result[RESULT_RATES], result[RESULT_FORCES],
                      state[:STATE_TWIST.start], state[STATE_TWIST], result[RESULT_ACCELERATION])

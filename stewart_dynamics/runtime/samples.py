@@ -26,8 +26,7 @@ from collections.abc import Callable
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
-from stewart_dynamics.mechanics.rotation import (
-    from_quaternion, is_unit, quaternion_length)
+from stewart_dynamics.mechanics.rotation import from_quaternion, is_unit, quaternion_length
 from stewart_dynamics.messages.cdr import finite, MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist, wrench

@@ -36,8 +36,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.input_topics import SOURCES, WRENCH
 from stewart_dynamics.runtime.joining import join_many, Samples, WAITING, Waiting
-from stewart_dynamics.runtime.rejections import (
-    NOT_JOINED, Rejection, Rejections, TOO_OLD, TWICE)
+from stewart_dynamics.runtime.rejections import NOT_JOINED, Rejection, Rejections, TOO_OLD, TWICE
 from stewart_dynamics.runtime.samples import SampleReader
 from stewart_dynamics.runtime.step import Batch, Setpoint
 from stewart_dynamics.runtime.wrench_input import WrenchInput

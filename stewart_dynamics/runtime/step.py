@@ -29,13 +29,15 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
 from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
 from stewart_dynamics.mechanics.rows import (
     CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
     UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity import (
-    advance, CAUSE, LAST, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
+    advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
+    UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters import Parameters
@@ -167,12 +169,12 @@ class Outputs(NamedTuple):
 
 # The settings as numbers, those of the warning first; whether to suppress, the thresholds of the
 # limits, what forces are clipped to.
-_THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(3, 1, 24, 6)
+_THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
 
 # One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
 _RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING = consecutive(RESULT, 6, STATE, 1, 1)
 _PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BEFORE, _RESTART, _IS_STAMP, _WRITTEN = consecutive(
-    kernel.MACHINE, _FORCE_MAX.stop, MOTION, WRENCH, STATE, 1, 1, _EXCEEDING.stop)
+    CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, STATE, 1, 1, _EXCEEDING.stop)
 _GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
 _GIVES = Struct(f'{_EXCEEDING.stop}d')
 
@@ -187,7 +189,7 @@ def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart
     if not finite:
         return False, False
     if restart:
-        state[CAUSE], state[STOPPED], state[LAST] = 0.0, 0.0, 0.0
+        forget(state)
     condition = result[CONDITION]
     advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
@@ -251,7 +253,7 @@ class Step:
         self._limits = Limits(parameters)
         self._numbers = np.zeros(_WRITTEN.stop)
         self._memory = self._numbers.data  # the same as bytes
-        self._numbers[_PLATFORM] = self._platform.machine
+        self._numbers[_PLATFORM] = self._platform.constants
         self._settings = settings = self._numbers[_SETTINGS]
         settings[_THRESHOLDS] = thresholds(parameters)
         settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'

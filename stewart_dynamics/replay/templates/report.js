@@ -1,147 +1,3 @@
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="<!--=policy-->">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title><!--=title--></title>
-<style>
-:root {
-  --ink: #1d2430; --soft: #5d6675; --faint: #8a93a1; --line: #d9dee5; --wash: #f5f7f9;
-  --accent: #0b5fa5; --good: #1b7f4b; --warn: #a45f00; --bad: #b3261e;
-}
-* { box-sizing: border-box; }
-html { scroll-behavior: smooth; scroll-padding-top: 12px; }
-body {
-  margin: 0 auto; padding: 0 28px 96px; max-width: 1360px; color: var(--ink); background: #fff;
-  font: 15px/1.5 system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 'DejaVu Sans', sans-serif;
-}
-h1 { margin: 0; font-size: 30px; line-height: 1.2; letter-spacing: -0.01em; overflow-wrap: anywhere; }
-h2 { margin: 0 0 4px; font-size: 20px; line-height: 1.3; }
-h3 { margin: 0; font-size: 16px; line-height: 1.3; }
-code { font: 0.92em ui-monospace, 'DejaVu Sans Mono', Consolas, monospace; overflow-wrap: anywhere; }
-header { padding: 28px 0 4px; }
-header p { margin: 2px 0; color: var(--soft); overflow-wrap: anywhere; }
-nav { display: flex; flex-wrap: wrap; margin: 10px 0 18px; padding-bottom: 12px; border-bottom: 1px solid var(--line); }
-nav a { margin-right: 16px; color: var(--accent); text-decoration: none; white-space: nowrap; }
-nav a:hover { text-decoration: underline; }
-section { margin: 30px 0; }
-.note { margin: 2px 0 10px; color: var(--soft); max-width: 90ch; }
-.none { color: var(--faint); }
-.cards { display: grid; gap: 14px; margin: 18px 0; grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); }
-.card { padding: 14px 18px; border: 1px solid var(--line); border-left: 5px solid var(--faint); border-radius: 6px; background: var(--wash); }
-.card h2 { font-size: 17px; }
-.card p { margin: 0; overflow-wrap: anywhere; }
-.mark { display: inline-block; width: 22px; height: 22px; margin-right: 8px; border-radius: 50%; background: var(--faint); color: #fff; font-size: 14px; line-height: 22px; text-align: center; vertical-align: 1px; }
-.card.good { border-left-color: var(--good); } .good .mark { background: var(--good); }
-.card.warn { border-left-color: var(--warn); } .warn .mark { background: var(--warn); }
-.card.bad { border-left-color: var(--bad); } .bad .mark { background: var(--bad); }
-.scroll { overflow-x: auto; margin-bottom: 14px; max-width: 100%; }
-.row { display: flex; flex-wrap: wrap; gap: 0 56px; align-items: flex-start; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: 5px 14px; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top; white-space: nowrap; }
-thead th { border-bottom: 2px solid var(--ink); color: var(--soft); font-size: 13px; font-weight: 600; line-height: 1.3; vertical-align: bottom; }
-th:first-child { padding-left: 2px; text-align: left; font-weight: 600; white-space: normal; overflow-wrap: anywhere; min-width: 110px; }
-table.wide td { text-align: left; white-space: normal; overflow-wrap: anywhere; }
-table.wide thead th { text-align: left; }
-table.units td:last-child { white-space: nowrap; }
-table.wide th { font-weight: 500; }
-tbody tr:hover { background: var(--wash); }
-.swatch { display: inline-block; width: 11px; height: 11px; margin-right: 8px; border-radius: 2px; background: currentColor; }
-.leg0 { color: #0072b2; } .leg1 { color: #d55e00; } .leg2 { color: #009e73; }
-.leg3 { color: #cc79a7; } .leg4 { color: #e69f00; } .leg5 { color: #56b4e9; }
-.broken { color: var(--bad); font-weight: 700; }
-.held { color: var(--ink); }
-button, select { font: inherit; color: inherit; }
-button.at { padding: 0; border: 0; background: none; color: var(--accent); font-variant-numeric: tabular-nums; cursor: pointer; text-decoration: underline dotted; text-underline-offset: 3px; }
-button.at:hover { text-decoration: underline; }
-.small { padding: 2px 10px; border: 1px solid var(--line); border-radius: 4px; background: #fff; font-size: 13px; cursor: pointer; }
-.small:hover { border-color: var(--accent); color: var(--accent); }
-select { padding: 2px 6px; border: 1px solid var(--line); border-radius: 4px; background: #fff; }
-.plot { margin: 22px 0; break-inside: avoid; }
-.plot .head { display: flex; flex-wrap: wrap; gap: 4px 12px; align-items: baseline; }
-.plot .head .note { margin: 0; font-size: 13.5px; }
-.plot .head .figure { color: var(--faint); font-weight: 500; }
-.plot .tools { margin-left: auto; display: flex; gap: 8px; }
-.plot .body { display: grid; grid-template-columns: minmax(0, 1fr) 236px; gap: 10px; align-items: start; }
-.canvas { position: relative; min-height: 260px; }
-.canvas.time { cursor: crosshair; }
-.canvas.tall { min-height: 520px; }
-.cursor { position: absolute; width: 0; border-left: 1.5px solid #1d2430; pointer-events: none; display: none; z-index: 5; }
-.readout { margin-top: 12px; font-size: 13.5px; }
-.readout table { width: 100%; margin-bottom: 12px; }
-.readout th, .readout td { padding: 2px 4px; border-bottom: 0; vertical-align: middle; }
-.readout th, .readout th:first-child { min-width: 0; padding: 2px 4px; color: var(--ink); font-size: 13.5px; font-weight: 400; }
-.readout td { width: 1px; font-weight: 600; }
-.readout thead th, .readout thead th:first-child { color: var(--soft); border-bottom: 1px solid var(--line); }
-.readout thead th:last-child { text-align: right; white-space: nowrap; }
-.readout tr.off { opacity: 0.35; }
-.readout button { display: flex; align-items: center; padding: 0; border: 0; background: none; text-align: left; cursor: pointer; overflow-wrap: anywhere; }
-.readout .swatch { flex: none; height: 4px; width: 16px; vertical-align: middle; }
-.legend { display: flex; flex-wrap: wrap; gap: 4px 20px; color: var(--soft); font-size: 13.5px; }
-.legend i { display: inline-block; width: 18px; height: 12px; margin-right: 6px; vertical-align: -1px; }
-#bar { position: fixed; left: 0; right: 0; bottom: 0; z-index: 20; background: #fff; border-top: 1px solid var(--line); box-shadow: 0 -2px 12px rgba(20, 30, 50, 0.08); }
-#bar > div { display: flex; gap: 14px; align-items: center; max-width: 1360px; margin: 0 auto; padding: 9px 28px; }
-#play { flex: none; width: 40px; height: 34px; border: 0; border-radius: 5px; background: var(--accent); color: #fff; font-size: 15px; line-height: 34px; padding: 0; cursor: pointer; }
-#slider { flex: 1; min-width: 60px; accent-color: var(--accent); }
-#now { flex: none; min-width: 178px; font-variant-numeric: tabular-nums; font-weight: 600; }
-#now span { color: var(--faint); font-weight: 400; }
-#bar label { color: var(--soft); font-size: 13.5px; white-space: nowrap; }
-footer { margin-top: 40px; color: var(--faint); font-size: 13px; }
-@media (max-width: 860px) {
-  body { padding: 0 14px 96px; }
-  .plot .body { grid-template-columns: minmax(0, 1fr); gap: 0; }
-  .readout { margin-top: 0; }
-  .readout tbody { display: flex; flex-wrap: wrap; gap: 0 16px; }
-  .plot .readout thead { display: none; }
-  #motion .readout thead { display: table-header-group; }
-  #motion .readout tbody { display: table-row-group; }
-  #motion .readout tr { display: table-row; }
-  .readout tr { display: flex; gap: 4px; align-items: baseline; }
-  .readout td, .readout th { width: auto; }
-  #bar > div { padding: 7px 10px; gap: 8px; flex-wrap: wrap; }
-  #now { min-width: 0; }
-}
-@media print {
-  @page { size: A4; margin: 13mm; }
-  body { max-width: none; padding: 0; font-size: 11px; }
-  #bar, nav, .tools, .modebar-container, .cursor { display: none !important; }
-  section { margin: 16px 0; }
-  .card { break-inside: avoid; }
-  .cards { grid-template-columns: repeat(3, 1fr); }
-  .plot .body { grid-template-columns: minmax(0, 1fr) 120px; }
-  .readout, .readout th, .readout th:first-child { font-size: 10px; }
-  .scroll { overflow: visible; }
-  th, td { padding: 2px 5px; font-size: 9.5px; }
-  thead th { font-size: 9px; }
-  tr { break-inside: avoid; }
-  button.at { color: inherit; text-decoration: none; }
-  * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-}
-</style>
-</head>
-<body>
-<!--=tables-->
-<section id="motion"></section>
-<section id="plots"></section>
-<section id="parameters"><h2>Parameters used</h2>
-<!--=parameters-->
-</section>
-</main>
-<footer>Times are seconds since the first setpoint of the bag. Curves of long bags are drawn by the
-lowest and highest sample of every short span, so that each peak stays; numbers in the tables are of
-all samples. Forces push with +, legs extend with +, power drives with +.</footer>
-<div id="bar" hidden><div>
-<button id="play" aria-label="play">&#9654;</button>
-<input id="slider" type="range" aria-label="time [s]" step="any">
-<div id="now"></div>
-<label>speed <select id="speed"></select></label>
-<button id="whole" class="small">whole time</button>
-</div></div>
-<script id="data" type="application/json"><!--=data--></script>
-<script><!--=plotly--></script>
-<script id="own">
 'use strict';
 
 // ---- the data
@@ -260,7 +116,7 @@ const watcher = new IntersectionObserver(entries => {
     if (!entry.isIntersecting) inView.delete(drawing);
     else {
       inView.add(drawing);
-      // A machine in 3-D can take seconds without a graphics card: the plots go first.
+      // A hexapod in 3-D can take seconds without a graphics card: the plots go first.
       setTimeout(() => drawing.appear(), drawing instanceof TimePlot || drawing.drawn ? 0 : 500);
     }
   }
@@ -412,7 +268,7 @@ class TimePlot {
         x1: ended === null ? report.end : ended, y0: 0, y1: 1, line: {width: 0},
         fillcolor: 'rgba(240, 170, 40, 0.22)'});
     }
-    for (const [begun, ended] of this.spec.touches ? report.touches : []) {
+    for (const [begun, ended] of this.spec.contacts ? report.contacts : []) {
       shapes.push({type: 'rect', layer: 'below', xref: 'x', yref: 'paper', x0: begun, x1: ended,
         y0: 0, y1: 1, line: {width: 0}, fillcolor: 'rgba(130, 90, 190, 0.2)'});
     }
@@ -522,7 +378,7 @@ class TimePlot {
   }
 }
 
-// ---- the machine in three dimensions
+// ---- the hexapod in three dimensions
 
 const NUMBERS = 24;  // position 3, rotation 9, lengths 6, forces 6
 const FORCE_COLORS = [[0, '#1f5fb4'], [0.25, '#86b0dc'], [0.5, '#c4c4c4'], [0.75, '#e79a7d'], [1, '#b2182b']];
@@ -634,7 +490,7 @@ class Player {
     this.reach = colorReach();
     place.append(element('h2', {textContent: 'Motion'}), element('p', {className: 'note', textContent:
       'Legs are coloured by the demanded force: red pushes, blue pulls. Play, or move the slider at the '
-      + 'bottom: the cursor in all plots goes with it. Turn the machine with the mouse.'}),
+      + 'bottom: the cursor in all plots goes with it. Turn the hexapod with the mouse.'}),
     element('div', {className: 'plot'}, element('div', {className: 'body'}, this.canvas, this.readout)));
     this.listValues();
     watch(this.canvas, this);
@@ -846,10 +702,10 @@ function setUp() {
     box.style.cssText = 'width: 0; border-left: 2px dotted #c00000';
     legend.append(element('span', {}, box, `det(J) crosses zero${part(report.crossings, report.allCrossings)}`));
   }
-  if (report.touches.length) {
+  if (report.contacts.length) {
     const box = element('i');
     box.style.background = 'rgba(130, 90, 190, 0.35)';
-    legend.append(element('span', {}, box, 'something touches the platform'));
+    legend.append(element('span', {}, box, 'contact: external load on the platform'));
   }
   place.append(legend);
   for (const spec of report.plots) {
@@ -880,6 +736,3 @@ window.addEventListener('afterprint', () => {
 });
 
 setUp();
-</script>
-</body>
-</html>

@@ -1,90 +1,3 @@
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-SHA256'">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>stewart_replay: all bags</title>
-<style>
-:root {
-  color-scheme: light dark;
-  --paper: #fff; --ink: #1b1f24; --faint: #667180; --line: #dde2e8; --head: #f4f6f8; --over: #eef4fb;
-  --blue: #0b5cad; --good: #1a7f4b; --warn: #9a5b00; --bad: #c0202a;
-  --good-back: #e3f4ea; --warn-back: #fdf0d8; --bad-back: #fce4e4;
-}
-@media (prefers-color-scheme: dark) {
-  :root {
-    --paper: #15191e; --ink: #e4e8ed; --faint: #97a2b0; --line: #2f3740; --head: #1d232a; --over: #212b36;
-    --blue: #72b3f5; --good: #63cf95; --warn: #f0b354; --bad: #ff7b7b;
-    --good-back: #173526; --warn-back: #3d2f12; --bad-back: #451d1f;
-  }
-}
-* { box-sizing: border-box; }
-[hidden] { display: none !important; }
-body { margin: 0; background: var(--paper); color: var(--ink); font: 14px/1.4 system-ui, sans-serif;
-  display: flex; flex-direction: column; height: 100vh; }
-header { padding: 14px 20px 12px; }
-h1 { margin: 0; font-size: 19px; font-weight: 600; }
-h1 small { font-weight: 400; font-size: 13px; color: var(--faint); margin-left: 8px; }
-dl { display: flex; flex-wrap: wrap; gap: 6px 34px; margin: 10px 0 12px; }
-dt { color: var(--faint); font-size: 12px; }
-dd { margin: 0; font-size: 17px; font-variant-numeric: tabular-nums; }
-dd small { font-size: 12px; color: var(--faint); }
-nav { display: flex; flex-wrap: wrap; gap: 8px; align-items: center; }
-nav button, nav input { font: inherit; color: inherit; background: var(--paper); border: 1px solid var(--line);
-  border-radius: 6px; padding: 4px 11px; }
-nav button { cursor: pointer; }
-nav button:hover, th button:hover { background: var(--over); }
-nav button[aria-pressed=true] { border-color: var(--blue); box-shadow: inset 0 0 0 1px var(--blue); }
-nav button b { font-variant-numeric: tabular-nums; margin-left: 2px; }
-nav input { width: 270px; }
-nav output { color: var(--faint); }
-main { flex: 1; min-height: 0; overflow: auto; border-top: 1px solid var(--line); }
-table { border-collapse: separate; border-spacing: 0; min-width: 100%; }
-th, td { padding: 0; border-bottom: 1px solid var(--line); text-align: left; white-space: nowrap; }
-td { padding: 5px 10px; vertical-align: top; }
-th { position: sticky; top: 0; z-index: 2; background: var(--head); vertical-align: bottom; }
-th button { font: inherit; font-size: 12.5px; font-weight: 600; line-height: 1.25; color: inherit; background: none; border: 0;
-  width: 100%; padding: 7px 10px; text-align: inherit; cursor: pointer; white-space: normal; }
-th small { font-size: 12px; font-weight: 400; color: var(--faint); }
-th i { font-style: normal; color: var(--blue); display: inline-block; width: 0; }
-th[aria-sort=ascending] i::after { content: '▲'; font-size: 9px; margin-left: 3px; }
-th[aria-sort=descending] i::after { content: '▼'; font-size: 9px; margin-left: 3px; }
-.number { text-align: right; font-variant-numeric: tabular-nums; }
-th:first-child, td:first-child { position: sticky; left: 0; z-index: 1; }
-th:first-child { z-index: 3; }
-td:first-child { background: var(--paper); border-left: 4px solid transparent; max-width: 34vw; overflow: hidden;
-  text-overflow: ellipsis; font-weight: 500; border-right: 1px solid var(--line); }
-th:first-child { border-left: 4px solid transparent; border-right: 1px solid var(--line); }
-tr.code1 td:first-child { border-left-color: var(--warn); }
-tr.code2 td:first-child, tr.code3 td:first-child { border-left-color: var(--bad); }
-tbody tr:hover td { background: var(--over); }
-.pill { border-radius: 10px; padding: 1px 9px; font-size: 12.5px; font-weight: 500; }
-.code0 .pill { color: var(--good); background: var(--good-back); }
-.code1 .pill { color: var(--warn); background: var(--warn-back); }
-.code2 .pill, .code3 .pill { color: var(--bad); background: var(--bad-back); }
-td.bad { color: var(--bad); font-weight: 600; }
-td.warn { color: var(--warn); font-weight: 600; }
-td.limits_broken div { white-space: normal; width: max-content; max-width: 300px; }
-td.error { color: var(--bad); white-space: normal; overflow-wrap: anywhere; }
-td.error div { width: max-content; max-width: 700px; }
-a { color: var(--blue); text-decoration: none; }
-a:hover { text-decoration: underline; }
-:focus-visible { outline: 2px solid var(--blue); outline-offset: -2px; }
-@media print { body { height: auto; } nav { display: none; } main { overflow: visible; } th, td { position: static !important; } }
-</style>
-</head>
-<body>
-<header>
-<h1>Replayed bags <small id="software"></small></h1>
-<dl id="totals"></dl>
-<nav><span id="results"></span><input id="filter" type="search" placeholder="Filter: part of any text in a row" aria-label="Filter"><output id="shown"></output></nav>
-</header>
-<main><table><thead><tr></tr></thead><tbody></tbody></table></main>
-<noscript>This table needs JavaScript; fleet.csv beside it has the same numbers.</noscript>
-<script type="application/json" id="fleet">FLEET</script>
-<script>
 'use strict';
 const fleet = JSON.parse(document.getElementById('fleet').textContent);
 const at = Object.fromEntries(fleet.columns.map((column, n) => [column.key, n]));
@@ -127,8 +40,8 @@ function cellText(value, m) {
 function marked(key, value) {
   if (value === null || value === '') return '';
   if (key.includes('_margin_')) return value < 0 ? 'bad' : '';
-  if (key === 'limits_broken' || key === 'crossings' && value > 0) return 'bad';
-  return (key === 'warnings' || key === 'refused') && value > 0 ? 'warn' : '';
+  if (key === 'limits_exceeded' || key === 'crossings' && value > 0) return 'bad';
+  return (key === 'warnings' || key === 'rejected') && value > 0 ? 'warn' : '';
 }
 
 const rows = fleet.rows.map((cells, n) => ({
@@ -160,9 +73,9 @@ function lineOf(row) {
       if (key !== 'error') return;
       cell.colSpan = fleet.columns.length - row.line.children.length;
       cell.append(element('div', value));
-    } else if (key === 'error' || key === 'limits_broken') cell.append(element('div', value));
+    } else if (key === 'error' || key === 'limits_exceeded') cell.append(element('div', value));
     else cell.textContent = cellText(value, m);
-    if (key === 'error' || key === 'limits_broken') cell.classList.add(key);
+    if (key === 'error' || key === 'limits_exceeded') cell.classList.add(key);
     row.line.append(cell);
   });
   return row.line;
@@ -278,6 +191,3 @@ if (force) total('worst force', `${cellText(force.value, at.force_worst_n)} N`, 
 const nearest = most('determinant_nearest_m3', (a, b) => a < b);
 if (nearest) total('det(J) nearest 0', `${cellText(nearest.value, at.determinant_nearest_m3)} m³`, nearest.row.cells[at.bag]);
 show();
-</script>
-</body>
-</html>

@@ -1,0 +1,80 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The check of array arguments: numbers, finite, of a shape that fits; else MotionError."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import MotionError
+
+
+def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
+    """Return a finite array whose shape ends so; else MotionError names it."""
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in 'biuf':
+            raise TypeError(f'its type is {given.dtype}')
+        array = given.astype(float, copy=False)
+    # An object in a list may raise anything.
+    except Exception as exc:
+        text = ' '.join(f'{exc}'.split())
+        raise MotionError(f'{name}: {_shown(value)}: not an array of real numbers: '
+                          f'{text[:200]}') from exc
+    if array.shape[-len(tail):] != tail:
+        raise MotionError(f'{name}: shape {array.shape}: must end in {tail}')
+    finite = np.isfinite(array)
+    if not finite.all():
+        at = tuple(map(int, np.argwhere(~finite)[0]))
+        raise MotionError(f'{name}{list(at)}: {array[at]}: must be finite')
+    return array
+
+
+def optional_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
+    """Return the same of an argument that may be left out, zeros for None."""
+    return np.zeros(tail) if value is None else as_array(name, value, tail)
+
+
+def common_shape(**shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the leading shape that all of these broadcast to; else MotionError names them."""
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError as exc:
+        given = ', '.join(f'{name} {shape}' for name, shape in shapes.items())
+        raise MotionError(f'leading shapes do not fit each other: {given}') from exc
+
+
+def wrong_type(name: str, value: object, wanted: str) -> MotionError:
+    """Return the error about an argument of another type."""
+    return MotionError(f'{name}: {_shown(value)}: must be {wanted}')
+
+
+def check_finite(name: str, values: Array, leading: int) -> Array:
+    """Return values whose first ``leading`` axes are samples; MotionError where not finite."""
+    finite = np.isfinite(values).all(axis=tuple(range(leading, values.ndim)))
+    if not finite.all():
+        at = list(map(int, np.argwhere(~finite)[0]))
+        raise MotionError(f'{name}{f" of sample {at}" if at else ""}: out of range: '
+                          'the numbers overflow')
+    return values
+
+
+def _shown(value: object) -> str:
+    """Return an argument in a few words."""
+    if isinstance(value, str | bool | int | float | complex) and len(f'{value!r}') < 40:
+        return f'{value!r}'
+    return 'None' if value is None else f'a value of type {type(value).__name__}'

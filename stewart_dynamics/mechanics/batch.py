@@ -1,0 +1,78 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The compiled functions on batches: rows as they take them, large batches on all processors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+import os
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics.jit import COMPILED
+from stewart_dynamics.mechanics.rows import RESULT, WRENCH
+
+# A thread gets at least so many samples: a millisecond's work, far more than starting it costs.
+_SAMPLES_FOR_A_THREAD = 4096
+_PARTS_OF_A_THREAD = 8
+_CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
+
+_NO_WRENCH = np.zeros((1, WRENCH))
+
+
+def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Array:
+    """
+    Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
+
+    Parameters
+    ----------
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
+    motions : (N, MOTION)
+        Rows of motion, laid out as ``rows`` says.
+    wrenches : (N, WRENCH) or (1, WRENCH), optional
+        External wrenches at the platform's origin, base axes [N, N m]; one row for all.
+
+    """
+    motions = compact(motions)
+    wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
+    results = np.empty((len(motions), RESULT))
+    in_parts(len(motions), lambda part: kernel.solve(
+        constants, motions[part], wrenches if len(wrenches) == 1 else wrenches[part],
+        results[part]))
+    return results
+
+
+def in_parts(many: int, do: Callable[[slice], object]) -> None:
+    """Call ``do`` for all of so many samples in parts, for large batches on all processors."""
+    threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+    if threads < 2:
+        do(slice(0, many))
+        return
+    # More parts than threads: a thread that is held up leaves more to the others.
+    edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(do, map(slice, edges[:-1], edges[1:])))
+
+
+def compact(array: Array) -> Array:
+    """Return the array, or a copy in the layout that the functions are compiled for."""
+    # For another layout in memory numba would compile anew, for seconds.
+    if array.flags.carray and array.dtype.char == 'd':
+        return array
+    return np.require(array, float, ['C', 'W'])

@@ -1,0 +1,56 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The friction of the actuators: viscous, and Coulomb friction that is linear near standstill.
+
+``f = viscous rate + coulomb sat(rate / COULOMB_RATE)``, sat limited to -1 .. 1: the force is
+a function of the rate alone, without a jump at standstill.
+"""
+
+from __future__ import annotations
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.jit import entry_point, inlined
+
+# Coulomb friction grows linearly up to this rate [m/s] and is constant above it.
+COULOMB_RATE = 1e-3
+
+
+@inlined
+def with_friction(force: float, rate: float, viscous: float, coulomb: float) -> float:
+    """Return the force of an actuator [N] that overcomes its friction at a rate [m/s] as well."""
+    slip = rate / COULOMB_RATE
+    return (force + viscous * rate
+            + coulomb * (-1.0 if slip < -1.0 else 1.0 if slip > 1.0 else slip))
+
+
+@entry_point
+def friction(rates: Array, viscous: Array, coulomb: Array, forces: Array) -> None:
+    """
+    Write the forces that overcome the friction.
+
+    Parameters
+    ----------
+    rates : (N, 6)
+        [m/s]
+    viscous, coulomb : (6,)
+        Coefficients [N s/m] and forces [N] of the legs.
+    forces : (N, 6)
+        Written [N].
+
+    """
+    for n in range(len(rates)):
+        for leg in range(6):
+            forces[n, leg] = with_friction(0.0, rates[n, leg], viscous[leg], coulomb[leg])

@@ -1,0 +1,97 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The arguments of a platform's calls: checked, broadcast, and as rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.errors import MotionError, SingularityError
+from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.rows import CONDITION, MOTION, POSE, POSITION, WRENCH
+from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+
+
+def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '') -> None:
+    """Raise MotionError where an argument is neither a Pose nor a Motion as it must be."""
+    if isinstance(value, kinds):
+        return
+    name = name or ('pose' if Pose in kinds else 'motion')
+    hint = '; Motion.from_pose makes one at rest' if isinstance(value, Pose) else ''
+    raise wrong_type(name, value, ' or '.join(f'a {kind.__name__}' for kind in kinds) + hint)
+
+
+def loaded(motion: Motion, wrench: ArrayLike | None) -> tuple[Array, Array, tuple[int, ...]]:
+    """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
+    check_kind(motion, Motion)
+    if wrench is None:
+        return motion.rows.reshape(-1, MOTION), np.zeros((1, WRENCH)), motion.shape
+    load = as_array('wrench', wrench, (WRENCH,))
+    shape = common_shape(motion=motion.shape, wrench=load.shape[:-1])
+    rows = (copies(motion.rows, shape) if shape != motion.shape
+            else motion.rows.reshape(-1, MOTION))
+    return rows, copies(load, shape), shape
+
+
+def motion_rows(pose: Pose | Motion, shape: tuple[int, ...] | None = None) -> Array:
+    """Return rows of motion (N, MOTION) at rest in a pose that is broadcast to a leading shape."""
+    check_kind(pose, Pose, Motion)
+    rows = np.zeros((*(pose.shape if shape is None else shape), MOTION))
+    rows[..., POSE] = pose.rows[..., POSE]
+    return rows.reshape(-1, MOTION)
+
+
+def leg_stiffnesses(value: ArrayLike) -> Array:
+    """Return stiffnesses (..., 6) [N/m]; MotionError where one is not positive."""
+    is_number = np.isscalar(value) or getattr(value, 'shape', None) == ()
+    legs = as_array('leg_stiffness', value, () if is_number else (6,))
+    legs = np.full(6, legs) if is_number else legs
+    if not (legs > 0.0).all():
+        raise MotionError(f'leg_stiffness: {legs.min():g} N/m: must be more than 0')
+    return legs
+
+
+def copies(array: Array, shape: tuple[int, ...]) -> Array:
+    """Return rows (N, ...) of their own of an array that is broadcast to a leading shape."""
+    last = array.shape[-1]
+    if array.shape[:-1] != shape:
+        array = np.broadcast_to(array, (*shape, last))
+    return np.array(array, order='C').reshape(-1, last)
+
+
+def place(at: int, shape: tuple[int, ...]) -> str:
+    """Return the index of a sample as its user counts."""
+    if len(shape) < 2:
+        return str(at)
+    return str(list(map(int, np.unravel_index(at, shape))))
+
+
+def find_unsolvable(rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Flags:
+    """Return where J_inv is singular (N,); raise SingularityError where it may not be."""
+    if singular not in ('raise', 'nan'):
+        raise wrong_type('singular', singular, "'raise' or 'nan'")
+    condition = results[:, CONDITION]
+    unsolvable: Flags = condition >= UNSOLVABLE_CONDITION
+    if singular == 'raise' and unsolvable.any():
+        at = int(np.argmax(unsolvable))
+        raise SingularityError(
+            f'sample {place(at, shape)}: J_inv cannot be solved: its condition number is '
+            f'{condition[at]:.3g}, must be less than {UNSOLVABLE_CONDITION:g}; position '
+            f'{rows[at, POSITION].tolist()} m')
+    return unsolvable

@@ -1,0 +1,223 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A pose: where the platform is, one sample or many."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics import rotation as rotations
+from stewart_dynamics.mechanics.arguments import as_array, common_shape
+from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
+
+# A rotation matrix further from orthogonal than this is rejected.
+ORTHOGONALITY = 1e-6
+
+Self = TypeVar('Self', bound='Samples')
+
+
+class Samples:
+    """
+    Poses, or motions, of any leading shape: the indexing, comparing and showing of both.
+
+    Attributes
+    ----------
+    rows : (..., n)
+        All numbers of each sample in a row, SI units, base axes.
+    shape : tuple of int
+        The leading shape; () for one sample.
+
+    """
+
+    rows: Array
+    shape: tuple[int, ...]
+
+    @classmethod
+    def of_rows(cls: type[Self], rows: Array) -> Self:
+        """Return what rows (..., n) of checked numbers hold; they are not copied."""
+        samples = cls.__new__(cls)
+        samples.rows, samples.shape = rows, rows.shape[:-1]
+        return samples
+
+    @property
+    def position(self) -> Array:
+        """Origin of the platform frame in the base frame, (..., 3) [m]."""
+        return self._part(POSITION)
+
+    @property
+    def rotation(self) -> Array:
+        """Platform axes to base axes, (..., 3, 3)."""
+        return self._part(ROTATION).reshape(*self.shape, 3, 3)
+
+    @property
+    def quaternion(self) -> Array:
+        """The rotation as unit quaternions x y z w, (..., 4), w >= 0."""
+        return rotations.to_quaternion(self.rotation)
+
+    def _part(self, which: slice) -> Array:
+        view = self.rows[..., which]
+        view.setflags(write=False)
+        return view
+
+    def __len__(self) -> int:
+        """Return the number of samples along the first axis; TypeError for a single sample."""
+        if not self.shape:
+            raise TypeError(f'one {type(self).__name__} has no length')
+        return self.shape[0]
+
+    def __getitem__(self: Self, index: Any) -> Self:
+        """Return some of the samples: an index, a slice or a mask, as of an array."""
+        where = index if isinstance(index, tuple) else (index,)
+        try:
+            return self.of_rows(self.rows[(*where, slice(None))] if any(
+                each is Ellipsis for each in where) else self.rows[(*where, ..., slice(None))])
+        except IndexError as exc:
+            raise IndexError(f'{type(self).__name__} of shape {self.shape}: {exc}') from exc
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether shape and all numbers are equal."""
+        return type(other) is type(self) and np.array_equal(self.rows, other.rows)
+
+    # Its arrays can be written to.
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return the shape, or the pose of a single sample."""
+        name = type(self).__name__
+        if self.shape:
+            return f'<{name} of shape {self.shape}>'
+        return (f'<{name}: position {_listed(self.position)} m, quaternion '
+                f'{_listed(self.quaternion)}>')
+
+
+class Pose(Samples):
+    """
+    Pose of the platform in the base frame, one sample or any leading shape of samples.
+
+    Leading shapes broadcast against each other. The arrays are copied; ``pose[3]``,
+    ``pose[::10]`` and ``len(pose)`` work as for an array of samples.
+
+    Parameters
+    ----------
+    position : (..., 3)
+        Origin of the platform frame in the base frame [m].
+    rotation : (..., 3, 3)
+        Platform axes to base axes.
+
+    Attributes
+    ----------
+    position, rotation, quaternion : (..., 3), (..., 3, 3), (..., 4)
+        Read-only; the quaternion is x y z w.
+    rows : (..., 12)
+        Position and rotation, row by row.
+    shape : tuple of int
+        The leading shape; () for one sample.
+
+    Raises
+    ------
+    MotionError
+        The shapes do not fit, a number is not finite, or a matrix is not a rotation.
+
+    """
+
+    def __init__(self, position: ArrayLike, rotation: ArrayLike) -> None:
+        at, turn = as_array('position', position, (3,)), as_rotation(rotation)
+        self.shape = common_shape(position=at.shape[:-1], rotation=turn.shape[:-2])
+        self.rows = np.empty((*self.shape, POSE.stop))
+        self.rows[..., POSITION] = at
+        self.rows[..., ROTATION] = turn.reshape(*turn.shape[:-2], 9)
+
+    @classmethod
+    def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
+        """
+        Return the pose of the paper's angles.
+
+        Parameters
+        ----------
+        position : (..., 3)
+            [m]
+        angles : (..., 3)
+            alpha, beta, gamma of R = Rz(gamma) Ry(beta) Rx(alpha) [rad].
+
+        """
+        return cls(position, rotations.from_euler(as_array('angles', angles, (3,))))
+
+    @classmethod
+    def from_quaternion(cls, position: ArrayLike, quaternion: ArrayLike) -> Pose:
+        """
+        Return the pose of a quaternion.
+
+        Parameters
+        ----------
+        position : (..., 3)
+            [m]
+        quaternion : (..., 4)
+            x y z w, its length 1 within 1e-3; it is normalized.
+
+        """
+        return cls(position, matrix_of_quaternion(quaternion))
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Pose:
+        """Return the pose of homogeneous transforms (..., 4, 4), platform frame to base frame."""
+        given = as_array('matrix', matrix, (4, 4))
+        last = given[..., 3, :]
+        off = np.abs(last - [0.0, 0.0, 0.0, 1.0]).max(axis=-1) > ORTHOGONALITY
+        if off.any():
+            at = tuple(map(int, np.argwhere(off)[0]))
+            raise MotionError(f'matrix{list(at) if at else ""}: its last row is '
+                              f'{last[at].tolist()}: must be [0, 0, 0, 1]')
+        return cls(given[..., :3, 3], given[..., :3, :3])
+
+
+def as_rotation(rotation: ArrayLike) -> Array:
+    """Return rotation matrices (..., 3, 3); MotionError for other ones."""
+    r = as_array('rotation', rotation, (3, 3))
+    with np.errstate(over='ignore', invalid='ignore'):
+        error = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1))
+        orthogonal, determinant = error <= ORTHOGONALITY, np.linalg.det(r)
+        good = orthogonal & (determinant > 0.0)
+    if not good.all():
+        at = tuple(map(int, np.argwhere(~good)[0]))
+        what = ('is a reflection: its determinant is -1, must be +1 (is an axis mirrored, or are '
+                'two columns exchanged?)' if orthogonal[at] else
+                f'is not a rotation: R^T R is {error[at]:.3g} off the identity, must be at most '
+                f'{ORTHOGONALITY:g}')
+        raise MotionError(f'rotation{list(at) if at else ""}: {r[at].tolist()} {what}')
+    return r
+
+
+def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions x y z w (..., 4)."""
+    q = as_array('quaternion', quaternion, (4,))
+    with np.errstate(over='ignore'):
+        length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
+    off = ~np.asarray(rotations.is_unit(length))
+    if off.any():
+        at = tuple(map(int, np.argwhere(off)[0]))
+        raise MotionError(
+            f'quaternion{list(at) if at else ""}: {q[at].tolist()}: length {length[at]:.6g}, must '
+            f'be within {rotations.QUATERNION_TOLERANCE:g} of 1')
+    x, y, z, w = np.moveaxis(q / length[..., None], -1, 0)
+    return np.stack(rotations.from_quaternion(x, y, z, w), axis=-1).reshape(*q.shape[:-1], 3, 3)
+
+
+def _listed(numbers: Array) -> str:
+    return '[' + ', '.join(f'{number + 0.0:.6g}' for number in numbers) + ']'

@@ -1,0 +1,84 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Stiffness of the platform on its legs, and its natural modes.
+
+Legs of stiffness k_i hold a small displacement ``dX = [dx; dtheta]`` (base axes) with the wrench
+``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2); what the
+present leg forces add by turning with the legs is left out. Undamped small vibrations obey
+``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import MotionError
+
+
+class NaturalModes(NamedTuple):
+    """
+    Natural modes of the platform on its legs, from the slowest to the fastest.
+
+    Attributes
+    ----------
+    frequencies : (..., 6)
+        [Hz]
+    shapes : (..., 6, 6)
+        Column n is mode n: displacement and small rotation [dx; dtheta] of the platform's
+        origin, base axes [m, rad], normalized to ``shapes^T M shapes = 1``.
+
+    """
+
+    frequencies: Array
+    shapes: Array
+
+    def __repr__(self) -> str:
+        """Return the frequencies of one pose, else the shape."""
+        if self.frequencies.ndim > 1:
+            return f'<NaturalModes of shape {self.frequencies.shape[:-1]}>'
+        listed = ', '.join(f'{each:.4g}' for each in self.frequencies)
+        return f'<NaturalModes: {listed} Hz>'
+
+
+def platform_stiffness(inverse_jacobian: Array, leg_stiffness: Array) -> Array:
+    """Return K (..., 6, 6) [N/m, N, N m/rad] of J_inv (..., 6, 6) and legs (..., 6) [N/m]."""
+    stiffness: Array = np.swapaxes(inverse_jacobian, -1, -2) @ (
+        leg_stiffness[..., None] * inverse_jacobian)
+    return stiffness
+
+
+def natural_modes(mass: Array, inverse_jacobian: Array, leg_stiffness: Array) -> NaturalModes:
+    """
+    Return the modes of M (..., 6, 6), J_inv (..., 6, 6) and stiffnesses of the legs (..., 6).
+
+    With ``M = L L^T``, ``omega^2`` are the eigenvalues of ``L^-1 K L^-T = A A^T``, where
+    ``A = L^-1 J_inv^T diag(sqrt(k))``: its singular values are omega, never negative, and keep
+    their digits near a singularity (Golub and Van Loan, Matrix Computations, 4th ed., 8.7).
+
+    Raises MotionError where M is not positive definite.
+    """
+    try:
+        factor = np.linalg.cholesky(mass)
+        a = np.linalg.solve(factor, np.swapaxes(inverse_jacobian, -1, -2)
+                            * np.sqrt(leg_stiffness)[..., None, :])
+        left, omega, _ = np.linalg.svd(a)
+        shapes = np.linalg.solve(np.swapaxes(factor, -1, -2), left)
+    except np.linalg.LinAlgError as exc:
+        raise MotionError('natural modes: the mass matrix is not positive definite') from exc
+    return NaturalModes(omega[..., ::-1] / (2.0 * np.pi), shapes[..., ::-1])

@@ -1,0 +1,172 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What is gathered of samples that come block after block: extremes, integrals, crossings, warnings.
+
+But for rounding, it does not matter where one block ends and the next begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+
+# So many crossings and warnings are listed one by one; all of them are counted.
+LISTED = 100
+# A step longer than so many usual ones (and than setpoint.timeout) is a gap; the usual one is
+# the median of the steps between the first setpoints, so many.
+_GAP = 10.0
+FIRST = 1000
+
+
+def longest_step(first: Array, timeout: float) -> float:
+    """Return the longest step that is no gap [s], by those between the first FIRST setpoints."""
+    forward = first[first > 0.0]
+    usual = float(np.median(forward)) if len(forward) else 0.0
+    return float(max(timeout, _GAP * usual))
+
+
+class Extreme:
+    """
+    Of each column the value that is the greatest by a measure, and the first time it is met.
+
+    nan are left out, as is what measures -inf.
+    """
+
+    def __init__(self, width: int, measure: Callable[[Array], Array]) -> None:
+        self._measure = measure
+        self._columns = np.arange(width)
+        self._measured: Array = np.full(width, -np.inf)
+        self.values: Array = np.full(width, np.nan)
+        self.at: Array = np.full(width, np.nan)
+
+    def add(self, seconds: Array, values: Array) -> None:
+        """Take values (N, width) at times (N,)."""
+        measured = self._measure(values)
+        unknown = np.isnan(measured)
+        if unknown.any():
+            measured = np.where(unknown, -np.inf, measured)
+        row = measured.argmax(axis=0)
+        greatest = measured[row, self._columns]
+        new = greatest > self._measured
+        self._measured = np.where(new, greatest, self._measured)
+        self.values = np.where(new, values[row, self._columns], self.values)
+        self.at = np.where(new, seconds[row], self.at)
+
+
+class Integral:
+    """
+    Of each column the integral over time by trapezoids, and the mean.
+
+    Rows with a nan are left out, and the steps from and to them.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.values = np.zeros(width)
+        self._time = 0.0
+        self._sum = np.zeros(width)
+        self._samples = 0
+        self._last = np.zeros(width)
+        self._last_known = False
+
+    def add(self, steps: Array, values: Array) -> None:
+        """Take the values in, and the times from each sample's predecessor to it."""
+        known = ~with_nan(values)
+        if not known.all():
+            values = np.where(known[:, None], values, 0.0)
+        weight = 0.5 * steps * known * np.concatenate(([self._last_known], known[:-1]))
+        self.values += (weight @ values + weight[1:] @ values[:-1] + weight[0] * self._last)
+        self._time += 2.0 * float(weight.sum())
+        self._sum += known.astype(float) @ values
+        self._samples += int(known.sum())
+        self._last, self._last_known = values[-1].copy(), bool(known[-1])
+
+    @property
+    def mean(self) -> Array:
+        """Over time, or over the samples where none has passed; nan without samples."""
+        if self._time > 0.0:
+            return self.values / self._time
+        return self._sum / self._samples if self._samples else np.full_like(self._sum, np.nan)
+
+
+class Crossings:
+    """
+    Where det(J) changes its sign, also by way of a zero.
+
+    Times are interpolated between two samples. A restart is no crossing: what was before it
+    says nothing of what comes after.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first: list[float] = []
+        # the last sample that was not zero, and the one after it
+        self._seconds: Array = np.empty(0)
+        self._determinants: Array = np.empty(0)
+
+    def add(self, seconds: Array, determinants: Array, restarts: Flags) -> None:
+        """Take samples (N,); of some, time has jumped back before them."""
+        carried = len(self._seconds)
+        time = np.concatenate((self._seconds, seconds))
+        det = np.concatenate((self._determinants, determinants))
+        run = np.concatenate((np.zeros(carried, dtype=int), np.cumsum(restarts)))
+        apart = np.flatnonzero(det)
+        before, after = apart[:-1], apart[1:]
+        crossed = (det[before] > 0.0) != (det[after] > 0.0)
+        before = before[crossed & (run[before] == run[after])]
+        self.count += len(before)
+        before = before[:LISTED - len(self.first)]
+        share = det[before] / (det[before] - det[before + 1])
+        self.first += (time[before] + share * (time[before + 1] - time[before])).tolist()
+        keep = slice(0, 0)
+        if len(apart) and run[apart[-1]] == run[-1]:
+            keep = slice(int(apart[-1]), int(apart[-1]) + 2)
+        self._seconds, self._determinants = time[keep], det[keep]
+
+
+class Warnings:
+    """From when to when a warning was on."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first: list[list[float | None]] = []
+        self.seconds = 0.0
+        self._on = False
+
+    def add(self, seconds: Array, steps: Array, warnings: Flags) -> None:
+        """Take samples (N,), and the times from each one's predecessor to it."""
+        before = np.concatenate(([self._on], warnings[:-1]))
+        self.seconds += float(steps @ before)
+        changes = np.flatnonzero(warnings != before)
+        self.count += int(warnings[changes].sum())
+        for at in changes[:2 * LISTED].tolist():
+            if warnings[at] and len(self.first) < LISTED:
+                self.first.append([float(seconds[at]), None])
+            elif not warnings[at] and self.first[-1][1] is None:
+                self.first[-1][1] = float(seconds[at])
+        self._on = bool(warnings[-1])
+
+
+def with_nan(values: Array) -> Flags:
+    """Return which rows have a nan in them."""
+    unknown = np.isnan(values)
+    rows: Flags = np.zeros(len(values), dtype=bool)
+    if unknown.any():  # seldom; to look row by row takes ten times as long
+        np.any(unknown, axis=1, out=rows)
+    return rows

@@ -1,0 +1,159 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Many bags, each replayed on its own: in processes of this computer or on a Dask cluster.
+
+What happens to one bag does not concern the others. A bag whose process dies is begun again; a run
+has a name, kept in all its results, so that one that was finished just before is not taken for
+somebody else's.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+import os
+from pathlib import Path
+import shutil
+from typing import NamedTuple
+import uuid
+
+from stewart_dynamics.errors import BagError
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.bag_task import counted, Ended, replay_task, Results, SOON, Task
+from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
+from stewart_dynamics.replay.index import Cell, RESULTS, write_fleet
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, Options, PARTLY_READ
+from stewart_dynamics.replay.progress_bar import ProgressBar
+from stewart_dynamics.replay.results_folder import partial_name
+
+_SEVERITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
+
+
+class Fleet(NamedTuple):
+    """What became of all bags, in the order in which they were given."""
+
+    ended: tuple[Ended, ...]
+
+    def code(self, strict: bool) -> int:
+        """Return the exit code, the most severe; a limit counts if it is strict."""
+        codes = (each.code for each in self.ended)
+        return max((code for code in codes if strict or code != LIMIT_MET), key=_SEVERITY,
+                   default=DONE)
+
+    def text(self) -> str:
+        """Return how many bags ended how, and a line for every bag that is not whole."""
+        number = Counter(each.code for each in self.ended)
+        counts = ', '.join(f'{number[code]} {RESULTS[code]}'
+                           for code in sorted(number, key=_SEVERITY))
+        return '\n'.join([f'{len(self.ended)} bags: {counts}',
+                          *(each.error for each in self.ended if each.error)])
+
+
+def replay_fleet(
+        bags: Sequence[tuple[Path, Path]], parameters: Parameters, output: Path,
+        options: Options, jobs: int = 1, scheduler: str | None = None,
+        show_progress: bool | None = None) -> Fleet:
+    """
+    Replay bags and write fleet.csv and index.html, a row for each bag.
+
+    Parameters
+    ----------
+    bags : sequence of (Path, Path)
+        Each with the folder of its results, as bags.folders_of_results gives them.
+    parameters : Parameters
+        Of the hexapod.
+    output : Path
+        Where fleet.csv and index.html go.
+    options : Options
+        For every bag. ``run`` is set if it is empty.
+    jobs : int
+        How many processes; 1: this one.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do it. They must have this package and find
+        the bags and ``output`` under the same paths as this process.
+    show_progress : bool, optional
+        On stderr; by default where that is a terminal.
+
+    Raises StewartError: fleet.csv or index.html exists already, or there is no such cluster.
+    Whatever is wrong with a bag is in its row. KeyboardInterrupt ends all; bags that
+    were finished by then keep their results.
+
+    """
+    for path in (output / FLEET_TABLE, output / FLEET_PAGE):
+        if path.is_dir() or path.exists() and not options.force:
+            raise BagError(f'{path}: exists already' + (
+                ' and is a folder' if path.is_dir() else '; --force replaces results'))
+    output.mkdir(parents=True, exist_ok=True)
+    options = options._replace(run=options.run or uuid.uuid4().hex)
+    tasks = [Task(number, bag, folder, parameters, options)
+             for number, (bag, folder) in enumerate(bags)]
+    sizes = [bytes_of(task.bag) for task in tasks]
+    # The largest first: else it may be the last, and all others wait for it alone.
+    order = sorted(tasks, key=lambda task: -sizes[task.number])
+    ended: dict[int, Ended] = {}
+    try:
+        with closing(ProgressBar(sizes, show_progress)) as bar, closing(
+                _results(order, jobs, scheduler, bar)) as results:
+            for number, result in results:
+                bag, folder = bags[number]
+                ended[number] = result._replace(bag=bag, folder=folder)
+                bar.end(number, result)
+    finally:
+        _clear_away(tasks, options.run)
+    fleet = Fleet(tuple(ended[number] for number in range(len(tasks))))
+    write_fleet(output, [_row(each, output) for each in fleet.ended])
+    return fleet
+
+
+def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, bar: ProgressBar) -> Results:
+    if scheduler is not None:
+        from stewart_dynamics.replay.dask_cluster import replay_on_cluster
+        yield from replay_on_cluster(tasks, scheduler, bar)
+    elif jobs > 1:
+        from stewart_dynamics.replay.local_processes import replay_in_processes
+        yield from replay_in_processes(tasks, min(jobs, len(tasks)), bar)
+    else:
+        for task in tasks:
+            yield task.number, replay_task(task, counted(task.number, bar.at, SOON))
+
+
+def _row(ended: Ended, output: Path) -> dict[str, Cell]:
+    results = None if ended.code == BAD_INPUT else Path(
+        os.path.relpath(ended.folder, output)).as_posix()
+    return {**ended.row, 'bag': str(ended.bag), 'results': results}
+
+
+def _clear_away(tasks: Sequence[Task], run: str) -> None:
+    """Remove what processes that died, or were ended, have left behind."""
+    begun: dict[Path, dict[str, Path]] = {}
+    for task in tasks:
+        begun.setdefault(task.folder.parent, {})[partial_name(task.folder, run)] = task.folder
+    for parent, beginnings in begun.items():
+        try:
+            left = [path for path in parent.iterdir() if f'.{run}.' in path.name]
+        except OSError:  # was never made
+            continue
+        for path in left:
+            folder = next((folder for beginning, folder in beginnings.items()
+                           if path.name.startswith(beginning)), None)
+            if folder is None:
+                continue
+            if path.name.endswith('.replaced') and not folder.exists():
+                path.rename(folder)  # what was to replace it was never whole
+            else:
+                shutil.rmtree(path, ignore_errors=True)

@@ -1,0 +1,96 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Pages from the templates beside this module, by Jinja2 with everything escaped.
+
+A page holds its own style and scripts, and the browser is told by their digests to run no others.
+Whatever users have named is text and never markup.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+import functools
+import hashlib
+import math
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+_FOLDER = Path(__file__).with_name('templates')
+
+
+def number(value: float | None, decimals: int) -> str:
+    """Return a number with so many decimals, or none where it is large."""
+    if value is None or not math.isfinite(value):
+        return '–'
+    return f'{value:.{decimals}f}'.replace('-', '−') if abs(value) < 1e5 else digits(value)
+
+
+def digits(value: float | None) -> str:
+    """Return a number with five digits, or to the unit where that is more."""
+    if value is None or not math.isfinite(value):
+        return '–'
+    grouped = 1e5 <= abs(value) < 1e10
+    return (f'{value:,.0f}' if grouped else f'{value:.5g}').replace('-', '−').replace(',', ' ')
+
+
+def _column_head(title: str) -> Markup:
+    """Return the head of a column with its unit in a line of its own; markup as it is."""
+    if isinstance(title, Markup):
+        return title
+    name, bracket, unit = title.rpartition(' [')
+    return Markup('{}<br>[{}').format(name, unit) if bracket else Markup('{}').format(title)
+
+
+@functools.lru_cache(maxsize=1)
+def _environment() -> Environment:
+    made = Environment(loader=FileSystemLoader(_FOLDER), autoescape=True,
+                       undefined=StrictUndefined, keep_trailing_newline=True)
+    made.filters.update(number=number, digits=digits, exactly=repr, column_head=_column_head)
+    made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
+    # Nothing in the data can end the element that holds it: the filter escapes < > & and '.
+    made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
+    return made
+
+
+def page(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
+    """
+    Return a page.
+
+    Parameters
+    ----------
+    template : str
+        Name of the template, of its style (.css) and of its script (.js).
+    scripts : sequence of str
+        Other scripts that the page may run.
+    values : mapping
+        What the template uses.
+
+    """
+    script, style = (_FOLDER.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
+                     for suffix in ('.js', '.css'))
+    script = f'\n{script}'
+    hashes = ' '.join(f"'sha256-{_digest(each)}'" for each in (*scripts, script))
+    return _environment().get_template(f'{template}.html').render(
+        hashes=Markup(hashes), script=Markup(script), style=Markup(style), **values)
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

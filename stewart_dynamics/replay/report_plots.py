@@ -1,0 +1,176 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The plots of a report over time: their channels, titles, notes and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.parameters import Parameters
+
+# Okabe and Ito's colours, which the colour-blind can tell apart; their yellow is lost on white.
+COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
+_AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
+_BLACK = '#222222'
+
+# The channels of a sample, in their order.
+POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
+    slice(n, n + 3) for n in range(0, 18, 3))
+LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
+DETERMINANT, CONDITION = 42, 43
+BREAKDOWN = slice(44, 44 + 6 * len(SOURCES))
+CHANNELS = BREAKDOWN.stop
+
+# And those of a comparison with what was measured, behind them.
+MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
+COMPARED = 24
+
+
+class Curve(NamedTuple):
+    """A line in a plot."""
+
+    name: str
+    color: str
+    curve: int
+    dash: str = 'solid'
+    width: float = 1.6
+
+
+class Bound(NamedTuple):
+    """A horizontal line in a plot."""
+
+    value: float
+    text: str
+    color: str = _BLACK
+
+
+class Plot(NamedTuple):
+    """A plot over time; of several variants one is shown at a time, by the reader's choice."""
+
+    key: str
+    figure: str
+    title: str
+    unit: str
+    variants: Mapping[str, Sequence[Curve]]
+    note: str = ''
+    bounds: Sequence[Bound] = ()
+    log: bool = False
+    contacts: bool = False
+    """Shade when there was an external load."""
+    spikes: bool = False
+    """A few samples may be far larger than all others: these are not to flatten them."""
+
+    def plain(self) -> dict[str, Any]:
+        """Return what JSON can hold."""
+        return self._asdict() | {
+            'bounds': [bound._asdict() for bound in self.bounds],
+            'variants': [{'name': name, 'curves': [curve._asdict() for curve in curves]}
+                         for name, curves in self.variants.items()]}
+
+
+def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
+    """Return the plots of a motion and of what it demands; without velocities fewer."""
+    p, joints = parameters, parameters['joints']
+    of_motion = [
+        Plot('velocity', '13', 'Velocity of the platform', 'm/s',
+             _of_axes(VELOCITY, 'v x', 'v y', 'v z'), 'of its origin, base axes'),
+        Plot('angular_velocity', '13', 'Angular velocity of the platform', 'deg/s',
+             _of_axes(OMEGA, 'w x', 'w y', 'w z'),
+             'base axes; not the rates of alpha, beta, gamma'),
+        Plot('acceleration', '14', 'Acceleration of the platform', 'm/s²',
+             _of_axes(ACCELERATION, 'a x', 'a y', 'a z'), 'of its origin, base axes'),
+        Plot('angular_acceleration', '14', 'Angular acceleration of the platform', 'deg/s²',
+             _of_axes(ALPHA, 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
+    of_rates = [
+        Plot('rates', '', 'Leg rates', 'm/s', _of_legs(joints, RATES), '+ extends',
+             _bounds('velocity_max', p['limits.velocity_max'], both=True)),
+        Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, POWERS),
+             'demanded force times rate; + drives, − brakes', spikes=True)]
+    return [
+        Plot('position', '12', 'Inputs: position of the platform', 'm',
+             _of_axes(POSITION, 'X', 'Y', 'Z'), 'of its origin, base axes'),
+        Plot('angles', '12', 'Inputs: orientation of the platform', 'deg',
+             _of_axes(ANGLES, 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
+        *(of_motion if velocities_known else ()),
+        Plot('lengths', '15', 'Leg lengths', 'm', _of_legs(joints, LENGTHS),
+             'between the joint centers', [
+                 *_bounds('length_min', p['limits.length_min']),
+                 *_bounds('length_max', p['limits.length_max'])]),
+        Plot('determinant', '17', 'det(J)', 'm³',
+             {'': [Curve('det(J)', COLORS[0], DETERMINANT)]},
+             'zero where the legs cannot hold some load', [Bound(0.0, 'singular', '#c00000')],
+             spikes=True),
+        Plot('condition', '17', 'Condition number of J_inv', '–',
+             {'': [Curve('condition', COLORS[1], CONDITION)]}, 'dimensionless; 1 is best', [
+                 Bound(p['singularity.warn_condition'], 'warn', '#b36b00'),
+                 Bound(p['singularity.stop_condition'], 'stop', '#c00000')], log=True),
+        Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, FORCES),
+             'as the motion demands them, + pushes',
+             _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
+        *(of_rates if velocities_known else ()),
+        Plot('force_breakdown', '', 'Leg force by source', 'N', {
+            leg: [Curve('sum', '#a3abb6', FORCES.start + n, width=4.5),
+                  *(Curve(source, color, BREAKDOWN.start + 6 * k + n) for k, (source, color) in
+                    enumerate(zip(SOURCES, COLORS, strict=True)))]
+            for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
+
+
+def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
+    """Return the plots of a comparison whose channels begin at a number."""
+    joints = parameters['joints']
+    measured, computed, residual, wrench = (
+        slice(first + each.start, first + each.stop)
+        for each in (MEASURED, COMPUTED, RESIDUAL, WRENCH))
+    return [
+        Plot('measured', '', 'Measured and computed leg force', 'N', {
+            leg: [Curve('measured', _BLACK, measured.start + n),
+                  Curve('computed', COLORS[n], computed.start + n),
+                  Curve('residual', '#888888', residual.start + n, 'dot')]
+            for n, leg in enumerate(joints)}, 'residual: measured less computed',
+            contacts=True, spikes=True),
+        Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(joints, residual),
+             'measured less computed force', contacts=True, spikes=True),
+        Plot('external_force', '', 'External force', 'N', _of_axes(wrench, 'F x', 'F y', 'F z'),
+             'J_inv^T (computed − measured): the load that the model does not have, base axes',
+             contacts=True, spikes=True),
+        Plot('external_moment', '', 'External moment', 'N m',
+             _of_axes(slice(wrench.start + 3, wrench.stop), 'M x', 'M y', 'M z'),
+             "about the platform's origin, base axes", contacts=True, spikes=True)]
+
+
+def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:
+    return {'': [Curve(leg, color, channels.start + n) for n, (leg, color) in
+                 enumerate(zip(joints, COLORS, strict=True))]}
+
+
+def _of_axes(channels: slice, *names: str) -> dict[str, list[Curve]]:
+    return {'': [Curve(name, color, channels.start + n) for n, (name, color) in
+                 enumerate(zip(names, _AXIS_COLORS, strict=True))]}
+
+
+def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:
+    """Return a line for the bound of all legs, or one in its own colour for each."""
+    if values is None:
+        return []
+    alike = bool(np.all(values == values[0]))
+    return [Bound(sign * float(value), name if alike else '', _BLACK if alike else color)
+            for sign in ((1.0, -1.0) if both else (1.0,))
+            for value, color in list(zip(values, COLORS, strict=True))[:1 if alike else 6]]

@@ -1,0 +1,109 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a report shows at first sight: what was read, limits, and how near a singularity was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
+from typing import Any
+
+from stewart_dynamics.parameters import PARAMETERS
+
+Summary = Mapping[str, Any]
+"""What summary.json holds."""
+Verdict = tuple[str, str]
+"""How good it is (good, warn, bad or none), and its title."""
+
+_MARGINS = (('length', 'length_margin_m', 'm'), ('rate', 'rate_margin_m_s', 'm/s'),
+            ('force', 'force_margin_n', 'N'))
+
+
+def verdicts(summary: Summary) -> dict[str, Verdict]:
+    """Return the verdicts on reading, limits and singularity."""
+    return {'reading': _reading(summary), 'limits': _limits(summary),
+            'singularity': _singularity(summary['singularity'])}
+
+
+def _reading(summary: Summary) -> Verdict:
+    if not summary['setpoints']['answered']:
+        return 'bad', 'No setpoint could be answered'
+    if not summary['complete']:
+        return 'bad', 'Only a part could be read'
+    if summary['rejected']:
+        return 'warn', 'Some messages were rejected'
+    return 'good', 'The whole bag was read'
+
+
+def _limits(summary: Summary) -> Verdict:
+    if summary['limits']:
+        return 'bad', 'Limits are exceeded'
+    if summary['limits_not_checked']:
+        return 'warn', 'Not all limits could be checked'
+    if not smallest_margins(summary):
+        return 'none', 'No limits to hold'
+    return 'good', 'All limits are held'
+
+
+def _singularity(found: Mapping[str, Any]) -> Verdict:
+    if found['crossings'] or found['unsolved']:
+        return 'bad', 'A singularity is met'
+    if found['warnings']:
+        return 'warn', 'A singularity is near'
+    if found['condition_max'] is None and found['determinant_nearest_m3'] is None:
+        return 'none', 'Singularity'
+    return 'good', 'Clear of singularities'
+
+
+def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
+    """Return of lengths, rates and forces the leg that is nearest to its limit."""
+    found = []
+    for name, key, unit in _MARGINS:
+        of_legs = [(leg[key], joint) for joint, leg in summary['legs'].items()
+                   if leg[key] is not None]
+        if of_legs:
+            value, joint = min(of_legs, key=lambda each: each[0])
+            found.append({'name': name, 'value': value, 'unit': unit, 'leg': joint})
+    return found
+
+
+def exceeded_limits(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return each limit that is exceeded, with the leg that exceeds it most."""
+    found = []
+    for name in dict.fromkeys(each['limit'] for each in limits):
+        legs = [each for each in limits if each['limit'] == name]
+        worst = max(legs, key=lambda each: abs(abs(each['worst']) - each['bound']))
+        found.append({
+            'name': name, 'bound': worst['bound'], 'unit': PARAMETERS[name].unit or '',
+            'leg': worst['leg'], 'worst': worst['worst'], 'others': len(legs) - 1,
+            'first_at_s': min(each['first_at_s'] for each in legs)})
+    return found
+
+
+def date(stamp: int | None) -> str:
+    """Return a stamp's date where it can be one."""
+    if stamp is None or stamp < 1_000_000_000 * 10 ** 9:
+        return ''
+    try:
+        when = datetime.fromtimestamp(stamp // 10 ** 9, timezone.utc)
+    except (OverflowError, OSError, ValueError):
+        return ''
+    return f' ({when:%Y-%m-%d %H:%M:%S} UTC)'
+
+
+def units() -> dict[str, str]:
+    """Return the unit of each parameter, as it is written."""
+    return {name: (PARAMETERS[name].unit or '').replace('^2', '²') for name in PARAMETERS}

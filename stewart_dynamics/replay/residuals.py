@@ -1,0 +1,313 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Residuals: measured leg forces against the computed ones, and what explains them.
+
+Measured efforts are interpolated linearly in time onto the setpoints' stamps, only between two
+samples no farther apart than ``setpoint.timeout``, and compared with the forces that the dynamics
+demand: residual = measured - computed. The external wrench that explains it is
+
+    w_ext = J_inv^T (f_computed - f_measured)
+
+with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
+base axes (see ``runtime.external_wrench``). A platform that is heavier than its parameters say
+gives an external force downward.
+
+``Comparison.values()`` is what summary.json has under ``measured``; docs/summary.md explains it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.mechanics.friction import friction
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.contacts import WrenchBins
+from stewart_dynamics.replay.time_matching import interpolated, Waiting
+from stewart_dynamics.runtime.external_wrench import external_wrenches
+from stewart_dynamics.runtime.step import Batch, Outputs
+
+# What waits for the other side at most, setpoints and measured samples.
+_SETPOINTS_WAITING = 2 ** 15
+_SAMPLES_WAITING = 2 ** 18
+
+# A fit that explains a smaller part than this is not given.
+_CONVINCING = 0.5
+
+AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
+_UNITS = ('n',) * 3 + ('n_m',) * 3
+
+# Columns of what is kept of a setpoint.
+_SECONDS, _POSE, _ACCELERATION, _RATES, _FORCES = (
+    0, slice(1, 13), slice(13, 16), slice(16, 22), slice(22, 28))
+
+
+class Compared(NamedTuple):
+    """Setpoints that were newly compared, K of them."""
+
+    seconds: Array
+    """(K,)"""
+    measured: Array
+    """(K, 6) [N]"""
+    computed: Array
+    """(K, 6) [N]"""
+    wrench: Array
+    """External wrench (K, 6) [N, N m]."""
+
+
+class Comparison:
+    """
+    Gathers how measured forces differ from the computed ones, in bounded memory.
+
+    Setpoints and measured samples may come in any turn. A setpoint waits for a measured sample
+    with a later stamp; when 32768 wait the longest waiting are dropped as not compared. Where
+    time jumps back by more than ``setpoint.timeout``, a bag that loops, another pass begins, and
+    a pass of the setpoints is compared with the measured samples of the pass of the same number.
+    A single stamp out of line, too late or in the future, begins no pass and is left out.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._platform = StewartPlatform(parameters)
+        gap = parameters['setpoint.timeout']
+        self._gap = round(gap * 1e9)
+        self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
+        self._samples = Waiting(self._gap, _SAMPLES_WAITING)
+        self._without_force = 0
+        self._legs = _Statistics(6)
+        self._measured_squares = np.zeros(6)
+        self._computed = np.zeros((3, 6))  # sums of it, its squares, its products with measured
+        self._fit = np.zeros((6, 3, 3))
+        self._fitted = np.zeros((6, 3))
+        self._wrench = _Statistics(6)
+        self._mass = np.zeros(3)  # sums of d.d, d.F and F.F, d = gravity - acceleration
+        self._bins = WrenchBins()
+
+    def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
+        """
+        Take setpoints and what the step gave for them; return what could be compared.
+
+        Parameters
+        ----------
+        seconds : (N,)
+            Since the first setpoint, never decreasing [s].
+        setpoints : Batch
+            N of them.
+        outputs : Outputs
+            Of all of them.
+
+        """
+        motions = setpoints.motions
+        self._setpoints.add(setpoints.stamps, np.column_stack([
+            seconds, motions[:, :12], motions[:, 18:21], outputs.rates, outputs.demanded_forces]))
+        return self._compared()
+
+    def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
+        """
+        Take measured forces; return what could be compared.
+
+        Parameters
+        ----------
+        stamps : (M,)
+            [ns]
+        efforts : (M, 6)
+            In the order of the parameter ``joints``, finite [N].
+
+        """
+        self._samples.add(stamps, efforts)
+        return self._compared()
+
+    def finish(self) -> Compared:
+        """Return what was left to compare; no more are to come."""
+        self._setpoints.confirm()
+        self._samples.confirm()
+        return self._compared()
+
+    def _compared(self) -> Compared:
+        setpoints = self._setpoints.take_before(self._samples.pass_number, self._samples.newest)
+        rows = setpoints.rows
+        if not len(rows):
+            six = np.empty((0, 6))
+            return Compared(np.empty(0), six, six, six)
+        samples = self._samples.joined()
+        measured = np.full((len(rows), 6), np.nan)
+        for number in np.unique(setpoints.passes):
+            mine, same = setpoints.passes == number, samples.passes == number
+            measured[mine] = interpolated(
+                setpoints.stamps[mine], samples.stamps[same], samples.rows[same], self._gap)
+        self._samples.forget_before(*self._setpoints.oldest())
+        there = np.isfinite(measured[:, 0])
+        known = there & np.isfinite(rows[:, _FORCES]).all(axis=1)
+        self._without_force += int(np.count_nonzero(there & ~known))
+        if not known.all():
+            rows, measured = rows[known], measured[known]
+        computed = rows[:, _FORCES]
+        compared = Compared(rows[:, _SECONDS], measured, computed, external_wrenches(
+            self._platform, rows[:, _POSE], computed, measured))
+        if len(rows):
+            self._gather(compared, rows)
+        return compared
+
+    def _gather(self, compared: Compared, rows: Array) -> None:
+        seconds, wrench = compared.seconds, compared.wrench
+        self._bins.add(seconds, wrench)
+        # legs and axes first: sums along what lies side by side are many times as fast
+        measured, computed, rates, loads, accelerations = map(np.ascontiguousarray, (
+            compared.measured.T, compared.computed.T, rows[:, _RATES].T, wrench.T,
+            rows[:, _ACCELERATION].T))
+        residual = measured - computed
+        self._legs.add(seconds, residual)
+        self._wrench.add(seconds, loads)
+        self._measured_squares += np.sum(measured ** 2, axis=1)
+        self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
+                           np.sum(computed * measured, axis=1)]
+        # offset, and of unit coefficients Coulomb and viscous friction
+        coulomb = np.empty((len(seconds), 6))
+        friction(np.ascontiguousarray(rows[:, _RATES]), np.zeros(6), np.ones(6), coulomb)
+        terms = np.ones_like(rates), np.ascontiguousarray(coulomb.T), rates
+        for row, one in enumerate(terms):
+            self._fitted[:, row] += np.sum(one * residual, axis=1)
+            for column, other in enumerate(terms):
+                self._fit[:, row, column] += np.sum(one * other, axis=1)
+        # a mass that the model lacks pulls the other way
+        drive, force = self._parameters['gravity'][:, None] - accelerations, loads[:3]
+        # not vdot: threads of BLAS that wait for a busy processor cost far more than the sums
+        self._mass += [np.sum(drive ** 2), np.sum(drive * force), np.sum(force ** 2)]
+
+    def values(self) -> dict[str, Any]:
+        """Return what summary.json has of it."""
+        joints = self._parameters['joints']
+        return {
+            'setpoints_compared': self._legs.count,
+            'setpoints_not_compared': {
+                'without_measurement': (
+                    self._setpoints.taken - self._legs.count - self._without_force),
+                'without_force': self._without_force},
+            'samples': self._samples.taken,
+            'samples_out_of_order': self._samples.out_of_order,
+            'samples_jumped_back': max(self._samples.pass_number, 0),
+            'gap_limit_s': self._gap * 1e-9,
+            'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
+            'external_wrench': {axis: self._wrench.named(number, '', unit)
+                                for number, (axis, unit) in enumerate(
+                                    zip(AXES, _UNITS, strict=True))},
+            'mass': self._unmodelled_mass(),
+            'contacts': self._contacts(),
+        }
+
+    def _leg(self, leg: int) -> dict[str, float | None]:
+        number = self._legs.count
+        named = self._legs.named(leg, 'residual_', 'n')
+        measured_squares = float(self._measured_squares[leg])
+        total, squares, products = self._computed[:, leg].tolist()
+        measured_total = total + float(self._legs.sums[leg])
+        rms = [np.sqrt(each / number) if number else None for each in (measured_squares, squares)]
+        spread = ((squares * number - total ** 2)
+                  * (measured_squares * number - measured_total ** 2))
+        # forces that do not change, but for rounding, do not correlate
+        constant = not spread > 1e-20 * squares * measured_squares * number ** 2
+        correlation = None if constant else float(np.clip(
+            (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0))
+        return {**named, 'measured_rms_n': rms[0], 'computed_rms_n': rms[1],
+                'correlation': correlation, **self._friction(leg)}
+
+    def _friction(self, leg: int) -> dict[str, float | None]:
+        """Return the friction that fits the residual; none where the leg hardly moved."""
+        names = 'offset_n', 'coulomb_friction_n', 'viscous_friction_n_s_m', 'friction_share'
+        fit, fitted = self._fit[leg], self._fitted[leg]
+        scale = np.sqrt(np.diagonal(fit))
+        if not scale.all() or np.linalg.cond(fit / np.outer(scale, scale)) > 1e8:
+            return dict.fromkeys(names)
+        best = np.linalg.solve(fit / np.outer(scale, scale), fitted / scale) / scale
+        mean_part = fitted[0] ** 2 / fit[0, 0]
+        variance = float(self._legs.squares[leg] - mean_part)
+        if variance <= 1e-12 * float(self._legs.squares[leg]):
+            return dict.fromkeys(names)
+        share = float(np.clip((best @ fitted - mean_part) / variance, 0.0, 1.0))
+        number = self._legs.count
+        noise = 0.05 * np.sqrt(variance / number)
+        if share < _CONVINCING or min(best[1], best[2] * np.sqrt(fit[2, 2] / number)) < -noise:
+            # Something else is at work, and these numbers are no parameters.
+            return {**dict.fromkeys(names), 'friction_share': share}
+        return dict(zip(names, [*best.tolist(), share], strict=True))
+
+    def _unmodelled_mass(self) -> dict[str, float | None]:
+        drives, products, forces = self._mass.tolist()
+        share = products ** 2 / (drives * forces) if drives and forces else None
+        return {'unmodelled_kg': (products / drives if share and share >= _CONVINCING else None),
+                'share': share}
+
+    def _contacts(self) -> dict[str, Any]:
+        number = max(self._legs.count, 1)
+        force = float(np.sqrt(np.mean(self._computed[1] + self._measured_squares) / number))
+        length = self._parameters['singularity.characteristic_length']
+        smallest = 1e-3 * force * np.array([1.0, 1.0, 1.0, length, length, length])
+        middle, deviation = self._bins.middle()
+        threshold = np.maximum(6.0 * deviation, smallest)
+        found = self._bins.contacts(middle, threshold, self._gap * 1e-9)
+        strongest = sorted(sorted(found, key=lambda each: -each.excess)[:100])
+        return {
+            'count': len(found),
+            'threshold': {f'{axis}_{unit}': float(each) for axis, unit, each in zip(
+                AXES, _UNITS, threshold, strict=True)},
+            'resolution_s': self._bins.width,
+            'strongest': [
+                {'from_s': each.begin, 'to_s': each.end, 'axis': AXES[each.axis],
+                 'force_n': list(each.load[:3]), 'moment_n_m': list(each.load[3:])}
+                for each in strongest]}
+
+
+class _Statistics:
+    """Sums, squares and peaks of quantities."""
+
+    def __init__(self, quantities: int) -> None:
+        self.count = 0
+        self.sums = np.zeros(quantities)
+        self.squares = np.zeros(quantities)
+        self._peaks = np.zeros(quantities)
+        self._peaks_at = np.zeros(quantities)
+
+    def add(self, seconds: Array, values: Array) -> None:
+        """Take values (quantities, N) at times (N,)."""
+        first = not self.count
+        self.count += len(seconds)
+        self.sums += np.sum(values, axis=1)
+        self.squares += np.sum(values ** 2, axis=1)
+        at = np.argmax(np.abs(values), axis=1)
+        peaks = values[np.arange(len(values)), at]
+        larger = (np.abs(peaks) > np.abs(self._peaks)) | first
+        self._peaks[larger] = peaks[larger]
+        self._peaks_at[larger] = seconds[at][larger]
+
+    def named(self, number: int, prefix: str, unit: str) -> dict[str, float | None]:
+        """Return RMS, mean and peak under names with units; null where there was nothing."""
+        names = [f'{prefix}rms_{unit}', f'{prefix}mean_{unit}', f'{prefix}peak_{unit}',
+                 f'{prefix}peak_at_s']
+        if not self.count:
+            return dict.fromkeys(names)
+        return dict(zip(names, [
+            float(np.sqrt(self.squares[number] / self.count)),
+            float(self.sums[number] / self.count),
+            float(self._peaks[number]), float(self._peaks_at[number])], strict=True))

@@ -1,0 +1,189 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The summary of a motion as lines that a person can read in a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import textwrap
+from typing import Any
+
+from stewart_dynamics.mechanics.limits import FORCE_MAX
+
+_LISTED = 5
+_WIDTH = 100
+
+
+def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
+    """
+    Return the lines, no wider than 100 columns.
+
+    Parameters
+    ----------
+    found : mapping
+        What Summary.values gives.
+    parameters : mapping
+        The parameters of the hexapod.
+
+    """
+    if not found['setpoints']['answered']:
+        return ['no setpoint could be answered']
+    bounds = parameters[FORCE_MAX]
+    clipped = [bounds is not None and leg['force_peak_n'] is not None
+               and abs(leg['force_peak_n']) >= bounds[n]
+               for n, leg in enumerate(found['legs'].values())]
+    lines = [_heading(found['setpoints']), '', *_legs_table(found['legs'], clipped)]
+    if found['quasi_static']:
+        lines.append('velocities are not known: the forces are those at rest; rates, power and '
+                     'energy are not known')
+    lines += _limit_lines(found, any(clipped), any(name.startswith('limits.') and bound is not None
+                                                   for name, bound in parameters.items()))
+    lines += ['', *_singularity_lines(found['singularity'])]
+    return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
+            for line in lines]
+
+
+def measured_lines(measured: Mapping[str, Any]) -> list[str]:
+    """Return what the comparison with measured forces says, its headline first."""
+    if not measured['setpoints_compared']:
+        return ['measured: no setpoint could be compared']
+    lines = []
+    if measured['mass']['unmodelled_kg'] is not None:
+        lines.append(f'measured: {measured["mass"]["unmodelled_kg"]:.4g} kg more on the platform '
+                     f'explain {100.0 * measured["mass"]["share"]:.0f} % of the residual')
+    friction = {leg: found for leg, found in measured['legs'].items()
+                if found['coulomb_friction_n'] is not None}
+    if friction:
+        lines.append('measured: friction beyond the parameters, Coulomb [N] and viscous [N s/m]: '
+                     + ', '.join(f'{leg} {found["coulomb_friction_n"]:.3g} and '
+                                 f'{found["viscous_friction_n_s_m"]:.3g}'
+                                 for leg, found in friction.items()))
+    rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
+                    measured['legs'].items() if found['residual_rms_n'] is not None)
+    lines.append(f'compared {measured["setpoints_compared"]} setpoints; measured less computed '
+                 f'force, RMS [N]: {rms or "none"}')
+    contacts = measured['contacts']
+    lines += [f'contact from t = {each["from_s"]:.2f} to {each["to_s"]:.2f} s: external force '
+              f'({", ".join(f"{part:.1f}" for part in each["force_n"])}) N'
+              for each in contacts['strongest'][:_LISTED]]
+    if contacts['count'] > _LISTED:
+        lines.append(f'and {contacts["count"] - _LISTED} more contacts')
+    return lines
+
+
+def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) -> list[str]:
+    lines = []
+    if clipped:
+        lines.append('* reaches limits.force_max: published clipped to it, the leg would need '
+                     'more')
+    for each in found['limits']:
+        lines.append(f'{each["limit"]}, {each["bound"]:g}, exceeded by {each["leg"]} in '
+                     f'{_counted(each["setpoints"], "setpoint")} from t = '
+                     f'{each["first_at_s"]:.2f} s on: {each["worst"]:.6g} at worst')
+    for name in found['limits_not_checked']:
+        lines.append(f'{name} could not be checked: velocities are not known; --differentiate '
+                     'makes them of the poses')
+    if limits_given and not lines:
+        lines.append('all limits held')
+    return lines
+
+
+def _counted(number: int, what: str) -> str:
+    return f'{number} {what}' if number == 1 else f'{number} {what}s'
+
+
+def _heading(setpoints: Mapping[str, Any]) -> str:
+    text = f'{_counted(setpoints["answered"], "setpoint")} in {setpoints["duration_s"]:.2f} s'
+    if setpoints['gaps']:
+        text += (f', of them {setpoints["gaps_s"]:.2f} s in '
+                 f'{_counted(setpoints["gaps"], "gap")}')
+    if setpoints['restarts']:
+        text += f', {_counted(setpoints["restarts"], "restart")}'
+    return text
+
+
+# Of the legs' table: what it is of, title, key, width, digits after the point. With a leg's name
+# and the mark they fill _WIDTH.
+_COLUMNS = (
+    ('force [N]', 'peak', 'force_peak_n', 10, 1), ('force [N]', 'at [s]', 'force_peak_at_s', 9, 2),
+    ('force [N]', 'RMS', 'force_rms_n', 9, 1), ('force [N]', 'margin', 'force_margin_n', 9, 1),
+    ('power [W]', 'peak', 'power_peak_w', 10, 1),
+    ('length [m]', 'from', 'length_min_m', 8, 4), ('length [m]', 'to', 'length_max_m', 8, 4),
+    ('length [m]', 'margin', 'length_margin_m', 8, 4),
+    ('rate [m/s]', 'peak', 'rate_peak_m_s', 9, 4),
+    ('rate [m/s]', 'margin', 'rate_margin_m_s', 8, 4))
+_NAME = 11
+_MARKED = 'force_peak_n'
+
+
+def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
+                marked: Sequence[bool]) -> list[str]:
+    """Return the lines of the legs; a column without any number is left out."""
+    columns = [column for column in _COLUMNS
+               if any(leg[column[2]] is not None for leg in legs.values())]
+    spans: dict[str, int] = {}
+    titles = f'{"leg":<{_NAME}}'
+    for group, title, key, width, _ in columns:
+        spans[group] = spans.get(group, 0) + width + (key == _MARKED)
+        titles += f'{title:>{width}}' + ' ' * (key == _MARKED)
+    lines = [' ' * _NAME + ''.join(f' {group:-^{span - 1}}' for group, span in spans.items()),
+             titles]
+    for (name, leg), mark in zip(legs.items(), marked, strict=True):
+        line = f'{name:<{_NAME}.{_NAME}}'
+        for _, _, key, width, digits in columns:
+            line += _fitted(leg[key], width, digits) + ('* '[not mark] if key == _MARKED else '')
+        lines.append(line)
+    return lines
+
+
+def _fitted(value: float | None, width: int, digits: int) -> str:
+    """Return a number with so many digits after the point, fewer where they have no room."""
+    if value is None:
+        return f'{"-":>{width}}'
+    for text in (f'{value:.{digits}f}', f'{value:.0f}'):
+        if len(text) < width:
+            return f'{text:>{width}}'
+    return f'{value:>{width}.1e}'
+
+
+def _singularity_lines(found: Mapping[str, Any]) -> list[str]:
+    crossings, spans = found['crossings_at_s'], found['warnings_from_to_s']
+    lines = ['det(J) did not cross zero']
+    if crossings:
+        times = ', '.join(f't = {time:.3f} s' for time in crossings[:_LISTED])
+        more = found['crossings'] - _LISTED
+        lines = [f'det(J) crossed zero at {times}{f" and {more} times more" if more > 0 else ""}:'
+                 ' forces grow without bound there']
+    lines.append(f'det(J) nearest zero: {found["determinant_nearest_m3"]:.6g} m^3 at t = '
+                 f'{found["determinant_nearest_at_s"]:.2f} s')
+    if found['condition_max'] is not None:
+        lines.append(f'condition number of J_inv: {found["condition_max"]:.4g} at most, at t = '
+                     f'{found["condition_max_at_s"]:.2f} s')
+    if unpublished := found['unsolved'] + found['suppressed']:
+        lines.append(f'no forces were published in {_counted(unpublished, "setpoint")}')
+    for begun, ended in spans[:_LISTED]:
+        ahead = [time - begun for time in crossings
+                 if begun <= time and (ended is None or time <= ended)]
+        lines.append(
+            f'singularity warning from t = {begun:.2f} s '
+            + ('to the end' if ended is None else f'to {ended:.2f} s')
+            + (f': {ahead[0]:.2f} s before the crossing' if ahead else ''))
+    if found['warnings'] > _LISTED:
+        lines.append(f'and {found["warnings"] - _LISTED} singularity warnings more, for '
+                     f'{found["warning_s"]:.2f} s in all')
+    if not spans:
+        lines.append('no singularity warning')
+    return lines

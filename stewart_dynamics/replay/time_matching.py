@@ -1,0 +1,177 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Samples of two sources brought together by their stamps, in bounded memory.
+
+Where time jumps back by more than a gap, a bag that loops, another pass begins; rows of one pass
+are matched with rows of the pass of the same number. A single stamp out of line, too late or in
+the future, begins no pass.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
+
+
+def interpolated(stamps: Stamps, at: Stamps, values: Array, gap: int) -> Array:
+    """Return values at stamps between two that are no farther apart than the gap, else nan."""
+    result = np.full((len(stamps), values.shape[1]), np.nan)
+    if not len(at):
+        return result
+    after = np.minimum(np.searchsorted(at, stamps), len(at) - 1)
+    # one with the very stamp needs no other
+    before = np.where(at[after] == stamps, after, np.maximum(after - 1, 0))
+    between = (at[before] <= stamps) & (stamps <= at[after]) & (at[after] - at[before] <= gap)
+    before, after = before[between], after[between]
+    part = (stamps[between] - at[before]) / np.maximum(at[after] - at[before], 1)
+    result[between] = values[before] + part[:, None] * (values[after] - values[before])
+    return result
+
+
+class Rows(NamedTuple):
+    """Rows with their stamps, and in which pass of the recording they are."""
+
+    stamps: Stamps
+    passes: Integers
+    rows: Array
+
+    def part(self, which: slice | Stamps | Flags) -> Rows:
+        """Return some of them; a copy where they are not given by a slice."""
+        return Rows(self.stamps[which], self.passes[which], self.rows[which])
+
+
+class Waiting:
+    """
+    Rows with stamps that wait for those of the other side, in order of pass and stamp.
+
+    The last row waits outside until the next one shows that its stamp is in line.
+    """
+
+    def __init__(self, gap: int, most: int) -> None:
+        self.taken = 0
+        self.out_of_order = 0
+        self.pass_number = -1
+        self.newest = 0
+        self._gap, self._most = gap, most
+        self._unsure: tuple[Stamps, Array] | None = None
+        self._chunks: list[Rows] = []
+        self._waiting = 0
+
+    def add(self, stamps: Stamps, rows: Array) -> None:
+        """Take rows (N, K) with their stamps (N,)."""
+        if not len(stamps):
+            return
+        self.taken += len(stamps)
+        if self._unsure is not None:
+            stamps = np.concatenate([self._unsure[0], stamps])
+            rows = np.concatenate([self._unsure[1], rows])
+        self._unsure = stamps[-1:].copy(), rows[-1:].copy()
+        self._line_up(stamps, rows[:-1])
+
+    def confirm(self) -> None:
+        """Take the last row for what it is: no other comes."""
+        if self._unsure is not None:
+            # one that jumps back and has no other behind it is out of line
+            stamps = np.append(self._unsure[0], np.iinfo(np.int64).max)
+            rows, self._unsure = self._unsure[1], None
+            self._line_up(stamps, rows)
+
+    def _line_up(self, stamps: Stamps, rows: Array) -> None:
+        """Give all rows but the last a pass; leave out what is out of order."""
+        if self.pass_number < 0 and len(rows):
+            self.pass_number, self.newest = 0, int(stamps[0]) - 1
+        steps = np.diff(stamps)
+        if len(rows) and stamps[0] > self.newest and steps.min() > 0:
+            passes: Stamps = np.full(len(rows), self.pass_number)
+            self.newest = int(stamps[-2])
+        else:
+            passes = np.array(self._passes(stamps.tolist()), dtype=np.int64)
+            self.out_of_order += int(np.count_nonzero(passes < 0))
+        in_line = passes >= 0
+        if in_line.any():
+            chunk = Rows(stamps[:-1], passes, rows).part(in_line)
+            self._chunks.append(chunk)
+            self._waiting += len(chunk.stamps)
+        excess = self._waiting - self._most
+        if excess > 0:
+            self._chunks = [self.joined().part(np.arange(excess, self._waiting))]
+            self._waiting = self._most
+
+    def _passes(self, stamps: list[int]) -> list[int]:
+        """Return the passes of all but the last stamp, -1 of those out of order."""
+        passes = []
+        for stamp, after in zip(stamps[:-1], stamps[1:], strict=True):
+            ahead = stamp > self.newest
+            far = abs(stamp - self.newest) > self._gap
+            # one that the next goes back behind, though not behind what was before, is in the
+            # future; one before what the next goes on from is late
+            alone = (self.newest < after < stamp - self._gap if ahead else after > self.newest)
+            if not far and not ahead or far and alone:
+                passes.append(-1)
+                continue
+            self.pass_number += not ahead
+            self.newest = stamp
+            passes.append(self.pass_number)
+        return passes
+
+    def take_before(self, pass_number: int, stamp: int) -> Rows:
+        """Return and forget the rows of earlier passes, and of this one up to the stamp."""
+        ready: list[Rows] = []
+        while self._chunks:
+            chunk = self._chunks[0]
+            count = int(np.count_nonzero((chunk.passes < pass_number) | (
+                (chunk.passes == pass_number) & (chunk.stamps <= stamp))))
+            if count:
+                ready.append(chunk.part(slice(0, count)))
+                self._waiting -= count
+            if count < len(chunk.stamps):
+                self._chunks[0] = chunk.part(slice(count, None))
+                break
+            self._chunks.pop(0)
+        return _rows(ready)
+
+    def joined(self) -> Rows:
+        """Return the rows that wait."""
+        rows = _rows(self._chunks)
+        self._chunks = [rows] if len(rows.stamps) else []
+        return rows
+
+    def oldest(self) -> tuple[int, int]:
+        """Return pass and stamp before which no row will be."""
+        if not self._chunks:
+            return self.pass_number, self.newest
+        return int(self._chunks[0].passes[0]), int(self._chunks[0].stamps[0])
+
+    def forget_before(self, pass_number: int, stamp: int) -> None:
+        """Forget the rows before this time but the last one of them."""
+        rows = self.joined()
+        before = int(np.count_nonzero((rows.passes < pass_number) | (
+            (rows.passes == pass_number) & (rows.stamps <= stamp))))
+        if before > 1:
+            self._chunks = [rows.part(np.arange(before - 1, len(rows.stamps)))]
+            self._waiting = len(rows.stamps) - before + 1
+
+
+def _rows(chunks: list[Rows]) -> Rows:
+    if not chunks:
+        none = np.empty(0, dtype=np.int64)
+        return Rows(none, none, np.empty((0, 0)))
+    return chunks[0] if len(chunks) == 1 else Rows(
+        *map(np.concatenate, zip(*chunks, strict=True)))

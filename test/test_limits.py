@@ -1,0 +1,86 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The limits of the legs: one rule for a row, a sample and an array, and its tolerance."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import rng, symmetric_parameters
+
+from stewart_dynamics.mechanics.limits import (
+    any_exceeded, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, TOLERANCE,
+    VELOCITY_MAX)
+from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, RATES, RESULT
+
+GIVEN = {LENGTH_MIN: [0.9, 0.91, 0.92, 0.93, 0.94, 0.95], LENGTH_MAX: 1.5, VELOCITY_MAX: 0.5,
+         FORCE_MAX: 6000.0}
+PLACES = {LENGTH_MIN: LENGTHS, LENGTH_MAX: LENGTHS, VELOCITY_MAX: RATES, FORCE_MAX: FORCES}
+
+
+def row() -> NDArray[np.float64]:
+    """Return a result within all limits of GIVEN."""
+    result = np.zeros(RESULT)
+    result[LENGTHS] = 1.2
+    return result
+
+
+@pytest.mark.parametrize('limit', LIMITS)
+@pytest.mark.parametrize('leg', range(6))
+def test_each_limit_of_each_leg_is_judged_alike_everywhere(limit: str, leg: int) -> None:
+    limits = Limits(symmetric_parameters().replaced(GIVEN))
+    bound = float(limits.bounds[limit][leg])
+    outward = -1.0 if limit == LENGTH_MIN else 1.0
+    signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
+    for beyond, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+                             (2.0 * TOLERANCE, True), (0.1, True)):
+        for sign in signs:
+            result = row()
+            result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + beyond * outward)
+            assert any_exceeded(limits.thresholds.ravel(), result) is exceeded
+            for other in LIMITS:
+                expected = [exceeded and other == limit and n == leg for n in range(6)]
+                assert limits.exceeds(other, result[PLACES[other]]).tolist() == expected
+            of_sample = (tuple(result[at].tolist()) for at in (LENGTHS, RATES, FORCES))
+            assert limits.exceeded(*of_sample) == (
+                (Exceedance(limit, leg, value, bound),) if exceeded else ())
+
+
+def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
+    limits = Limits(symmetric_parameters())
+    huge = rng().choice([-1e300, 1e300], (5, 6))
+    assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
+    assert limits.exceeded((1e300,) * 6, (-1e300,) * 6, (1e300,) * 6) == ()
+    assert np.isinf(limits.force_max).all() and not limits.bounds
+
+
+def test_forces_that_are_unknown_exceed_nothing() -> None:
+    limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
+    result = row()
+    result[FORCES] = np.nan
+    assert not any_exceeded(limits.thresholds.ravel(), result)
+    assert limits.exceeded((1.2,) * 6, (0.0,) * 6, None) == ()
+
+
+@pytest.mark.parametrize(('exceedance', 'words'), [
+    (Exceedance(LENGTH_MIN, 0, 0.9, 0.95), 'a: length 0.9 m is 0.05 m below limits.length_min'),
+    (Exceedance(LENGTH_MAX, 1, 1.75, 1.5), 'b: length 1.75 m is 0.25 m above limits.length_max'),
+    (Exceedance(VELOCITY_MAX, 2, -0.75, 0.5),
+     'c: rate -0.75 m/s is 0.25 m/s above limits.velocity_max'),
+    (Exceedance(FORCE_MAX, 5, -7000.0, 6000.0),
+     'f: force -7000 N is 1000 N above limits.force_max')])
+def test_it_is_said_by_how_much(exceedance: Exceedance, words: str) -> None:
+    assert exceedance.words('abcdef') == words

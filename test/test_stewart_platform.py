@@ -1,0 +1,322 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The library's calls: what only they do, and that any argument gives numbers or one line."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import pickle
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    each_relative, QUARTER_TURN, random_motion, random_parameters, random_wrench, relative, rng,
+    ROOT, rotation_about, symmetric_parameters)
+
+from stewart_dynamics import (
+    ForceBreakdown, Motion, MotionError, ParameterError, Parameters, Pose, SingularityError,
+    StewartError, StewartPlatform)
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
+
+Array = NDArray[np.float64]
+
+EXAMPLE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+
+
+@pytest.fixture(scope='module')
+def platform() -> StewartPlatform:
+    """Return a hexapod with nothing special about it."""
+    return StewartPlatform(random_parameters(rng()))
+
+
+def passing_a_singularity() -> Motion:
+    """Return samples of the symmetric hexapod, (2, 3), of which [1, 1] is singular."""
+    turns = np.array([rotation_about([0.0, 0.0, 1.0], angle) for angle in
+                      np.linspace(0.0, 1.0, 6)]).reshape(2, 3, 3, 3)
+    turns[1, 1] = QUARTER_TURN
+    return Motion([0.0, 0.0, 1.0], turns, [0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [1.0, 2.0, 3.0])
+
+
+# Pose or Motion
+
+def test_where_a_pose_is_taken_a_motion_will_do(platform: StewartPlatform) -> None:
+    motion = random_motion(platform.parameters, rng(), 5)
+    pose = Pose(motion.position, motion.rotation)
+    for call in (platform.inverse_kinematics, platform.inverse_jacobian, platform.mass_matrix,
+                 platform.gravity_vector, lambda at: platform.twist(at, np.ones(6)),
+                 lambda at: platform.stiffness(at, 1e6),
+                 lambda at: platform.natural_modes(at, 1e6).shapes):
+        assert np.array_equal(call(pose), call(motion))
+    lengths = platform.inverse_kinematics(pose)
+    assert (platform.forward_kinematics(lengths, motion)
+            == platform.forward_kinematics(lengths, pose))
+
+
+@pytest.mark.parametrize('given', [
+    None, {'position': 1}, [[0.0, 0.0, 1.0], np.eye(3)], np.zeros(24), 'pose', 1.0, 1 + 2j,
+    Motion, (np.zeros(3), np.eye(3))], ids=str)
+def test_nothing_else_is_taken(platform: StewartPlatform, given: Any) -> None:
+    for call in (platform.inverse_kinematics, platform.inverse_jacobian, platform.mass_matrix,
+                 platform.gravity_vector, platform.inverse_dynamics, platform.force_breakdown,
+                 platform.coriolis_matrix, platform.inverse_jacobian_rate,
+                 lambda at: platform.twist(at, np.ones(6)),
+                 lambda at: platform.forward_dynamics(at, np.ones(6)),
+                 lambda at: platform.forward_kinematics(np.ones(6), at),
+                 lambda at: platform.stiffness(at, 1e6),
+                 lambda at: platform.natural_modes(at, 1e6)):
+        with pytest.raises(MotionError, match='^(pose|motion|guess): .* must be a (Pose|Motion)'):
+            call(given)
+    with pytest.raises(StewartError, match='must be Parameters; StewartPlatform.from_yaml'):
+        StewartPlatform(given)
+
+
+def test_a_pose_in_place_of_a_motion_is_answered_with_how_to_make_one(
+        platform: StewartPlatform) -> None:
+    pose = Pose([0.0, 0.0, 1.0], np.eye(3))
+    with pytest.raises(MotionError, match='must be a Motion; Motion.from_pose makes one at rest'):
+        platform.inverse_dynamics(pose)
+
+
+# Singular samples
+
+def test_a_singular_sample_is_named_or_marked() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    motion = passing_a_singularity()
+    for call in (platform.inverse_dynamics, platform.force_breakdown):
+        with pytest.raises(SingularityError, match=r'^sample \[1, 1\]: J_inv cannot be solved'):
+            call(motion)
+        with pytest.raises(SingularityError, match='^sample 1: '):
+            call(motion[1])
+        with pytest.raises(MotionError, match="singular: 'skip': must be 'raise' or 'nan'"):
+            call(motion, singular='skip')
+    bad = np.zeros((2, 3), dtype=bool)
+    bad[1, 1] = True
+    result = platform.inverse_dynamics(motion, singular='nan')
+    assert np.array_equal(np.isnan(result.forces), np.repeat(bad[..., None], 6, axis=-1))
+    for name in set(result._fields) - {'forces'}:
+        assert np.isfinite(getattr(result, name)).all()
+    by = platform.force_breakdown(motion, singular='nan')
+    good = platform.inverse_dynamics(motion[~bad])
+    assert np.array_equal(result.forces[~bad], good.forces)
+    for part in by:
+        assert np.array_equal(np.isnan(part), np.isnan(result.forces))
+
+
+# Force breakdown
+
+def test_the_force_breakdown_names_its_sources_and_sums_to_the_forces(
+        platform: StewartPlatform) -> None:
+    motion = random_motion(platform.parameters, rng(), 12)
+    motion = Motion.of_rows(motion.rows.reshape(3, 4, -1))
+    wrench = random_wrench(platform.parameters, rng(), 4)
+    by = platform.force_breakdown(motion, wrench)
+    assert isinstance(by, ForceBreakdown)
+    assert [name.split('_')[0] for name in by._fields] == [name.split()[0] for name in SOURCES]
+    assert by.total.shape == by.gravity.shape == (3, 4, 6)
+    forces = platform.inverse_dynamics(motion, wrench).forces
+    assert relative(by.total, forces) < 1e-12
+    rest = Motion.from_pose(motion)
+    assert np.array_equal(by.gravity, platform.inverse_dynamics(rest).forces)
+    one = platform.force_breakdown(motion[1, 2], wrench[2])
+    assert np.array_equal(one.wrench, by.wrench[1, 2])
+    assert one.total.shape == (6,)
+    assert repr(by).startswith('<ForceBreakdown of shape (3, 4): gravity, platform_inertia')
+
+
+# Stiffness and natural modes
+
+def test_stiffness_is_the_derivative_of_the_wrench_of_elastic_legs(
+        platform: StewartPlatform) -> None:
+    random = rng()
+    pose = random_motion(platform.parameters, random, 1)[0].pose
+    legs = random.uniform(1e6, 1e8, 6)
+    found = platform.stiffness(pose, legs)
+    assert np.allclose(found, found.T, rtol=1e-13, atol=0.0)
+    lengths, j_inv = platform.inverse_kinematics(pose), platform.inverse_jacobian(pose)
+    for direction in np.eye(6):
+        def wrench(step: float, direction: Array = direction) -> Array:
+            angle = float(np.linalg.norm(direction[3:]))
+            turn = rotation_about(direction[3:], step) if angle else np.eye(3)
+            moved = Pose(pose.position + step * direction[:3], turn @ pose.rotation)
+            force: Array = j_inv.T @ (legs * (platform.inverse_kinematics(moved) - lengths))
+            return force
+
+        assert relative((wrench(1e-5) - wrench(-1e-5)) / 2e-5, found @ direction) < 1e-7
+    assert np.array_equal(platform.stiffness(pose, 2e7), platform.stiffness(pose, [2e7] * 6))
+    assert np.array_equal(platform.stiffness(pose, 2e7), platform.stiffness(pose, np.array(2e7)))
+
+
+def test_natural_modes_solve_the_eigenvalue_problem(platform: StewartPlatform) -> None:
+    motion = random_motion(platform.parameters, rng(), 12)
+    motion = Motion.of_rows(motion.rows.reshape(3, 4, -1))
+    legs = rng().uniform(1e6, 1e8, (4, 6))
+    modes = platform.natural_modes(motion, legs)
+    assert modes.frequencies.shape == (3, 4, 6)
+    assert np.all(np.diff(modes.frequencies) >= 0.0)
+    mass, stiffness = platform.mass_matrix(motion), platform.stiffness(motion, legs)
+    shapes = modes.shapes
+    squares = (2.0 * np.pi * modes.frequencies) ** 2
+    back = np.swapaxes(shapes, -1, -2)
+    assert np.allclose(back @ mass @ shapes, np.eye(6), rtol=0.0, atol=1e-12)
+    # by the size of K in these coordinates: the largest square
+    off = np.abs(back @ stiffness @ shapes - squares[..., None] * np.eye(6))
+    assert np.max(off / squares[..., 5:, None]) < 1e-12
+    assert np.array_equal(platform.natural_modes(motion[1, 2], legs[2]).frequencies,
+                          modes.frequencies[1, 2])
+
+
+def test_natural_modes_of_a_bare_platform_are_those_known() -> None:
+    """On vertical legs over a symmetric platform, heave is sqrt(sum k / m) / (2 pi)."""
+    ring = 0.6 * np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3.0])
+    platform = StewartPlatform(Parameters({
+        'geometry.base_joints': ring.ravel(), 'geometry.platform_joints': ring.ravel(),
+        'platform.mass': 50.0, 'platform.inertia': [4.0, 0.0, 0.0, 4.0, 0.0, 6.0]}))
+    modes = platform.natural_modes(Pose([0.0, 0.0, 1.0], np.eye(3)), 1e6)
+    heave = np.sqrt(6e6 / 50.0) / (2.0 * np.pi)
+    pitch = np.sqrt(1e6 * 3.0 * 0.6 ** 2 / 4.0) / (2.0 * np.pi)
+    # J_inv has rank three: nothing holds the platform across the legs
+    assert np.allclose(modes.frequencies, [0.0, 0.0, 0.0, *sorted([heave, pitch, pitch])],
+                       rtol=1e-12, atol=1e-9)
+    assert repr(modes).startswith('<NaturalModes: ')
+    assert repr(modes).endswith(' Hz>')
+
+
+@pytest.mark.parametrize(('given', 'text'), [
+    (0.0, '0 N/m: must be more than 0'), ([1e6] * 5 + [-1.0], '-1 N/m: must be more than 0'),
+    ([1e6] * 5, 'leg_stiffness: shape (5,)'), (np.inf, 'must be finite'),
+    ('stiff', 'not an array of real numbers'), (None, 'not an array of real numbers'),
+    (np.full((4, 6), 1e6), 'pose (3,), leg_stiffness (4,)')])
+def test_a_stiffness_that_does_not_fit_is_rejected(
+        platform: StewartPlatform, given: Any, text: str) -> None:
+    poses = random_motion(platform.parameters, rng(), 3).pose
+    for call in (platform.stiffness, platform.natural_modes):
+        with pytest.raises(MotionError) as caught:
+            call(poses, given)
+        assert text in str(caught.value)
+
+
+# Home, likely mistakes, representation
+
+def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
+    platform = StewartPlatform(EXAMPLE)
+    home = platform.home_pose()
+    assert home.shape == ()
+    assert home.position[2] > 0.9
+    assert np.allclose(home.rotation, np.eye(3), rtol=0.0, atol=1e-12)
+    middle = 0.5 * (EXAMPLE['limits.length_min'] + EXAMPLE['limits.length_max'])
+    assert np.mean(platform.inverse_kinematics(home)) == pytest.approx(np.mean(middle), abs=1e-9)
+    no_limits = EXAMPLE.replaced({'limits.length_min': (), 'limits.length_max': (),
+                                  'geometry.zero_length': 1.2})
+    lower = StewartPlatform(no_limits)
+    assert np.mean(lower.inverse_kinematics(lower.home_pose())) == pytest.approx(1.2, abs=1e-9)
+
+
+@pytest.mark.parametrize(('changes', 'text'), [
+    ({'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 0.0},
+     'or geometry.zero_length, must give a length'),
+    ({'limits.length_min': 0.01, 'limits.length_max': 0.02}, 'no level pose has all legs')])
+def test_a_home_that_is_not_known_is_an_error(changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        StewartPlatform(EXAMPLE.replaced(changes)).home_pose()
+
+
+def test_check_returns_the_likely_mistakes() -> None:
+    assert StewartPlatform(EXAMPLE).check() == ()
+    wrong = EXAMPLE.replaced({'gravity': [0.0, 0.0, -9806.65]})
+    found = StewartPlatform(wrong).check()
+    assert found == likely_mistakes(wrong)
+    assert len(found) == 1
+    assert found[0].startswith('gravity: 9806.65 m/s^2')
+
+
+def test_representations_are_short(platform: StewartPlatform) -> None:
+    assert repr(StewartPlatform(EXAMPLE)) == (
+        '<StewartPlatform: 150 kg, joints on 0.9 m (base) and 0.6 m (platform)>')
+    motion = random_motion(platform.parameters, rng(), 5000)
+    for result in (motion, platform.inverse_dynamics(motion), platform.force_breakdown(motion),
+                   platform.natural_modes(motion, 1e6)):
+        assert len(repr(result)) < 150
+
+
+def test_a_platform_that_was_used_can_be_copied_and_pickled(platform: StewartPlatform) -> None:
+    motion = random_motion(platform.parameters, rng(), 3)
+    truth = platform.force_breakdown(motion)
+    for other in (copy.deepcopy(platform), pickle.loads(pickle.dumps(platform))):
+        assert np.array_equal(other.force_breakdown(motion), truth)
+
+
+# Whatever is given
+
+CALLS = {name: call for name, call in inspect.getmembers(StewartPlatform, inspect.isfunction)
+         if not name.startswith('_') and name not in ('solve', 'check', 'home_pose')}
+NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(), st.sampled_from(
+    [0.0, 1e-300, 1e155, 1e300, -1e308, 5e-324]))
+ARRAYS = st.sampled_from([(), (3,), (6,), (2, 6), (3, 6), (0, 6), (5,)]).flatmap(
+    lambda shape: st.lists(NUMBERS, min_size=int(np.prod(shape)), max_size=int(np.prod(shape)))
+    .map(lambda values: np.reshape(values, shape)))
+ODD = st.sampled_from([None, 'text', {}, {'a': 1}, [], [[]], object(), 1 + 1j, True, [1, [2]], b'',
+                       np.array(['x'] * 6), np.array([None] * 6), 10 ** 400, [10 ** 400] * 6,
+                       np.datetime64('2026-01-01'), np.ma.masked, Motion, float])
+
+
+def motions() -> st.SearchStrategy[Any]:
+    """Return motions and poses of any finite numbers, of one sample, two or none."""
+    finite = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))
+
+    def made(numbers: list[float], angles: list[float], shape: Any, pose: bool) -> Any:
+        parts = np.reshape(numbers, (5, 3))
+        at = [np.broadcast_to(part, (*shape, 3)) for part in parts]
+        motion = Motion.from_pose(Pose.from_euler(at[0], angles), *at[1:])
+        return motion.pose if pose else motion
+
+    return st.builds(made, st.lists(finite, min_size=15, max_size=15),
+                     st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3),
+                     st.sampled_from([(), (2,), (0,), (3, 1)]), st.booleans())
+
+
+@pytest.mark.parametrize('name', CALLS)
+@settings(derandomize=True, max_examples=60, deadline=None)
+@given(st.data())
+def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataObject) -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    names = [p.name for p in inspect.signature(CALLS[name]).parameters.values()
+             if p.name not in ('self', 'singular', 'christoffel')]
+    arguments = [data.draw(st.one_of(
+        motions() if each in ('motion', 'pose', 'guess') else ARRAYS, ARRAYS, ODD))
+        for each in names]
+    with np.errstate(all='raise', under='ignore'):
+        try:
+            result = CALLS[name](platform, *arguments)
+        except StewartError as exc:
+            assert '\n' not in str(exc)
+            assert 10 < len(str(exc)) < 1000
+            return
+    parts = result if isinstance(result, tuple) else [
+        result.rows if isinstance(result, Pose | Motion) else result]
+    assert all(np.isfinite(part).all() for part in parts)
+
+
+def test_christoffel_symbols_give_the_same_force(platform: StewartPlatform) -> None:
+    motion = random_motion(platform.parameters, rng(), 10)
+    twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)[..., None]
+    assert each_relative(platform.coriolis_matrix(motion, christoffel=True) @ twist,
+                         platform.coriolis_matrix(motion) @ twist) < 1e-12
