@@ -59,7 +59,7 @@ def library() -> None:
     home = Motion([0.0, 0.0, 1.1], np.eye(3))
     result = platform.inverse_dynamics(home)
     platform.forward_kinematics(result.lengths, home)
-    platform.twist(home.position, home.rotation, result.rates)
+    platform.twist(home, result.rates)
     platform.forward_dynamics(home, result.forces)
     with suppress(StewartError):  # no legs have such lengths
         ExternalWrench(platform.parameters)(

@@ -722,12 +722,12 @@ class DynamicsNode:
 
     def refuses(self, topic: str, reason: str, number: int = 1) -> None:
         """Expect that the diagnostics count so many more refusals."""
-        self.expected[f'refused, {topic}: {reason}'] += number
+        self.expected[f'rejected, {topic}: {reason}'] += number
 
     def counted(self) -> Counter[str]:
         """Return how many refusals of each kind the last diagnostics count."""
         return Counter({key: int(number) for key, number in self.values('setpoints').items()
-                        if key.startswith('refused, ')})
+                        if key.startswith('rejected, ')})
 
     def until_counted(self) -> None:
         """Wait until the diagnostics count the refusals that are expected, and no others."""

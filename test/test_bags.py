@@ -99,11 +99,17 @@ def test_results_are_no_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_folder_without_bags_is_an_error(tmp_path: Path) -> None:
-    make(tmp_path, 'notes.txt', '.hidden/metadata.yaml', 'old.bag')
+    make(tmp_path, 'notes.txt', '.hidden/metadata.yaml', 'old.bag.active')
     with pytest.raises(BagError, match='holds no bag') as caught:
         find_bags(tmp_path)
     assert f'{caught.value}'.startswith(f'{tmp_path}: ')
     assert '\n' not in f'{caught.value}'
+
+
+def test_bags_of_ros_1_are_found(tmp_path: Path) -> None:
+    make(tmp_path, 'a/old_0.bag', 'a/old_1.bag', 'b/one.bag', 'b/two.bag')
+    # files that are numbered are one recording
+    assert find_bags(tmp_path) == [tmp_path / 'a', tmp_path / 'b/one.bag', tmp_path / 'b/two.bag']
 
 
 def test_results_are_where_the_bags_are(tmp_path: Path) -> None:

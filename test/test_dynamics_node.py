@@ -56,7 +56,7 @@ FLAT = Sample((0.0, 0.0, 0.0))
 TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
 
-NOT_JOINED = 'passed over: not all topics had its stamp'
+NOT_JOINED = 'dropped: not all topics had its stamp'
 
 
 # Setpoints from a bag
@@ -99,7 +99,7 @@ def test_node_and_replay_give_the_same_bits(bag: str, fresh: Fresh, tmp_path: Pa
                'all messages have come')
     assert node.raw == messages
     summary = json.loads((tmp_path / bag / 'summary.json').read_text(encoding='utf-8'))
-    counts = {f'refused, {each["topic"]}: {each["reason"]}': str(each['count'])
+    counts = {f'rejected, {each["topic"]}: {each["reason"]}': str(each['count'])
               for each in summary['refused']}
     assert bool(counts) == (bag == 'flawed')
 
@@ -239,7 +239,7 @@ def test_a_bad_sample_is_refused_counted_and_nothing_is_published(node: Dynamics
             node.refuses(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
         # The next one is answered, and only that: it says so.
         node.answer(MOVING)
-        assert f'{bad_topic} refused: {reason}' in node.program.stderr, case
+        assert f'{bad_topic} rejected: {reason}' in node.program.stderr, case
     node.until_counted()
 
 
@@ -257,7 +257,7 @@ def test_a_quaternion_nearly_of_unit_length_is_brought_to_it(node: DynamicsNode)
 
 def test_a_setpoint_whose_numbers_overflow_is_refused(node: DynamicsNode) -> None:
     node.send(HOME._replace(position=(0.0, 0.0, 1e300)))
-    node.refuses('setpoint', 'out of range: the numbers overflow')
+    node.refuses('setpoint', 'out of range: numbers overflow')
     node.answer(MOVING)
     node.until_counted()
 
@@ -395,7 +395,7 @@ def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_
     node.until(lambda: len(node.raw['singularity_warning']) > warnings, 'it warns')
     assert node.warning
     node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
-    node.until_status('limits', ERROR, 'beyond limits.length_min')
+    node.until_status('limits', ERROR, 'below limits.length_min')
     # Out of it again the forces are back; the warning ends a sample after det(J) has changed.
     node.answer(MOVING)
     node.answer(MOVING)
@@ -410,10 +410,10 @@ def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: Dynam
     assert result.forces.max() > 6000.0
     state = node.answer(LEAPING)
     assert max(state.effort) == 6000.0
-    message = node.until_status('limits', ERROR, 'beyond limits.force_max, clipped')
+    message = node.until_status('limits', ERROR, 'above limits.force_max, clipped')
     worst = int(np.argmax(result.forces))
     assert (f'leg_{worst + 1}: force {result.forces[worst]:.6g} N is '
-            f'{result.forces[worst] - 6000.0:.6g} N beyond limits.force_max, clipped') in message
+            f'{result.forces[worst] - 6000.0:.6g} N above limits.force_max, clipped') in message
     key = f'leg_{worst + 1}: force demanded (N)'
     assert node.values('limits')[key] == f'{result.forces[worst]:.6g}'
     node.answer(MOVING)
@@ -422,10 +422,10 @@ def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: Dynam
 
 def test_other_limits_are_told_and_the_answer_goes_out(node: DynamicsNode) -> None:
     for sample, text in (
-            (HOME._replace(position=(0.0, 0.0, 0.5)), 'm beyond limits.length_min'),
-            (HOME._replace(position=(0.0, 0.0, 2.0)), 'm beyond limits.length_max'),
+            (HOME._replace(position=(0.0, 0.0, 0.5)), 'm below limits.length_min'),
+            (HOME._replace(position=(0.0, 0.0, 2.0)), 'm above limits.length_max'),
             (HOME._replace(twist=(0.0, 0.0, 0.9, 0.0, 0.0, 0.0)),
-             'm/s beyond limits.velocity_max')):
+             'm/s above limits.velocity_max')):
         node.answer(sample)
         node.until_status('limits', ERROR, text)
         assert 'clipped' not in node.status('limits').message
@@ -437,7 +437,7 @@ def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
     node.answer()
     node.until_status('singularity', OK, 'clear')
     node.answer(TURNED)
-    node.until_status('singularity', WARN, 'condition number above warn_condition')
+    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition, 20')
     values = node.values('singularity')
     result = node.result_of(TURNED)
     assert values['condition number'] == f'{result.condition_number:.6g}'
@@ -508,7 +508,7 @@ def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
     node = start(command=WITHOUT_EVENTS if executor == 'single-threaded' else None,
                  NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
     node.until_active()
-    key = 'refused, setpoint: passed over: more came at once than can be answered'
+    key = 'rejected, setpoint: dropped: more came at once than can be answered'
     sent = passed = 0
     while not passed:
         stamps = [node.stamp() for _ in range(500)]
@@ -834,7 +834,7 @@ def test_the_whole_lifecycle(start: Start) -> None:
     assert len(node.raw['leg_states']) == 3
     said = log_lines(node.program.stderr, 'ERROR')
     assert said
-    assert all('transition refused: ' in line for line in said)
+    assert all('transition rejected: ' in line for line in said)
     node.until_counted()
     node.stop()
 

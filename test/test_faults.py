@@ -50,8 +50,8 @@ OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 
 MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
                 (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
-NOT_JOINED = 'passed over: not all topics had its stamp'
-PASSED_OVER = 'passed over: more came at once than can be answered'
+NOT_JOINED = 'dropped: not all topics had its stamp'
+DROPPED = 'dropped: more came at once than can be answered'
 SPECIAL = (math.nan, math.inf, -math.inf)
 
 
@@ -346,16 +346,16 @@ def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -
         for topic, message in MOVING.messages(stamp).items():
             node.publish(topic, message)
     node.check(node.state_of(stamps[-1]), node.result_of(MOVING))
-    node.until_reported('timing', WARN, 'passed over')
-    assert int(node.values('timing')['passed over']) > 100
+    node.until_reported('timing', WARN, 'dropped: ')
+    assert int(node.values('timing')['dropped']) > 100
     answered = [nanoseconds(state.header.stamp) for state in node.received('leg_states')]
     assert answered == sorted(answered)
     node.until_status('timing', OK, 'on time')
     values = node.values('setpoints')
     node.expected.update({key: int(number) for key, number in values.items()
-                          if key.startswith('refused, ')})
-    passed = node.expected[f'refused, setpoint: {PASSED_OVER}']
-    incomplete = node.expected[f'refused, setpoint/pose: {NOT_JOINED}']
+                          if key.startswith('rejected, ')})
+    passed = node.expected[f'rejected, setpoint: {DROPPED}']
+    incomplete = node.expected[f'rejected, setpoint/pose: {NOT_JOINED}']
     # What the middleware drops of more than a thousand on one topic, nobody can count.
     assert len(answered) + passed + incomplete <= len(stamps)
     assert 'more came at once than can be answered' in node.program.stderr
@@ -371,7 +371,7 @@ def test_of_a_series_of_refusals_the_first_and_the_last_are_logged(
 
     def said() -> list[str]:
         return [line for line in log_lines(node.program.stderr, 'WARN')
-                if 'wrench refused: malformed' in line]
+                if 'wrench rejected: malformed' in line]
 
     assert len(said()) == 1
     node.until(lambda: len(said()) > 1, 'the last is said when no more come')
@@ -514,7 +514,7 @@ def _expect_what_was_cut_off(node: DynamicsNode) -> None:
                            if key.endswith('same stamp twice')), 'it is counted')
     counted = node.counted()
     strange = {key: number for key, number in (counted - node.expected).items()
-               if ': passed over: ' not in key}
+               if ': dropped: ' not in key}
     assert not strange
     node.expected = counted
 
@@ -604,7 +604,7 @@ def test_it_is_shut_down_from_where_it_has_not_begun(start: Start, configured: b
     # There is no way back, and it says so.
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE, shutdown):
         assert not node.change(transition)
-    assert 'transition refused: ' in node.program.stderr
+    assert 'transition rejected: ' in node.program.stderr
     node.until(lambda: not any(writer.get_subscription_count()
                                for writer in node.writers.values()), 'it has no topics')
 
@@ -625,7 +625,7 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> 
         assert node.state == 'active'
         assert not node.set_parameters(platform__mass=0.0).successful
     assert not node.change(Transition.TRANSITION_ACTIVATE)
-    assert 'transition refused: ' in node.program.stderr
+    assert 'transition rejected: ' in node.program.stderr
     assert node.set_parameters(platform__mass=mass).successful
     feeder.end()
     assert len(masses) > 10
@@ -689,6 +689,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
     node.answer()
     node.until(lambda: node.warning is False, 'no warning is on')
     crossings = int(node.values('singularity').get('crossings', '0'))
+    said = sum('det(J) crossed' in line for line in log_lines(node.program.stderr, 'ERROR'))
     # 4 degrees in 10 ms.
     there = [_turned(degrees, math.radians(400.0)) for degrees in (84.0, 88.0, 92.0, 96.0)]
     clear = [node.result_of(sample) for sample in there]
@@ -697,16 +698,19 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
         state = node.answer(sample)
         assert np.abs(state.effort).max() <= 6000.0
         node.until(lambda: node.warning, 'it warns')
-    # One sample crossed, the next ones are only near: it is said for a second nevertheless.
-    node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
+    # One sample crossed, the next ones are only near: it is reported for a second nevertheless.
+    node.until_status('singularity', ERROR, 'det(J) crossed zero 0.005 s before stamp ')
+    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition, 20')
     # Back with one leap, from where nothing is near into where nothing is.
     for degrees in (130.0, 130.0, 50.0):
         node.answer(_turned(degrees))
-    node.until_status('singularity', WARN, 'det(J) changed its sign since the last sample')
+    node.until_status('singularity', ERROR, 'det(J) crossed zero ')
     node.answer(_turned(50.0))
     node.until(lambda: node.warning is False, 'the warning ends')
     node.until_status('singularity', OK, 'clear')
     assert node.values('singularity')['crossings'] == str(crossings + 2)
+    assert sum('singularity: det(J) crossed zero ' in line for line in log_lines(
+        node.program.stderr, 'ERROR')) == said + 2
 
 
 def test_no_forces_go_out_through_a_singularity_where_they_are_suppressed(

@@ -86,6 +86,13 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'error': '', 'results': 'deep/a'}]
 
 
+def test_a_bag_without_answers_is_not_partly_read(tmp_path: Path) -> None:
+    unanswered = summary([None] * 6, setpoints={'answered': 0, 'duration_s': 0.0})
+    write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
+                           row('b', 3, summary([1.0]), 'cut off')])
+    assert [cells['result'] for cells in table(tmp_path)] == ['nothing answered', 'partly read']
+
+
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
     nothing = summary([None] * 6, singularity=dict.fromkeys(
         ('determinant_nearest_m3', 'crossings', 'condition_max', 'warnings')))

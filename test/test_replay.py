@@ -402,7 +402,8 @@ def test_a_combined_bag_gives_the_numbers_of_the_separate_one(tmp_path: Path) ->
     assert outputs_of(out / 'combined').rows == outputs_of(out / 'separate').rows
 
 
-def test_a_bag_of_poses_is_quasi_static(tmp_path: Path) -> None:
+def test_a_bag_of_poses_is_quasi_static(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_bag(tmp_path / 'poses', motion(30)[::3])
     params = parameter_file(tmp_path, 'setpoint: {source: pose}')
     assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out')]) == DONE
@@ -411,6 +412,36 @@ def test_a_bag_of_poses_is_quasi_static(tmp_path: Path) -> None:
     rows = outputs_of(tmp_path / 'out' / 'poses').rows
     assert [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']]
             for row in rows] == still.forces.tolist()
+    # what poses cannot tell is not known, and not zero
+    assert {row[f'{leg} rate (m/s)'] for row in rows for leg in PARAMETERS['joints']} == {''}
+    assert {row['d(det(J))/dt (m^3/s)'] for row in rows} == {''}
+    capsys.readouterr()
+    for options, code in (((), LIMIT_MET), (('--differentiate', '--cutoff', '5'), DONE)):
+        assert main([str(bag), '--params', str(params), '--output', str(tmp_path / f'{code}'),
+                     '--strict', '--no-report', *options]) == code
+        said = capsys.readouterr().out
+        assert ('limits.velocity_max could not be checked' in said) is (code == LIMIT_MET)
+        assert ('all limits held' in said) is (code == DONE)
+
+
+def test_names_of_a_bag_do_not_control_the_terminal(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hostile = '/a\x1b[2J\rb'
+    bag = write_bag(tmp_path / 'bag', [*motion(3), (hostile, RECORDED, messages.wrench(0))],
+                    **{hostile[1:]: INPUT_TYPES[WRENCH]})
+    assert run(bag, tmp_path / 'out', '--no-report') == DONE
+    said = capsys.readouterr().out
+    assert '/a\\x1b[2J\\rb' in said
+    assert not set(said) & {'\x1b', '\r'}
+
+
+@pytest.mark.parametrize('name', ['', '/', 'a b', '1st', 'a//b'])
+def test_a_name_that_no_node_can_have_is_rejected(
+        name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), '--node', name])
+    assert caught.value.code == BAD_INPUT
+    assert 'not a name of a node' in capsys.readouterr().err
 
 
 def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
