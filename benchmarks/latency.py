@@ -18,7 +18,7 @@ The processes around the node whose latency is measured.
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the machine; a caller asks
 for parameters and states meanwhile, a viewer takes the markers, a machine has its legs measured, a
-planner sends planned motions.
+planner sends planned trajectories.
 """
 
 from __future__ import annotations
@@ -212,7 +212,7 @@ def view(name: str) -> None:
 
 def plan(path: Path, name: str, points: int) -> None:
     """
-    Send a planned motion each second, so many for each number on stdin; note how long it takes.
+    Send a planned trajectory each second, so many for each number on stdin; note how long it takes.
 
     Parameters
     ----------

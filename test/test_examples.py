@@ -66,13 +66,13 @@ def test_a_planned_motion_is_answered_or_its_refusal_is_said(
         'motion.type': 'quintic', 'motion.initial': HOME, 'motion.final': THERE,
         'motion.duration': 2.0, 'rate': 100.0})
     expected = node.platform.inverse_dynamics(motion_at(settings, sample_times(settings) * 1e-9))
-    # Refused ones before and after it, which are not taken for its answer.
+    # Rejected ones before and after it, which are not taken for its answer.
     given = ['--from', *HOME, '--to', *THERE, '--duration', '2.0']
     for n, arguments in enumerate((given, [])):  # which are those by default
         program = planned('--duration', '0.3')
         assert program.wait() == 1
         assert program.stdout == ''
-        assert re.fullmatch(r'refused: at 0\.\d+ s leg_\d: rate .* beyond limits\.velocity_max\n',
+        assert re.fullmatch(r'rejected: at 0\.\d+ s leg_\d: rate .* above limits\.velocity_max\n',
                             program.stderr)
         program = planned(*arguments)
         assert program.wait() == 0, program.stderr

@@ -434,7 +434,7 @@ def test_what_cannot_be_computed_holds_it_at_rest(
     assert len(simulator.said('ERROR', '')) == 1
 
 
-def test_a_machine_too_stiff_for_real_time_lets_time_go(begin: Start) -> None:
+def test_a_hexapod_too_stiff_for_real_time_skips_time(begin: Start) -> None:
     simulator = begin('actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0')
     simulator.command(holding())
     simulator.until_said('WARN', 'fell behind by')
@@ -445,7 +445,7 @@ def test_a_machine_too_stiff_for_real_time_lets_time_go(begin: Start) -> None:
     assert max(np.diff(simulator.stamps())) > PERIOD
 
 
-def test_a_simulator_that_was_stopped_takes_what_is_due_and_lets_the_rest_go(
+def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
         start: Start) -> None:
     simulator = start()
     simulator.until_there()
