@@ -212,7 +212,7 @@ def view(name: str) -> None:
 
 def plan(path: Path, name: str, points: int) -> None:
     """
-    Send a planned trajectory each second, so many for each number on stdin; note how long it takes.
+    Send a planned trajectory each second, so many for each number on stdin; note their times.
 
     Parameters
     ----------

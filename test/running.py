@@ -958,7 +958,7 @@ class Planner:
         self._writer.publish(message)
 
     def send_long(self, points: int, stamp: int = STEP, leap: float = 0.0) -> None:
-        """Send a trajectory that is at home for so many points, 1 ms apart, and leaps to the last."""
+        """Send a trajectory at home for so many points, 1 ms apart, and a leap to the last."""
         point, = HOME.combined(0).points
         two = raw(MultiDOFJointTrajectory(header=header(stamp, ''), points=[point, point]))
         # Points are of 184 bytes, their times in the last eight.
