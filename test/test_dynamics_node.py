@@ -365,6 +365,25 @@ def test_a_topic_that_never_came_is_named(fresh: Fresh) -> None:
     assert node.raw['leg_states'] == []
 
 
+def test_messages_that_complete_no_setpoint_are_warned_of_in_the_log(fresh: Fresh) -> None:
+    node = fresh()
+    node.until_active()
+    for lacking, text in (
+            (SEPARATE[2:], 'setpoint/accel never came'),
+            ((), 'all topics arrive, but none is joined: their stamps differ by more than '
+             'setpoint.sync_tolerance, 0 s')):
+        line = f'setpoints: no setpoint: {text}'
+
+        def warned(lacking: tuple[str, ...] = lacking, line: str = line) -> bool:
+            for topic in SEPARATE:  # each with a stamp of its own
+                if topic not in lacking:
+                    node.publish(topic, HOME.messages(node.stamp())[topic])
+            return any(line in each for each in log_lines(node.program.stderr, 'WARN'))
+
+        node.until(warned, 'it is warned of')
+    node.answer(MOVING)
+
+
 def test_without_setpoints_diagnostics_are_stale_and_nothing_is_repeated(
         node: DynamicsNode) -> None:
     node.answer(MOVING)

@@ -163,7 +163,7 @@ def test_many_are_the_equation_of_motion_of_each() -> None:
         forces = platform.inverse_dynamics(motion, known + load).forces
         found = external_wrenches(platform, motion.rows, model, forces)
         assert relative(found, load) < 1e-9
-        jacobian = platform.jacobian(motion.position, motion.rotation)
+        jacobian = platform.inverse_jacobian(motion)
         assert relative(found, np.einsum('nji,nj->ni', jacobian, model - forces)) < 1e-12
         # Each alone gives the same bits, of a pose alone too, and however the arrays lie.
         for n in range(0, 50, 7):
