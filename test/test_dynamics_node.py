@@ -39,7 +39,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
     assert_only_log_lines, bits, DynamicsNode, executable, HOME, LATCHED, log_lines, nanoseconds,
-    NODE, OUTPUTS, Peer, PLATFORM, raw, refused, ROOT, Sample, SEPARATE, wrench_message)
+    NODE, OUTPUTS, Peer, PLATFORM, raw, rejected, ROOT, Sample, SEPARATE, wrench_message)
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Parameters, Pose, StewartPlatform
@@ -56,7 +56,7 @@ FLAT = Sample((0.0, 0.0, 0.0))
 TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
 
-NOT_JOINED = 'passed over: not all topics had its stamp'
+NOT_JOINED = 'dropped: not all topics had its stamp'
 
 
 # Setpoints from a bag
@@ -99,8 +99,8 @@ def test_node_and_replay_give_the_same_bits(bag: str, fresh: Fresh, tmp_path: Pa
                'all messages have come')
     assert node.raw == messages
     summary = json.loads((tmp_path / bag / 'summary.json').read_text(encoding='utf-8'))
-    counts = {f'refused, {each["topic"]}: {each["reason"]}': str(each['count'])
-              for each in summary['refused']}
+    counts = {f'rejected, {each["topic"]}: {each["reason"]}': str(each['count'])
+              for each in summary['rejected']}
     assert bool(counts) == (bag == 'flawed')
 
     def counted() -> bool:
@@ -108,7 +108,7 @@ def test_node_and_replay_give_the_same_bits(bag: str, fresh: Fresh, tmp_path: Pa
         return (values.get('setpoints answered') == str(answers)
                 and {key: n for key, n in values.items() if key in counts} == counts)
 
-    node.until(counted, 'the node refuses what the replay refuses')
+    node.until(counted, 'the node rejects what the replay rejects')
 
 
 def test_a_thousand_setpoints_are_answered_with_the_librarys_bits(
@@ -230,16 +230,16 @@ def _nanosec(message: bytes, nanosec: int) -> bytes:
     return message[:8] + nanosec.to_bytes(4, 'little') + message[12:]
 
 
-def test_a_bad_sample_is_refused_counted_and_nothing_is_published(node: DynamicsNode) -> None:
+def test_a_bad_sample_is_rejected_counted_and_nothing_is_published(node: DynamicsNode) -> None:
     for case, (spoil, reason) in SPOILED.items():
         stamp = node.stamp()
         bad_topic, bad = spoil(stamp)
         for topic, message in HOME.messages(stamp).items():
             node.publish(topic, bad if topic == bad_topic else message)
-            node.refuses(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
+            node.rejects(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
         # The next one is answered, and only that: it says so.
         node.answer(MOVING)
-        assert f'{bad_topic} refused: {reason}' in node.program.stderr, case
+        assert f'{bad_topic} rejected: {reason}' in node.program.stderr, case
     node.until_counted()
 
 
@@ -255,20 +255,20 @@ def test_a_quaternion_nearly_of_unit_length_is_brought_to_it(node: DynamicsNode)
     node.until_counted()
 
 
-def test_a_setpoint_whose_numbers_overflow_is_refused(node: DynamicsNode) -> None:
+def test_a_setpoint_whose_numbers_overflow_is_rejected(node: DynamicsNode) -> None:
     node.send(HOME._replace(position=(0.0, 0.0, 1e300)))
-    node.refuses('setpoint', 'out of range: the numbers overflow')
+    node.rejects('setpoint', 'out of range: numbers overflow')
     node.answer(MOVING)
     node.until_counted()
 
 
-def test_a_stamp_older_than_the_last_used_is_refused(node: DynamicsNode) -> None:
+def test_a_stamp_older_than_the_last_used_is_rejected(node: DynamicsNode) -> None:
     node.answer()
     last = node.stamp(0)
     # setpoint.timeout is 0.1 s: a jump by more would be a restart.
     node.send(MOVING, last - 100_000_000)
     for topic in SEPARATE:
-        node.refuses(topic, 'older than the last used')
+        node.rejects(topic, 'older than the last used')
     node.answer(MOVING)
     node.until_counted()
 
@@ -321,8 +321,8 @@ def test_of_a_stamp_twice_on_one_topic_the_first_is_used(node: DynamicsNode) -> 
     node.check(node.state_of(stamp), node.result_of(MOVING))
     # And once more when it has been answered.
     node.publish('setpoint/pose', other['setpoint/pose'])
-    node.refuses('setpoint/pose', 'same stamp twice', 2)
-    node.refuses('setpoint/twist', 'same stamp twice')
+    node.rejects('setpoint/pose', 'same stamp twice', 2)
+    node.rejects('setpoint/twist', 'same stamp twice')
     node.answer(MOVING)
     node.until_counted()
 
@@ -350,7 +350,7 @@ def test_a_silent_topic_is_named_and_nothing_is_published(
     assert len(node.raw['leg_states']) == answered + 1
     for topic in SEPARATE:
         if topic != silent:
-            node.refuses(topic, NOT_JOINED, sent)
+            node.rejects(topic, NOT_JOINED, sent)
     node.until_counted()
 
 
@@ -395,7 +395,7 @@ def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_
     node.until(lambda: len(node.raw['singularity_warning']) > warnings, 'it warns')
     assert node.warning
     node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
-    node.until_status('limits', ERROR, 'beyond limits.length_min')
+    node.until_status('limits', ERROR, 'below limits.length_min')
     # Out of it again the forces are back; the warning ends a sample after det(J) has changed.
     node.answer(MOVING)
     node.answer(MOVING)
@@ -410,10 +410,10 @@ def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: Dynam
     assert result.forces.max() > 6000.0
     state = node.answer(LEAPING)
     assert max(state.effort) == 6000.0
-    message = node.until_status('limits', ERROR, 'beyond limits.force_max, clipped')
+    message = node.until_status('limits', ERROR, 'above limits.force_max, clipped')
     worst = int(np.argmax(result.forces))
     assert (f'leg_{worst + 1}: force {result.forces[worst]:.6g} N is '
-            f'{result.forces[worst] - 6000.0:.6g} N beyond limits.force_max, clipped') in message
+            f'{result.forces[worst] - 6000.0:.6g} N above limits.force_max, clipped') in message
     key = f'leg_{worst + 1}: force demanded (N)'
     assert node.values('limits')[key] == f'{result.forces[worst]:.6g}'
     node.answer(MOVING)
@@ -422,10 +422,10 @@ def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: Dynam
 
 def test_other_limits_are_told_and_the_answer_goes_out(node: DynamicsNode) -> None:
     for sample, text in (
-            (HOME._replace(position=(0.0, 0.0, 0.5)), 'm beyond limits.length_min'),
-            (HOME._replace(position=(0.0, 0.0, 2.0)), 'm beyond limits.length_max'),
+            (HOME._replace(position=(0.0, 0.0, 0.5)), 'm below limits.length_min'),
+            (HOME._replace(position=(0.0, 0.0, 2.0)), 'm above limits.length_max'),
             (HOME._replace(twist=(0.0, 0.0, 0.9, 0.0, 0.0, 0.0)),
-             'm/s beyond limits.velocity_max')):
+             'm/s above limits.velocity_max')):
         node.answer(sample)
         node.until_status('limits', ERROR, text)
         assert 'clipped' not in node.status('limits').message
@@ -437,7 +437,7 @@ def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
     node.answer()
     node.until_status('singularity', OK, 'clear')
     node.answer(TURNED)
-    node.until_status('singularity', WARN, 'condition number above warn_condition')
+    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition')
     values = node.values('singularity')
     result = node.result_of(TURNED)
     assert values['condition number'] == f'{result.condition_number:.6g}'
@@ -460,7 +460,7 @@ def test_who_reads_the_answers_is_counted(fresh: Fresh) -> None:
     node.until(lambda: readers.items() <= node.values('setpoints').items(), 'it has gone')
 
 
-def test_with_exclusive_setpoints_a_second_writer_is_told_and_refused(fresh: Fresh) -> None:
+def test_with_exclusive_setpoints_a_second_writer_is_told_and_rejected(fresh: Fresh) -> None:
     node = fresh('setpoint.exclusive:=true')
     node.until_active()
     node.answer()
@@ -468,13 +468,13 @@ def test_with_exclusive_setpoints_a_second_writer_is_told_and_refused(fresh: Fre
     node.until(lambda: node.values('setpoints')['setpoint/pose: writers'] == '2',
                'the second writer is known')
     node.send(MOVING)
-    node.refuses('setpoint/pose', 'more than one writer')
+    node.rejects('setpoint/pose', 'more than one writer')
     node.until_counted()
     node.peer.node.destroy_publisher(second)
     node.until(lambda: node.values('setpoints')['setpoint/pose: writers'] == '1',
                'the second writer has gone')
     for topic in ('setpoint/twist', 'setpoint/accel'):
-        node.refuses(topic, NOT_JOINED)
+        node.rejects(topic, NOT_JOINED)
     node.answer(MOVING)
     node.until_counted()
 
@@ -503,12 +503,12 @@ WITHOUT_NUMBA = [sys.executable, '-c', WITHOUT.format('numba')]
 
 
 @pytest.mark.parametrize('executor', ['events', 'single-threaded'])
-def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
+def test_of_a_burst_the_newest_is_answered_and_those_dropped_are_counted(
         start: Start, executor: str) -> None:
     node = start(command=WITHOUT_EVENTS if executor == 'single-threaded' else None,
                  NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
     node.until_active()
-    key = 'refused, setpoint: passed over: more came at once than can be answered'
+    key = 'rejected, setpoint: dropped: more came at once than can be answered'
     sent = passed = 0
     while not passed:
         stamps = [node.stamp() for _ in range(500)]
@@ -528,7 +528,7 @@ def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
 
 
 def _passed_over(node: DynamicsNode, key: str, sent: int) -> int:
-    """Return how many setpoints the node has passed over, once it has counted all sent."""
+    """Return how many setpoints the node has dropped, once it has counted all sent."""
     def counted(key: str) -> int:
         return int(node.values('setpoints').get(key, '0'))
 
@@ -591,7 +591,7 @@ def test_setpoints_in_one_message(fresh: Fresh) -> None:
         if reason == 'older than the last used':
             node.answer()
         node.publish('setpoint/combined', bad)
-        node.refuses('setpoint/combined', reason)
+        node.rejects('setpoint/combined', reason)
     node.answer(MOVING)
     node.until_counted()
     assert '2 points: a setpoint has one' in node.program.stderr
@@ -628,7 +628,7 @@ def test_stamps_within_the_tolerance_are_joined(fresh: Fresh) -> None:
     node.answer(MOVING)
     assert len(node.raw['leg_states']) == 2
     for topic in SEPARATE:
-        node.refuses(topic, NOT_JOINED)
+        node.rejects(topic, NOT_JOINED)
     node.until_counted()
 
 
@@ -650,7 +650,7 @@ def test_a_wrench_holds_for_the_setpoints_to_come(fresh: Fresh) -> None:
                         (wrench_message((9.0,) * 6, 'platform'), 'wrong frame_id'),
                         (raw(wrench_message((9.0,) * 6))[:50], 'malformed')):
         node.publish('wrench', bad)
-        node.refuses('wrench', reason)
+        node.rejects('wrench', reason)
     node.until_counted()
     # The last sound one still holds; one in a frame without a name is sound.
     node.answer(MOVING, loads[-1])
@@ -756,7 +756,7 @@ BAD_CHANGES: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_a_bad_change_is_refused_with_its_reason(node: DynamicsNode) -> None:
+def test_a_bad_change_is_rejected_with_its_reason(node: DynamicsNode) -> None:
     for changes, reason in BAD_CHANGES:
         result = node.set_atomically([
             RosParameter(name, value=value) for name, value in changes.items()])
@@ -834,7 +834,7 @@ def test_the_whole_lifecycle(start: Start) -> None:
     assert len(node.raw['leg_states']) == 3
     said = log_lines(node.program.stderr, 'ERROR')
     assert said
-    assert all('transition refused: ' in line for line in said)
+    assert all('transition rejected: ' in line for line in said)
     node.until_counted()
     node.stop()
 
@@ -912,7 +912,7 @@ def test_a_broken_rule_is_said_in_one_line(domain: int, tmp_path: Path, case: st
     assert good in GOOD
     file = tmp_path / 'machine.yaml'
     file.write_text(GOOD.replace(good, bad), encoding='utf-8')
-    line = refused(domain, tmp_path / 'node', '--params-file', str(file))
+    line = rejected(domain, tmp_path / 'node', '--params-file', str(file))
     assert line.startswith(f'stewart_dynamics: {file}: {text}')
 
 
@@ -925,7 +925,7 @@ def test_the_file_that_those_spoil_is_good(tmp_path: Path) -> None:
 
 def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
     file = tmp_path / 'none.yaml'
-    assert refused(domain, tmp_path / 'node', '--params-file', str(file)) == (
+    assert rejected(domain, tmp_path / 'node', '--params-file', str(file)) == (
         f'stewart_dynamics: {file}: cannot be read: No such file or directory')
 
 
@@ -935,12 +935,12 @@ def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None
 ])
 def test_a_bad_parameter_on_the_command_line_is_said_in_one_line(
         domain: int, tmp_path: Path, override: str, text: str) -> None:
-    line = refused(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
+    line = rejected(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
     assert text in line
 
 
 def test_no_parameters_at_all_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
-    assert refused(domain, tmp_path / 'node') == (
+    assert rejected(domain, tmp_path / 'node') == (
         'stewart_dynamics: command line: geometry.base_joints: missing, it has no default')
 
 
@@ -993,7 +993,7 @@ def test_whatever_comes_nothing_but_numbers_goes_out_and_a_setpoint_is_answered(
 
 
 @pytest.mark.parametrize('program', ['stewart_dynamics', 'stewart_trajectory'])
-def test_help_is_given_and_a_stray_argument_is_refused(program: str) -> None:
+def test_help_is_given_and_a_stray_argument_is_rejected(program: str) -> None:
     path = Path(sys.executable).with_name(program)
     said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
     assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')

@@ -53,7 +53,7 @@ def run(tmp_path: Path) -> Iterator[Run]:
         program.kill()
 
 
-def test_a_planned_motion_is_answered_or_its_refusal_is_said(
+def test_a_planned_motion_is_answered_or_its_rejection_is_said(
         start: Callable[..., DynamicsNode], run: Run) -> None:
     node = start()
     node.until_active()
@@ -72,7 +72,7 @@ def test_a_planned_motion_is_answered_or_its_refusal_is_said(
         program = planned('--duration', '0.3')
         assert program.wait() == 1
         assert program.stdout == ''
-        assert re.fullmatch(r'refused: at 0\.\d+ s leg_\d: rate .* beyond limits\.velocity_max\n',
+        assert re.fullmatch(r'rejected: at 0\.\d+ s leg_\d: rate .* beyond limits\.velocity_max\n',
                             program.stderr)
         program = planned(*arguments)
         assert program.wait() == 0, program.stderr

@@ -141,9 +141,9 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
                                    six(each.rates + 1e-4 * random.normal(size=6)),
                                    six(each.forces + 5.0 * random.normal(size=6))))
             for each in measured(MACHINE, motion, LOAD, stamps)]
-    refused: list[object] = []
+    rejected: list[object] = []
     step = ExternalWrench(MACHINE)
-    legs = MeasuredLegs(MACHINE, step, lambda *said: refused.append(said), refused.append)
+    legs = MeasuredLegs(MACHINE, step, lambda *said: rejected.append(said), rejected.append)
     expected = []
     for each in data:
         estimate = legs.take(each, NO_WRENCH, None)
@@ -151,7 +151,7 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
         if estimate.wrench is not None:
             expected.append(step.message(estimate))
         felt.publish(each)
-    assert not refused
+    assert not rejected
     felt.node.until(lambda: len(felt.raw) >= len(expected), 'all wrenches have come')
     assert felt.raw == expected
     assert felt.received()[0].header.frame_id == 'base'
@@ -184,10 +184,10 @@ def test_thresholds_are_checked_and_can_be_changed_while_it_is_active(felt: Felt
     felt.until_status(OK, 'no overload')
     assert felt.node.set_parameters(external_wrench__force_max=300.0).successful
     felt.until_status(ERROR, f'force {math.hypot(*LOAD[:3]):.6g} N is ')
-    assert 'N beyond external_wrench.force_max' in felt.node.status(STATUS).message
+    assert 'N above external_wrench.force_max' in felt.node.status(STATUS).message
     assert felt.node.set_parameters(
         external_wrench__force_max=400.0, external_wrench__moment_max=100.0).successful
-    felt.until_status(ERROR, ' N m beyond external_wrench.moment_max')
+    felt.until_status(ERROR, ' N m above external_wrench.moment_max')
     felt.until_status(OK, 'no overload', NO_WRENCH)
     answer = felt.node.set_parameters(external_wrench__cutoff=0.0)
     assert answer.reason == 'external_wrench.cutoff: 0.0 Hz: must be more than 0'
@@ -220,11 +220,11 @@ SPOILT = {
     'without position, velocity or effort': {'effort': []},
     'not as many numbers as names': {'velocity': [0.0] * 5},
     'not finite': {'position': [math.nan] + [0.3] * 5},
-    'lengths belong to no pose': {'position': [9.0] + [0.3] * 5},
-    'out of range: the numbers overflow': {'velocity': [1e308] * 6}}
+    'forward kinematics did not converge': {'position': [9.0] + [0.3] * 5},
+    'out of range: numbers overflow': {'velocity': [1e308] * 6}}
 
 
-def test_measured_legs_that_are_unfit_are_refused(felt: Felt) -> None:
+def test_measured_legs_that_are_unfit_are_rejected(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     for number, (reason, fields) in enumerate(SPOILT.items()):
@@ -235,7 +235,7 @@ def test_measured_legs_that_are_unfit_are_refused(felt: Felt) -> None:
         felt.until_answered(felt.rest(step=2 * MILLISECOND))
         assert len(felt.raw) == number + 2
         felt.node.until(
-            lambda key=f'refused, {LEGS}: {reason}': felt.node.values(STATUS).get(key) == '1',
+            lambda key=f'rejected, {LEGS}: {reason}': felt.node.values(STATUS).get(key) == '1',
             f'{reason} is counted')
 
     def told() -> bool:
@@ -244,13 +244,13 @@ def test_measured_legs_that_are_unfit_are_refused(felt: Felt) -> None:
         status = felt.node.status(STATUS)
         return bool(status.level == WARN) and 'measured_legs: malformed' in status.message
 
-    felt.node.until(told, 'diagnostics say what is refused')
-    assert any('measured_legs refused: lacks one of the joints: leg_6; there are ' in line
+    felt.node.until(told, 'diagnostics say what is rejected')
+    assert any('measured_legs rejected: lacks one of the joints: leg_6; there are ' in line
                for line in log_lines(felt.node.program.stderr, 'WARN'))
     felt.until_status(OK, 'no overload')
 
 
-def test_stamps_of_measured_legs_that_are_none_or_late_are_refused(felt: Felt) -> None:
+def test_stamps_of_measured_legs_that_are_none_or_late_are_rejected(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     many = len(felt.raw)
@@ -260,7 +260,7 @@ def test_stamps_of_measured_legs_that_are_none_or_late_are_refused(felt: Felt) -
         felt.rest(step=step)
         felt.stamp = stamp
         felt.node.until(
-            lambda key=f'refused, {LEGS}: {reason}': felt.node.values(STATUS).get(key) == '1',
+            lambda key=f'rejected, {LEGS}: {reason}': felt.node.values(STATUS).get(key) == '1',
             f'{reason} is counted')
     assert len(felt.raw) == many
     felt.rest(step=-50 * 10 ** 9)  # of that one there is no acceleration
