@@ -22,7 +22,6 @@ import struct
 import time
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import (
     AccelStamped, PoseStamped, Transform, Twist, TwistStamped, WrenchStamped)
 from hypothesis import example, given, settings
@@ -36,7 +35,6 @@ from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
-from stewart_dynamics.messages.diagnostics import diagnostics
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import (
     combined, layout_of, pose, StampedWriter, twist, wrench)
@@ -404,25 +402,6 @@ def test_a_number_and_a_truth_value_are_what_rclpy_writes(number: float, truth: 
     assert serialize_message(Bool(data=truth))[:len(data)] == data  # padded to four bytes
     assert deserialize_message(data, Bool).data is truth
     assert STORE.deserialize_cdr(data, 'std_msgs/msg/Bool').data is truth
-
-
-statuses = st.lists(st.tuples(
-    st.integers(0, 3), st.tuples(texts, texts, texts),
-    st.lists(st.tuples(texts, texts), max_size=4)), max_size=4)
-
-
-@moderately
-@given(stamps, statuses)
-def test_diagnostics_are_what_rclpy_and_rosbags_write(stamp: int, written: Any) -> None:
-    data = diagnostics(stamp, written)
-    array = deserialize_message(data, DiagnosticArray)
-    assert (array.header.stamp.sec, array.header.stamp.nanosec) == divmod(stamp, SECOND)
-    assert array.header.frame_id == ''
-    assert [(status.level[0], (status.name, status.message, status.hardware_id),
-             [(pair.key, pair.value) for pair in status.values])
-            for status in array.status] == written
-    kind = 'diagnostic_msgs/msg/DiagnosticArray'
-    assert bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, kind), kind)) == data
 
 
 @pytest.mark.parametrize(('stamp', 'holds'), [

@@ -32,8 +32,8 @@ from scipy.interpolate import make_smoothing_spline
 
 from stewart_dynamics import Motion
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.replay.differentiate import (
-    Differentiator, FEWEST, smoothing_spline, TOO_FAST, TOO_FEW)
+from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAST, TOO_FEW
+from stewart_dynamics.replay.smoothing_spline import FEWEST, smoothing_spline
 from stewart_dynamics.runtime.step import Batch
 
 Array = NDArray[np.float64]

@@ -143,7 +143,8 @@ def callables() -> Iterator[tuple[str, object]]:
                 yield f'{name}.{member}', getattr(thing, member)
 
 
-@pytest.mark.parametrize('name, thing', list(callables()), ids=lambda value: str(value)[:40])
+@pytest.mark.parametrize('name, thing', list(callables()),
+                         ids=lambda value: value if isinstance(value, str) else '')
 def test_documented_parameters_are_those_of_the_call(name: str, thing: object) -> None:
     """Text after a section without its own heading would be shown as a parameter."""
     docscrape = importlib.import_module('numpydoc.docscrape')

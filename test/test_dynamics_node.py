@@ -437,7 +437,7 @@ def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
     node.answer()
     node.until_status('singularity', OK, 'clear')
     node.answer(TURNED)
-    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition')
+    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition, 20')
     values = node.values('singularity')
     result = node.result_of(TURNED)
     assert values['condition number'] == f'{result.condition_number:.6g}'

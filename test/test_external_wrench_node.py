@@ -217,7 +217,7 @@ def test_names_in_another_order_after_the_machine_is_connected_anew(felt: Felt) 
 
 SPOILT = {
     'lacks one of the joints': {'names': [*JOINTS[:5], 'elbow']},
-    'without position, velocity or effort': {'effort': []},
+    'without effort': {'effort': []},
     'not as many numbers as names': {'velocity': [0.0] * 5},
     'not finite': {'position': [math.nan] + [0.3] * 5},
     'forward kinematics did not converge': {'position': [9.0] + [0.3] * 5},

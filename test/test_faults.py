@@ -346,7 +346,7 @@ def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -
         for topic, message in MOVING.messages(stamp).items():
             node.publish(topic, message)
     node.check(node.state_of(stamps[-1]), node.result_of(MOVING))
-    node.until_reported('timing', WARN, 'dropped')
+    node.until_reported('timing', WARN, 'dropped: ')
     assert int(node.values('timing')['dropped']) > 100
     answered = [nanoseconds(state.header.stamp) for state in node.received('leg_states')]
     assert answered == sorted(answered)
@@ -689,6 +689,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
     node.answer()
     node.until(lambda: node.warning is False, 'no warning is on')
     crossings = int(node.values('singularity').get('crossings', '0'))
+    said = sum('det(J) crossed' in line for line in log_lines(node.program.stderr, 'ERROR'))
     # 4 degrees in 10 ms.
     there = [_turned(degrees, math.radians(400.0)) for degrees in (84.0, 88.0, 92.0, 96.0)]
     clear = [node.result_of(sample) for sample in there]
@@ -697,16 +698,19 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
         state = node.answer(sample)
         assert np.abs(state.effort).max() <= 6000.0
         node.until(lambda: node.warning, 'it warns')
-    # One sample crossed, the next ones are only near: it is said for a second nevertheless.
-    node.until_status('singularity', WARN, 'det(J) crossed zero since the last setpoint')
+    # One sample crossed, the next ones are only near: it is reported for a second nevertheless.
+    node.until_status('singularity', ERROR, 'det(J) crossed zero 0.005 s before stamp ')
+    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition, 20')
     # Back with one leap, from where nothing is near into where nothing is.
     for degrees in (130.0, 130.0, 50.0):
         node.answer(_turned(degrees))
-    node.until_status('singularity', WARN, 'det(J) crossed zero since the last setpoint')
+    node.until_status('singularity', ERROR, 'det(J) crossed zero ')
     node.answer(_turned(50.0))
     node.until(lambda: node.warning is False, 'the warning ends')
     node.until_status('singularity', OK, 'clear')
     assert node.values('singularity')['crossings'] == str(crossings + 2)
+    assert sum('singularity: det(J) crossed zero ' in line for line in log_lines(
+        node.program.stderr, 'ERROR')) == said + 2
 
 
 def test_no_forces_go_out_through_a_singularity_where_they_are_suppressed(

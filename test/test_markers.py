@@ -169,7 +169,8 @@ def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoin
     assert kinds == {
         'base': [Marker.TRIANGLE_LIST, Marker.SPHERE_LIST],
         'names': [Marker.TEXT_VIEW_FACING] * 6,
-        'platform': [Marker.TRIANGLE_LIST, Marker.SPHERE_LIST, Marker.LINE_LIST],
+        'platform': [Marker.TRIANGLE_LIST, Marker.SPHERE_LIST, Marker.LINE_LIST,
+                     Marker.SPHERE_LIST],
         'cylinders': [Marker.CYLINDER] * 6, 'pistons': [Marker.CYLINDER] * 6,
         'singularity': [Marker.TEXT_VIEW_FACING]}
     assert [by_name(message)['names', n].text for n in range(6)] == list(joints)
@@ -251,6 +252,17 @@ def test_the_platforms_axes_are_those_of_its_frame() -> None:
     assert np.allclose(directions, QUARTER_TURN.T, atol=1e-15)
 
 
+def test_the_centre_of_mass_is_drawn_in_the_platform() -> None:
+    parameters = MACHINE.replaced({'platform.center_of_mass': [0.1, -0.2, 0.3]})
+    for to in (HOME, NEAR, SINGULAR):
+        rotation = np.reshape(to.motion[3:12], (3, 3))
+        ball = picture(parameters, to)['platform', 3]
+        assert np.allclose(points(ball), [to.motion[:3] + rotation @ [0.1, -0.2, 0.3]],
+                           rtol=0.0, atol=1e-13)
+        assert color(ball) not in map(color, (
+            picture(parameters, to)['platform', n] for n in range(3)))
+
+
 def test_the_text_stands_above_the_platform() -> None:
     drawn = picture(MACHINE, NEAR)
     where = drawn['singularity', 0].pose.position
@@ -292,7 +304,7 @@ def test_without_a_limit_the_largest_force_has_the_full_colour() -> None:
     forces = answer(parameters, HOME).forces
     assert forces is not None
     text = picture(parameters, HOME)['singularity', 0].text
-    assert f'full colour at {max(map(abs, forces)):.4g} N' in text
+    assert f'saturated at {max(map(abs, forces)):.4g} N' in text
 
 
 def test_legs_without_forces_are_grey() -> None:
@@ -329,7 +341,7 @@ def test_the_platform_and_the_text_tell_of_the_singularity() -> None:
     suppressing = MACHINE.replaced({'singularity.action': 'suppress_forces',
                                     'singularity.stop_condition': 25.0})
     for parameters, to, level, words in (
-            (MACHINE, HOME, OK, ''), (MACHINE, NEAR, WARN, 'condition number above'),
+            (MACHINE, HOME, OK, ''), (MACHINE, NEAR, WARN, 'condition number '),
             (suppressing, NEAR, ERROR, 'inside stop_condition: forces suppressed'),
             (MACHINE, SINGULAR, ERROR, 'J_inv cannot be solved: no forces')):
         drawn, output = picture(parameters, to), answer(parameters, to)
@@ -343,10 +355,10 @@ def test_the_platform_and_the_text_tell_of_the_singularity() -> None:
 def test_the_text_names_legs_beyond_their_limits() -> None:
     parameters = MACHINE.replaced({'limits.length_max': [1.65, 1.0, 1.65, 1.65, 1.65, 1.0]})
     text = picture(parameters, HOME)['singularity', 0].text
-    assert 'beyond their limits: leg_2, leg_6' in text.split('\n')
+    assert 'limits exceeded: leg_2, leg_6' in text.split('\n')
     assert 'limits' not in picture(MACHINE, HOME)['singularity', 0].text
     different = MACHINE.replaced({'limits.force_max': [6000.0] * 5 + [5000.0]})
-    assert 'full colour at limits.force_max' in picture(different, HOME)['singularity', 0].text
+    assert 'saturated at limits.force_max' in picture(different, HOME)['singularity', 0].text
 
 
 def test_whatever_is_answered_the_picture_has_only_numbers() -> None:
@@ -481,3 +493,17 @@ def test_the_rate_changes_only_while_unconfigured(node: DynamicsNode) -> None:
     result = node.set_parameters(visualization_rate=10.0)
     assert not result.successful
     assert 'only changed while the node is unconfigured' in result.reason
+
+
+def test_a_payload_and_thresholds_change_the_picture_while_active(node: DynamicsNode) -> None:
+    seen = _seen(node)
+    changes = {'platform.center_of_mass': [0.05, -0.04, 0.25], 'singularity.warn_condition': 1.5}
+    assert node.set_parameters(**{
+        name.replace('.', '__'): value for name, value in changes.items()}).successful
+    stamp = node.stamp()
+    node.send(stamp=stamp)
+    node.state_of(stamp)
+    node.until(lambda: stamp in _stamps(seen), 'it is drawn')
+    drawn = by_name(seen[_stamps(seen).index(stamp)])
+    assert np.allclose(points(drawn['platform', 3]), [[0.05, -0.04, 1.35]], rtol=0.0, atol=1e-13)
+    assert 'singularity.warn_condition, 1.5' in drawn['singularity', 0].text

@@ -41,7 +41,7 @@ SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', N
 # Modules whose rosdep key is not their own name; '' where rosdep has no key.
 KEYS = {
     'dask': '', 'distributed': '', 'docutils': 'python3-docutils',
-    'hypothesis': 'python3-hypothesis', 'lz4': '',
+    'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
     'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'numba': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',

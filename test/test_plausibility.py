@@ -130,10 +130,11 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
             'in mm?']),
     'all joints in mm of a machine as long as a street': (
         {'geometry.base_joints': 3e3 * BASE, 'geometry.platform_joints': 3e3 * TOP}, [
-            'geometry.base_joints: 2.7e+03 m from their center: larger than any machine: in mm?',
+            'geometry.base_joints: 2.7e+03 m from their center: larger than any hexapod '
+            'known: in mm?',
             'limits.length_min: [0.95] m and limits.length_max: [1.65] m: no level pose has all '
-            'legs within; the base joints are 2.7e+03 m from their center, the platform joints '
-            '1.8e+03 m: different units?']),
+            'legs within them; the base joints are 2.7e+03 m from their center, the platform '
+            'joints 1.8e+03 m: different units?']),
     'the base joints in mm': (
         {'geometry.base_joints': 1e3 * BASE}, [
             'geometry.platform_joints: 0.6 m from their center, the base joints 900 m: one of '
@@ -146,7 +147,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
             'limits.length_max: 1.65e+03 m, but']),
     'limits of another machine': (
         {'limits.length_min': 0.05, 'limits.length_max': 0.1}, [
-            'no level pose has all legs within; the base joints are 0.9 m']),
+            'no level pose has all legs within them; the base joints are 0.9 m']),
     'a longest leg in dm': ({'limits.length_min': (), 'limits.length_max': 0.165}, [
         'limits.length_max: [0.165] m: no level pose has all legs within']),
     'forces in kN': ({'limits.force_max': 0.2}, [

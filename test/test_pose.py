@@ -91,9 +91,9 @@ def test_constructors_take_any_leading_shape() -> None:
     (lambda: Pose(POSITION, UPRIGHT + 0j), 'rotation: a value of type ndarray: not an array of '
      'real numbers: its type is complex128'),
     (lambda: Pose([POSITION, POSITION], [UPRIGHT] * 3), 'position (2,), rotation (3,)'),
-    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]), 'length 1.01, must be 1'),
-    (lambda: Pose.from_quaternion(POSITION, [0.0] * 4), 'length 0, must be 1 within 0.001'),
-    (lambda: Pose.from_quaternion(POSITION, [1e308] * 4), 'length inf, must be 1'),
+    (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 0.0, 1.01]), 'length 1.01, must be'),
+    (lambda: Pose.from_quaternion(POSITION, [0.0] * 4), 'length 0, must be within 0.001 of 1'),
+    (lambda: Pose.from_quaternion(POSITION, [1e308] * 4), 'length inf, must be'),
     (lambda: Pose.from_quaternion(POSITION, [0.0, 0.0, 1.0]), 'quaternion: shape (3,)'),
     (lambda: Pose.from_matrix(np.eye(3)), 'matrix: shape (3, 3): must end in (4, 4)'),
     (lambda: Pose.from_matrix([np.eye(4), np.ones((4, 4))]),

@@ -51,7 +51,7 @@ import zstandard
 
 from stewart_dynamics import BagError, Parameters
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.mcap_recording import LARGEST_CHUNK
+from stewart_dynamics.replay.mcap_layout import LARGEST_CHUNK
 from stewart_dynamics.replay.one_bag import replay as replay_one
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, NODE, Options, PARTLY_READ
 from stewart_dynamics.replay.recording import Recording

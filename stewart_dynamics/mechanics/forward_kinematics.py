@@ -16,10 +16,10 @@
 Forward kinematics: the pose that belongs to six leg lengths, and the twist to six leg rates.
 
 Up to forty poses have the same six lengths (Dietmaier, The Stewart-Gough platform of general
-geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess says which
-one is meant: the last pose, or the one that is commanded. Newton's method on ``L(X) = L``
-with the exact J_inv goes from it to the pose, and never to where det(J) has the other sign:
-another assembly lies beyond a singularity.
+geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess tells which
+one: the last pose, or the one commanded. Newton's method on ``L(X) = L`` with the exact J_inv
+goes from it to the pose, and never to where det(J) has the other sign: another assembly is on
+the other side of a singularity.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot6, Matrix3, read3, read9, scale, Vector3, Vector6)
 
-# The lengths of a pose that is found differ by no more than this from those given [m].
+# The lengths of a pose that is found differ by at most this from those given [m].
 RESIDUAL = 1e-12
 
-# What became of a guess.
+# The outcome of a search.
 FOUND, NO_POSE, SINGULAR = range(3)
 
 # Newton's method takes 6 steps at most from nearly everywhere (benchmarks/README.md). A step to
-# the other side of a singularity is halved, and one that leads away by this (of the sum of
-# squares: a first step from afar may overshoot and yet be the fastest way). Where even so small a
-# part of one does, and after so many, there is no pose to be found.
+# the other side of a singularity is halved, and one that increases the sum of squares by this
+# factor (a first step from afar may overshoot and yet be the fastest). Where so small a part of a
+# step still does, and after so many steps, it did not converge.
 _FARTHER = 16.0
 _LEAST_PART = 1e-3
 MOST_STEPS = 50
@@ -90,7 +90,7 @@ def _turned(turn: Vector3, r: Matrix3) -> Matrix3:
     """
     Return R turned about ``turn`` by 2 atan(|turn| / 2): Cayley's map, a rotation exactly.
 
-    It is the turn by |turn| but for the third order, which Newton's method does not feel.
+    It is the turn by |turn| but for the third order, which does not slow Newton's method.
     """
     x, y, z = scale(0.5, turn)
     k = 2.0 / (1.0 + x * x + y * y + z * z)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-How the runtime path is compiled: by numba where it is installed, else not at all.
+How the compiled functions are compiled: by numba where it is installed, else not at all.
 
 The functions are plain Python either way and give the same bits: no fast-math flag is set,
 so the compiler may neither reorder a sum nor fuse a product into it, and a sample computed
@@ -35,13 +35,12 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 
 _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a thousand times '
                'slower, a millisecond or more for each setpoint')
-# What a user should hear once, on a log, of how the runtime path is compiled; empty where all
-# is well.
+# What a program logs once about the compilation; empty where there is nothing to tell.
 HINT = ''
 
 
 def _quiet(function: Function) -> Function:
-    """Return the function with no word of an overflow, as compiled code has none."""
+    """Return the function without warnings of overflows, as compiled code gives none."""
     return np.errstate(all='ignore')(function)
 
 
@@ -73,7 +72,7 @@ else:
         return cast('Function', numba.njit(error_model='numpy', nogil=True)(function))
 
     def entry_point(function: Function) -> Function:
-        """Compile what Python calls; its machine code is kept on disk for the next start."""
+        """Compile what Python calls; the compiled code is kept on disk for the next start."""
         global HINT
         if not COMPILED:
             return _quiet(function)
@@ -84,8 +83,8 @@ else:
             HINT = ('the compiled dynamics cannot be kept on disk: every start takes seconds; '
                     'let NUMBA_CACHE_DIR name a folder that can be written to')
             return compiled(function)
-        # numba takes kept machine code for valid while the file of the entry point is unchanged,
-        # whatever became of the files of the functions that it calls.
+        # numba takes kept code as valid while the file of the entry point is unchanged, even if
+        # the files of the functions that it calls have changed.
         index = dispatcher._cache._cache_file
         index._source_stamp = index._source_stamp, _MECHANICS
         return cast('Function', dispatcher)

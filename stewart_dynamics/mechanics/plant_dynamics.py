@@ -35,7 +35,8 @@ from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import ACCELERATION, consecutive, MOTION, ROTATION, TWIST
-from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, scale, Vector3
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, dot, Matrix3, read3, scale, Vector3)
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
 STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
@@ -57,11 +58,6 @@ _matrix = inlined(from_quaternion)
 
 
 @inlined
-def _vector3(numbers: Array, at: int) -> Vector3:
-    return numbers[at], numbers[at + 1], numbers[at + 2]
-
-
-@inlined
 def _rotation(state: Array) -> Matrix3:
     """Return R of the quaternion, which within a step is not of unit length."""
     at = STATE_QUATERNION.start
@@ -72,14 +68,14 @@ def _rotation(state: Array) -> Matrix3:
 
 @inlined
 def _twist(state: Array) -> tuple[Vector3, Vector3]:
-    return _vector3(state, STATE_TWIST.start), _vector3(state, STATE_TWIST.start + 3)
+    return read3(state, STATE_TWIST.start), read3(state, STATE_TWIST.start + 3)
 
 
 @compiled
 def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: Array,
            forces: Array, work: Array, slope: Array) -> None:
     """Write a state's time derivative under its loads; motion, forces and work are memory."""
-    position, rotation = _vector3(state, 0), _rotation(state)
+    position, rotation = read3(state, 0), _rotation(state)
     velocity, omega = _twist(state)
     for n in range(3):
         motion[n] = state[n]
@@ -93,7 +89,7 @@ def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: A
         forces[leg] = loads[leg] + stop_force(stops, leg, length, rate)
     acceleration(constants, motion, forces, loads[6:], work)
     at = STATE_QUATERNION.start
-    vector, scalar = _vector3(state, at), state[at + 3]
+    vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))
     for n in range(3):
         slope[n] = velocity[n]
@@ -111,7 +107,7 @@ def _write_legs(constants: Array, state: Array, result: Array) -> float:
     Return the largest of the angular speed and the speeds of the platform joints relative to
     their legs' lengths [1/s]; infinite where a leg has no length.
     """
-    position, rotation = _vector3(state, 0), _rotation(state)
+    position, rotation = read3(state, 0), _rotation(state)
     velocity, omega = _twist(state)
     fastest = math.sqrt(dot(omega, omega))
     for leg in range(6):

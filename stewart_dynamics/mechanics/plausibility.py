@@ -187,7 +187,7 @@ def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
     if at_home >= stop:
         yield (f'geometry: {_kind(at_home)} at home ({home.text}): the condition number is '
                f'{at_home:.3g}, singularity.stop_condition is {stop:g}: is the platform turned '
-               'against the base there, or are the joints in another order?')
+               'against the base there, or the joints in another order?')
 
 
 def _kind(condition: float) -> str:

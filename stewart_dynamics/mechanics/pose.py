@@ -29,8 +29,6 @@ from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
 
 # A rotation matrix further from orthogonal than this is rejected.
 ORTHOGONALITY = 1e-6
-# A quaternion's length may differ from one by this much; it is normalized.
-QUATERNION_TOLERANCE = 1e-3
 
 Self = TypeVar('Self', bound='Samples')
 
@@ -210,13 +208,14 @@ def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
     """Return the rotation matrices (..., 3, 3) of unit quaternions x y z w (..., 4)."""
     q = as_array('quaternion', quaternion, (4,))
     with np.errstate(over='ignore'):
-        length = np.linalg.norm(q, axis=-1, keepdims=True)
-    off = np.abs(length[..., 0] - 1.0) > QUATERNION_TOLERANCE
+        length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
+    off = ~np.asarray(rotations.is_unit(length))
     if off.any():
         at = tuple(map(int, np.argwhere(off)[0]))
-        raise MotionError(f'quaternion{list(at) if at else ""}: {q[at].tolist()}: length '
-                          f'{length[at][0]:.6g}, must be 1 within {QUATERNION_TOLERANCE:g}')
-    x, y, z, w = np.moveaxis(q / length, -1, 0)
+        raise MotionError(
+            f'quaternion{list(at) if at else ""}: {q[at].tolist()}: length {length[at]:.6g}, must '
+            f'be within {rotations.QUATERNION_TOLERANCE:g} of 1')
+    x, y, z, w = np.moveaxis(q / length[..., None], -1, 0)
     return np.stack(rotations.from_quaternion(x, y, z, w), axis=-1).reshape(*q.shape[:-1], 3, 3)
 
 

@@ -29,10 +29,10 @@ from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMoti
 
 def sample_times(parameters: ReferenceMotionParameters) -> Integers:
     """
-    Return the times of one way of the motion (N,) [ns], 0 and on at the rate.
+    Return the times of the motion in one direction (N,) [ns], from 0 on at the rate.
 
-    The last is at the duration or, where no sample falls on it, the next one after it: a
-    motion that ends at rest is then seen to end.
+    The last is at the duration or, where no sample falls on it, the next one after it, so that a
+    motion that ends at rest is complete.
     """
     return sample_time(parameters, np.arange(sample_count(parameters)))
 
@@ -46,7 +46,7 @@ def sample_count(parameters: ReferenceMotionParameters) -> int:
 
 
 def sample_time(parameters: ReferenceMotionParameters, index: ArrayLike) -> Integers:
-    """Return the times of samples by their index (...) [ns]; errors of rounding do not add up."""
+    """Return the times of samples by their index (...) [ns]; rounding errors do not add up."""
     times: Integers = np.rint(
         np.asarray(index) * 1e9 / parameters['rate']).astype(np.int64)
     return times
@@ -60,17 +60,17 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
       (1 - cos(pi t / T)) / 2. The paper prints neither its law nor its figures' data, only
       that the input goes from an initial to a final pose in 10 s and is differentiated twice.
       This is the simplest law that does so from rest to rest; its acceleration is bounded but
-      does not begin at zero, and looped it is one smooth oscillation.
+      does not start at zero, and looped it is one smooth oscillation.
     - quintic: the position on a straight line, the rotation about the one axis, fixed in the
-      base, that leads from the initial to the final orientation the short way; both with
+      base, that turns the initial to the final orientation by at most pi; both with
       10 u^3 - 15 u^4 + 6 u^5, u = t / T, so that velocity and acceleration are zero at both
       ends.
     - sine: each coordinate as initial + amplitude sin(2 pi frequency t + phase), from the first
-      sample on: it begins at full speed where the phase is zero.
+      sample on: it starts at full speed where the phase is zero.
     - hold: at rest in initial.
 
     paper and quintic are at rest in initial before their start and in final after their end;
-    looped they run to and fro, each way in the duration.
+    looped they run to and fro, each direction in the duration.
     """
     time = np.asarray(times, dtype=float)
     kind, initial = parameters['motion.type'], parameters['motion.initial']
@@ -101,7 +101,7 @@ def _euler_motion(pose: Array, rate: Array, acceleration: Array) -> Motion:
 
 
 def _progress(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
-    """Return the part of the way that is done and its time derivatives [1, 1/s, 1/s^2]."""
+    """Return the completed part of the motion and its time derivatives [1, 1/s, 1/s^2]."""
     duration = parameters['motion.duration']
     u = time / duration
     sign = np.ones_like(u)

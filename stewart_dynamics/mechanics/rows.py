@@ -14,7 +14,7 @@
 
 
 """
-One sample as a row of numbers: where each quantity stands in it.
+One sample as a row of numbers: the place of each quantity in it.
 
 Motions, wrenches and results pass through all layers as rows of float64, SI units, base axes;
 ``rows[..., FORCES]`` is a quantity of all samples.

@@ -28,7 +28,8 @@ from stewart_dynamics.mechanics import (
     batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility, stiffness)
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
-from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows
+from stewart_dynamics.mechanics.force_breakdown import (
+    ForceBreakdown, ForceBreakdownRows, SOURCES)
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.inverse_dynamics import InverseDynamics
 from stewart_dynamics.mechanics.motion import Motion
@@ -139,8 +140,8 @@ class StewartPlatform:
             self._breakdown = ForceBreakdownRows(self.parameters)
         forces = self._breakdown(rows, wrenches)
         check_finite('motion', np.where(unsolvable[:, None, None], 0.0, forces).reshape(
-            *shape, -1, 6), len(shape))
-        return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(-1, *shape, 6))
+            *shape, len(SOURCES), 6), len(shape))
+        return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
 
     def forward_dynamics(
             self, motion: Motion, forces: ArrayLike, wrench: ArrayLike | None = None) -> Motion:

@@ -39,7 +39,7 @@ def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
     A file is a bag, and so is a folder that holds metadata.yaml. One without, as a recording
     that was killed leaves it, is a bag if it holds the files of one recording, no other
     bag and no bags below it; else each of its files is a bag. Symbolic links, hidden names and
-    results of replays are passed over.
+    results of replays are skipped.
 
     Parameters
     ----------

@@ -12,43 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Twist and acceleration of recorded poses, by smoothing splines.
-
-Positions and the four numbers of the quaternion are each smoothed by the cubic spline f that
-minimises ``sum h_i (y_i - f(t_i))^2 + L * integral f''^2 dt`` over a stretch without gaps, where
-h_i is half the time from the pose before to the pose after. By these weights the sum is the
-integral of (y - f)^2 by trapezoids, so the spline is the same filter however the poses are
-spaced: for ``f = H y`` the minimum has ``(1 + L w^4) H(w) = 1`` (Craven and Wahba, Numerische
-Mathematik 31, 1979, doi:10.1007/BF01404567; Unser and Blu, IEEE Trans. Signal Processing 53(6),
-2005, doi:10.1109/TSP.2005.847856). It has no phase. The cut-off frequency f_c is where an
-amplitude comes down to 1/sqrt(2) of it (-3 dB), hence ``L = (sqrt(2) - 1) / (2 pi f_c)^4``:
-
-    H = 1 / (1 + (sqrt(2) - 1) (f / f_c)^4)
-
-which leaves 99.9 % at 0.2 f_c, 50 % at 1.25 f_c and 3 % at 3 f_c. On samples h apart w^4 is in
-truth ``(2 - 2 cos wh)^2 / (h^4 (2 + cos wh) / 3)``, w^4 within 0.5 % up to a fifth of the
-sampling rate. Acceleration passes as w^2 H: white noise of s in poses h apart leaves
-``s sqrt(sqrt(2) / 16 h W^5)``, ``W = 2 pi f_c / (sqrt(2) - 1)^(1/4)``, which grows so fast with
-the cut-off that the cut-off wants to be as low as the motion allows.
-
-The poles of H decay by ``W / sqrt(2)`` = 5.54 f_c in a second, so what is farther away than
-5 / f_c counts less than 1e-12: a long recording is worked off in windows that overlap by this.
-At the ends of a stretch the spline is natural, without acceleration; within about 1 / f_c of
-them the accelerations are too small, and how many setpoints this concerns is counted.
-
-The spline is had in the form of Reinsch (Numerische Mathematik 10, 1967,
-doi:10.1007/BF02162161; Green and Silverman, Nonparametric Regression and Generalized Linear
-Models, 1994, 2.3): a banded system for the second derivatives at the samples. SciPy's own
-``make_smoothing_spline`` gives the same numbers, but takes 6 us for a pose and axis where this
-takes 0.1 us for all axes, and loses twenty times more digits at low cut-off frequencies.
-"""
+"""Twist and acceleration of recorded poses, by the splines of ``smoothing_spline``."""
 
 from __future__ import annotations
 
 from collections import Counter
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,13 +26,12 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.rows import MOTION, WRENCH
+from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
 from stewart_dynamics.runtime.step import Batch
 
 # Poses that are worked off at once.
 WINDOW = 4096
 
-# Fewer poses in a stretch say nothing of an acceleration: a natural spline has none at its ends.
-FEWEST = 5
 TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration follows from them'
 TOO_FAST = 'turns faster than the cut-off frequency can follow'
 
@@ -81,73 +50,6 @@ _SHORTEST_QUATERNION = 0.5
 _POSITION, _ROTATION, _POSE = slice(0, 3), slice(3, 12), slice(0, 12)
 _VELOCITY, _OMEGA, _ACCELERATION, _ALPHA = (
     slice(12, 15), slice(15, 18), slice(18, 21), slice(21, 24))
-
-
-class Spline(NamedTuple):
-    """A smoothing spline at its samples, each (N, K)."""
-
-    values: Array
-    rates: Array
-    accelerations: Array
-
-
-def smoothing_spline(times: Array, samples: Array, cutoff: float) -> Spline:
-    """
-    Return the smoothing spline of K signals that were sampled at the same times.
-
-    Parameters
-    ----------
-    times : (N,)
-        [s], increasing, N at least FEWEST.
-    samples : (N, K)
-        Of the signals, in any unit.
-    cutoff : float
-        Frequency that passes with 1/sqrt(2) of its amplitude [Hz].
-
-    """
-    banded = _banded_solver()
-    steps = np.diff(times)
-    slope = 1.0 / steps
-    weights = np.empty(len(times))
-    weights[1:-1] = 0.5 * (steps[1:] + steps[:-1])
-    weights[0], weights[-1] = 0.5 * steps[0], 0.5 * steps[-1]
-    roughness = (math.sqrt(2.0) - 1.0) / (2.0 * math.pi * cutoff) ** 4 / weights
-    # Green and Silverman, 2.1.2: column j of Q has these at j, j + 1 and j + 2; R + L Q^T W^-1 Q
-    # by its diagonals, the lower ones below
-    first, third = slope[:-1], slope[1:]
-    second = -(first + third)
-    matrix = np.zeros((3, len(times) - 2))
-    matrix[0] = ((steps[:-1] + steps[1:]) / 3.0 + first ** 2 * roughness[:-2]
-                 + second ** 2 * roughness[1:-1] + third ** 2 * roughness[2:])
-    matrix[1, :-1] = (steps[1:-1] / 6.0 + second[:-1] * first[1:] * roughness[1:-2]
-                      + third[:-1] * second[1:] * roughness[2:-1])
-    matrix[2, :-2] = third[:-2] * first[2:] * roughness[2:-2]
-
-    bends = np.zeros_like(samples)
-    bends[1:-1] = banded(
-        matrix, np.diff(np.diff(samples, axis=0) * slope[:, None], axis=0), lower=True,
-        overwrite_ab=True, overwrite_b=True, check_finite=False)
-    residual = np.diff(np.diff(bends, axis=0) * slope[:, None], axis=0, prepend=0.0, append=0.0)
-    values = samples - roughness[:, None] * residual
-
-    # the slope at either end of a piece; each sample takes that of its longer piece, where the
-    # difference loses fewer digits
-    step = steps[:, None]
-    chords = np.diff(values, axis=0) / step
-    begins = chords - step * (2.0 * bends[:-1] + bends[1:]) / 6.0
-    ends = chords + step * (bends[:-1] + 2.0 * bends[1:]) / 6.0
-    rates = np.concatenate([begins, ends[-1:]])
-    rates[1:-1] = np.where(step[1:] >= step[:-1], begins[1:], ends[:-1])
-    return Spline(values, rates, bends)
-
-
-def _banded_solver() -> Any:
-    try:
-        from scipy.linalg import solveh_banded
-    except ImportError as exc:
-        raise StewartError('twist and acceleration of poses need scipy, which is not installed: '
-                           'pip install "stewart_dynamics[differentiate]"') from exc
-    return solveh_banded
 
 
 class Deviation(NamedTuple):
@@ -193,7 +95,7 @@ class Differentiator:
     def __init__(self, cutoff: float, gap: float, window: int = WINDOW) -> None:
         if not (math.isfinite(cutoff) and cutoff > 0.0):
             raise StewartError(f'cut-off frequency: {cutoff} Hz: must be a positive number')
-        _banded_solver()
+        banded_solver()
         self.cutoff = cutoff
         self.left_out: Counter[str] = Counter()
         """Setpoints that got no twist and acceleration and are not given back, by reason."""
@@ -295,7 +197,7 @@ class Differentiator:
             if not closed and (end < self._given + self._window or after > len(stamps)):
                 break
             part = slice(self._begin_of_reach(stamps, self._given), min(after, len(stamps)))
-            # numbers that overflow are left to the step, which refuses them
+            # numbers that overflow are left to the step, which rejects them
             with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
                 done.append(self._differentiate(stretch, part, slice(self._given, end)))
             self._given = end

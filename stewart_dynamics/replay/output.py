@@ -36,7 +36,7 @@ import yaml  # type: ignore[import-untyped]
 from stewart_dynamics.arrays import Bytes, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.messages.layout import at_any_byte
-from stewart_dynamics.replay.mcap_recording import MAGIC
+from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Outputs
 

@@ -31,7 +31,6 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 
 _FOLDER = Path(__file__).with_name('templates')
 
@@ -51,19 +50,11 @@ def digits(value: float | None) -> str:
     return (f'{value:,.0f}' if grouped else f'{value:.5g}').replace('-', '−').replace(',', ' ')
 
 
-def _column_head(title: str) -> Markup:
-    """Return the head of a column with its unit in a line of its own; markup as it is."""
-    if isinstance(title, Markup):
-        return title
-    name, bracket, unit = title.rpartition(' [')
-    return Markup('{}<br>[{}').format(name, unit) if bracket else Markup('{}').format(title)
-
-
 @functools.lru_cache(maxsize=1)
 def _environment() -> Environment:
     made = Environment(loader=FileSystemLoader(_FOLDER), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
-    made.filters.update(number=number, digits=digits, exactly=repr, column_head=_column_head)
+    made.filters.update(number=number, digits=digits, exactly=repr)
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
     # Nothing in the data can end the element that holds it: the filter escapes < > & and '.
     made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
@@ -89,7 +80,7 @@ def page(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     script = f'\n{script}'
     hashes = ' '.join(f"'sha256-{_digest(each)}'" for each in (*scripts, script))
     return _environment().get_template(f'{template}.html').render(
-        hashes=Markup(hashes), script=Markup(script), style=Markup(style), **values)
+        hashes=hashes, script=script, style=style, **values)
 
 
 def _digest(script: str) -> str:

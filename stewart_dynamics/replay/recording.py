@@ -23,7 +23,8 @@ import tempfile
 
 from stewart_dynamics.errors import BagError, one_line
 from stewart_dynamics.replay.bag_files import files_of, unpack
-from stewart_dynamics.replay.mcap_recording import MAGIC, McapRecording
+from stewart_dynamics.replay.mcap_layout import MAGIC
+from stewart_dynamics.replay.mcap_recording import McapRecording
 from stewart_dynamics.replay.message_blocks import of_good_length, Source
 from stewart_dynamics.runtime.setpoints import Messages
 

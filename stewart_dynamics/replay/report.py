@@ -29,7 +29,6 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -147,7 +146,7 @@ class Report:
         plotly = _plotly()
         text = page(
             'report', [plotly], s=summary, p=self._parameters, legs=list(self._legs),
-            name=Path(summary['bag']).name or summary['bag'], plotly=Markup(plotly),
+            name=Path(summary['bag']).name or summary['bag'], plotly=plotly,
             data=self._data(summary), sources=SOURCES, verdicts=verdicts(summary),
             exceeded=exceeded_limits(summary['limits']), margins=smallest_margins(summary),
             rejected=sum(each['count'] for each in summary['rejected']),

@@ -33,7 +33,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.errors import one_line
-from stewart_dynamics.replay.mcap_recording import LARGEST_CHUNK
+from stewart_dynamics.replay.mcap_layout import LARGEST_CHUNK
 from stewart_dynamics.replay.message_blocks import Block, block_of
 
 # Messages that are read at once.

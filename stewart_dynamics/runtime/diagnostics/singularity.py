@@ -78,7 +78,7 @@ class SingularityDiagnostics:
         self._log = LevelLog(_NAME)
         self._crossed = False  # with the last setpoint
         self._crossing_held = False  # it may be
-        self._crossings: list[LogLine] = []
+        self._crossings: list[str] = []  # since the last report
         self._crossing_logged_at = -PERIOD
         self._largest = self._second_largest = self._second_before_largest = 1.0
         self._second_begin = now
@@ -98,7 +98,7 @@ class SingularityDiagnostics:
             return False
         self._crossed = self._crossing_held = True
         crossing = Level(ERROR, _crossing(before, output))
-        self._crossings.append(LogLine(ERROR, f'{_NAME}: {crossing.message}', 'crossing'))
+        self._crossings.append(crossing.message)
         self._crossing.see(crossing, now)
         stopped = output.singularity.stopped or output.demanded_forces is None
         self._state.see(state if stopped else FINE, now)
@@ -136,9 +136,13 @@ class SingularityDiagnostics:
             ('its leg', self.parameters['joints'][worst])))
 
     def log_lines(self, now: float) -> list[LogLine]:
-        """Return each crossing, and the changes of level that are none."""
-        lines, self._crossings = self._crossings, []
-        if lines:
+        """Return the crossing since the last report, and the change of level besides."""
+        lines = []
+        if self._crossings:
+            many = len(self._crossings)
+            how_many = f' (the last of {many} crossings)' if many > 1 else ''
+            lines = [LogLine(ERROR, f'{_NAME}: {self._crossings[-1]}{how_many}')]
+            self._crossings = []
             self._crossing_logged_at = now
         state = self._state.at(now)
         return lines + self._log.lines(Level(state.level, state.message or 'clear'))

@@ -1,0 +1,84 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Planned trajectories are worked on one after the other, a piece at each tick of the timer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PlannedTrajectoryQueue
+from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+
+
+class Timed:
+    """A queue, its timer, and what has become of the trajectories."""
+
+    def __init__(self) -> None:
+        self.running = False
+        self.pieces: list[str] = []
+        self.done: list[tuple[str, float]] = []
+        self.queue = PlannedTrajectoryQueue(
+            lambda: self._run(True), lambda: self._run(False),
+            lambda outcome, came: self.done.append((outcome.message, came)))
+
+    def _run(self, running: bool) -> None:
+        self.running = running
+
+    def work(self, name: str, pieces: int = 2) -> Iterator[Outcome | None]:
+        """Yield None after each piece, and the outcome at the end."""
+        for _ in range(pieces):
+            self.pieces.append(name)
+            yield None
+        yield Outcome(name)
+
+
+def test_each_tick_is_one_piece_and_the_timer_runs_while_there_is_work() -> None:
+    timed = Timed()
+    assert not timed.running
+    timed.queue.add(timed.work('first'), 1.0)
+    timed.queue.add(timed.work('second', pieces=1), 2.0)
+    for pieces, done in ((['first'], []), (['first'] * 2, []),
+                         (['first'] * 2, [('first', 1.0)]),
+                         (['first', 'first', 'second'], [('first', 1.0)])):
+        assert timed.running
+        timed.queue.tick()
+        assert timed.pieces == pieces
+        assert timed.done == done
+    timed.queue.tick()
+    assert timed.done == [('first', 1.0), ('second', 2.0)]
+    assert not timed.running
+
+
+def test_it_is_full_with_those_in_work_and_waiting() -> None:
+    timed = Timed()
+    for n in range(LENGTH):
+        assert not timed.queue.full
+        timed.queue.add(timed.work(str(n), pieces=0), 0.0)
+    assert timed.queue.full
+    timed.queue.tick()
+    assert not timed.queue.full
+
+
+def test_what_is_dropped_is_counted_and_does_nothing_any_more() -> None:
+    timed = Timed()
+    assert timed.queue.drop() == 0
+    for name in ('first', 'second'):
+        timed.queue.add(timed.work(name), 0.0)
+    timed.queue.tick()
+    assert timed.queue.drop() == 2
+    timed.queue.tick()  # the timer may be due already
+    assert timed.pieces == ['first']
+    assert not timed.done
+    assert not timed.running
