@@ -109,6 +109,7 @@ LOG_LINE = re.compile(
     r"Failed to publish log message to rosout: publisher's context is invalid")
 
 _DOMAINS = range(1, 101)
+_LOCKS: dict[int, int] = {}  # file descriptors
 _ENDLESS = 10_000_000
 
 
@@ -119,7 +120,12 @@ def executable(name: str) -> str:
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """Give a ROS domain that no other test on this machine has, in whatever process."""
+    """
+    Give a ROS domain that no other test on this machine has, in whatever process.
+
+    The programs in it inherit the lock: while one runs on, after its test was killed, no other
+    test gets the domain.
+    """
     for attempt in range(len(_DOMAINS)):
         domain = _DOMAINS[(os.getpid() + attempt) % len(_DOMAINS)]
         path = Path(tempfile.gettempdir()) / f'stewart_dynamics_test_domain_{domain}'
@@ -128,7 +134,11 @@ def own_domain() -> Iterator[int]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 continue
-            yield domain
+            _LOCKS[domain] = file.fileno()
+            try:
+                yield domain
+            finally:
+                del _LOCKS[domain]
             return
     raise RuntimeError('all ROS domains are taken')
 
@@ -170,7 +180,7 @@ class Program:
         with self._out.open('wb') as out, self._err.open('wb') as err:
             self.process = subprocess.Popen(
                 [str(part) for part in command], stdin=subprocess.DEVNULL, stdout=out,
-                stderr=err, cwd=folder, env={
+                stderr=err, cwd=folder, pass_fds=filter(None, [_LOCKS.get(domain)]), env={
                     **os.environ, 'ROS_DOMAIN_ID': str(domain), 'ROS_LOG_DIR': str(folder / 'log'),
                     **environment})
 
@@ -291,7 +301,7 @@ class Inside:
         assert_only_log_lines(self.stderr)
 
 
-def refused(domain: int, folder: Path, *arguments: str | Path) -> str:
+def rejected(domain: int, folder: Path, *arguments: str | Path) -> str:
     """Return the one line that the node ends with, exit code 1, for these ROS arguments."""
     program = Program([executable('stewart_dynamics'), '--ros-args', *arguments], domain, folder)
     try:
@@ -720,19 +730,19 @@ class DynamicsNode:
         assert bits(state.velocity) == bits(result.rates)
         assert bits(state.effort) == bits(np.clip(result.forces, -bound, bound))
 
-    def refuses(self, topic: str, reason: str, number: int = 1) -> None:
-        """Expect that the diagnostics count so many more refusals."""
+    def rejects(self, topic: str, reason: str, number: int = 1) -> None:
+        """Expect that the diagnostics count so many more rejections."""
         self.expected[f'rejected, {topic}: {reason}'] += number
 
     def counted(self) -> Counter[str]:
-        """Return how many refusals of each kind the last diagnostics count."""
+        """Return how many rejections of each kind the last diagnostics count."""
         return Counter({key: int(number) for key, number in self.values('setpoints').items()
                         if key.startswith('rejected, ')})
 
     def until_counted(self) -> None:
-        """Wait until the diagnostics count the refusals that are expected, and no others."""
+        """Wait until the diagnostics count the rejections that are expected, and no others."""
         try:
-            self.until(lambda: self.counted() == self.expected, 'refusals are counted')
+            self.until(lambda: self.counted() == self.expected, 'rejections are counted')
         except AssertionError as exc:
             raise AssertionError(
                 f'counted {self.counted()}, expected {self.expected}: {exc}') from exc
@@ -741,7 +751,7 @@ class DynamicsNode:
         """
         Check that the node does its work, and has done nothing else so far.
 
-        A setpoint is answered with the library's bits, refusals are counted as expected, and of
+        A setpoint is answered with the library's bits, rejections are counted as expected, and of
         all that has come out nothing is without a setpoint that asked for it.
         """
         self.answer()
@@ -902,7 +912,7 @@ class Feeder(Program):
                          node.domain, folder, **environment)
 
     def begin(self, heard: bool = True) -> None:
-        """Let it begin, and expect answers; its first setpoints may be lost if it is not heard."""
+        """Let it begin, and expect answers; its first setpoints may be lost if not heard."""
         if heard:
             self.node.until(lambda: self._writers() > self._before, 'the node hears the feeder')
         else:

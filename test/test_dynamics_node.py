@@ -39,7 +39,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
     assert_only_log_lines, bits, DynamicsNode, executable, HOME, LATCHED, log_lines, nanoseconds,
-    NODE, OUTPUTS, Peer, PLATFORM, raw, refused, ROOT, Sample, SEPARATE, wrench_message)
+    NODE, OUTPUTS, Peer, PLATFORM, raw, rejected, ROOT, Sample, SEPARATE, wrench_message)
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Parameters, Pose, StewartPlatform
@@ -100,7 +100,7 @@ def test_node_and_replay_give_the_same_bits(bag: str, fresh: Fresh, tmp_path: Pa
     assert node.raw == messages
     summary = json.loads((tmp_path / bag / 'summary.json').read_text(encoding='utf-8'))
     counts = {f'rejected, {each["topic"]}: {each["reason"]}': str(each['count'])
-              for each in summary['refused']}
+              for each in summary['rejected']}
     assert bool(counts) == (bag == 'flawed')
 
     def counted() -> bool:
@@ -108,7 +108,7 @@ def test_node_and_replay_give_the_same_bits(bag: str, fresh: Fresh, tmp_path: Pa
         return (values.get('setpoints answered') == str(answers)
                 and {key: n for key, n in values.items() if key in counts} == counts)
 
-    node.until(counted, 'the node refuses what the replay refuses')
+    node.until(counted, 'the node rejects what the replay rejects')
 
 
 def test_a_thousand_setpoints_are_answered_with_the_librarys_bits(
@@ -230,13 +230,13 @@ def _nanosec(message: bytes, nanosec: int) -> bytes:
     return message[:8] + nanosec.to_bytes(4, 'little') + message[12:]
 
 
-def test_a_bad_sample_is_refused_counted_and_nothing_is_published(node: DynamicsNode) -> None:
+def test_a_bad_sample_is_rejected_counted_and_nothing_is_published(node: DynamicsNode) -> None:
     for case, (spoil, reason) in SPOILED.items():
         stamp = node.stamp()
         bad_topic, bad = spoil(stamp)
         for topic, message in HOME.messages(stamp).items():
             node.publish(topic, bad if topic == bad_topic else message)
-            node.refuses(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
+            node.rejects(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
         # The next one is answered, and only that: it says so.
         node.answer(MOVING)
         assert f'{bad_topic} rejected: {reason}' in node.program.stderr, case
@@ -255,20 +255,20 @@ def test_a_quaternion_nearly_of_unit_length_is_brought_to_it(node: DynamicsNode)
     node.until_counted()
 
 
-def test_a_setpoint_whose_numbers_overflow_is_refused(node: DynamicsNode) -> None:
+def test_a_setpoint_whose_numbers_overflow_is_rejected(node: DynamicsNode) -> None:
     node.send(HOME._replace(position=(0.0, 0.0, 1e300)))
-    node.refuses('setpoint', 'out of range: numbers overflow')
+    node.rejects('setpoint', 'out of range: numbers overflow')
     node.answer(MOVING)
     node.until_counted()
 
 
-def test_a_stamp_older_than_the_last_used_is_refused(node: DynamicsNode) -> None:
+def test_a_stamp_older_than_the_last_used_is_rejected(node: DynamicsNode) -> None:
     node.answer()
     last = node.stamp(0)
     # setpoint.timeout is 0.1 s: a jump by more would be a restart.
     node.send(MOVING, last - 100_000_000)
     for topic in SEPARATE:
-        node.refuses(topic, 'older than the last used')
+        node.rejects(topic, 'older than the last used')
     node.answer(MOVING)
     node.until_counted()
 
@@ -321,8 +321,8 @@ def test_of_a_stamp_twice_on_one_topic_the_first_is_used(node: DynamicsNode) -> 
     node.check(node.state_of(stamp), node.result_of(MOVING))
     # And once more when it has been answered.
     node.publish('setpoint/pose', other['setpoint/pose'])
-    node.refuses('setpoint/pose', 'same stamp twice', 2)
-    node.refuses('setpoint/twist', 'same stamp twice')
+    node.rejects('setpoint/pose', 'same stamp twice', 2)
+    node.rejects('setpoint/twist', 'same stamp twice')
     node.answer(MOVING)
     node.until_counted()
 
@@ -350,7 +350,7 @@ def test_a_silent_topic_is_named_and_nothing_is_published(
     assert len(node.raw['leg_states']) == answered + 1
     for topic in SEPARATE:
         if topic != silent:
-            node.refuses(topic, NOT_JOINED, sent)
+            node.rejects(topic, NOT_JOINED, sent)
     node.until_counted()
 
 
@@ -479,7 +479,7 @@ def test_who_reads_the_answers_is_counted(fresh: Fresh) -> None:
     node.until(lambda: readers.items() <= node.values('setpoints').items(), 'it has gone')
 
 
-def test_with_exclusive_setpoints_a_second_writer_is_told_and_refused(fresh: Fresh) -> None:
+def test_with_exclusive_setpoints_a_second_writer_is_told_and_rejected(fresh: Fresh) -> None:
     node = fresh('setpoint.exclusive:=true')
     node.until_active()
     node.answer()
@@ -487,13 +487,13 @@ def test_with_exclusive_setpoints_a_second_writer_is_told_and_refused(fresh: Fre
     node.until(lambda: node.values('setpoints')['setpoint/pose: writers'] == '2',
                'the second writer is known')
     node.send(MOVING)
-    node.refuses('setpoint/pose', 'more than one writer')
+    node.rejects('setpoint/pose', 'more than one writer')
     node.until_counted()
     node.peer.node.destroy_publisher(second)
     node.until(lambda: node.values('setpoints')['setpoint/pose: writers'] == '1',
                'the second writer has gone')
     for topic in ('setpoint/twist', 'setpoint/accel'):
-        node.refuses(topic, NOT_JOINED)
+        node.rejects(topic, NOT_JOINED)
     node.answer(MOVING)
     node.until_counted()
 
@@ -522,7 +522,7 @@ WITHOUT_NUMBA = [sys.executable, '-c', WITHOUT.format('numba')]
 
 
 @pytest.mark.parametrize('executor', ['events', 'single-threaded'])
-def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
+def test_of_a_burst_the_newest_is_answered_and_those_dropped_are_counted(
         start: Start, executor: str) -> None:
     node = start(command=WITHOUT_EVENTS if executor == 'single-threaded' else None,
                  NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
@@ -547,7 +547,7 @@ def test_of_a_burst_the_newest_is_answered_and_those_passed_over_are_counted(
 
 
 def _passed_over(node: DynamicsNode, key: str, sent: int) -> int:
-    """Return how many setpoints the node has passed over, once it has counted all sent."""
+    """Return how many setpoints the node has dropped, once it has counted all sent."""
     def counted(key: str) -> int:
         return int(node.values('setpoints').get(key, '0'))
 
@@ -610,7 +610,7 @@ def test_setpoints_in_one_message(fresh: Fresh) -> None:
         if reason == 'older than the last used':
             node.answer()
         node.publish('setpoint/combined', bad)
-        node.refuses('setpoint/combined', reason)
+        node.rejects('setpoint/combined', reason)
     node.answer(MOVING)
     node.until_counted()
     assert '2 points: a setpoint has one' in node.program.stderr
@@ -647,7 +647,7 @@ def test_stamps_within_the_tolerance_are_joined(fresh: Fresh) -> None:
     node.answer(MOVING)
     assert len(node.raw['leg_states']) == 2
     for topic in SEPARATE:
-        node.refuses(topic, NOT_JOINED)
+        node.rejects(topic, NOT_JOINED)
     node.until_counted()
 
 
@@ -669,7 +669,7 @@ def test_a_wrench_holds_for_the_setpoints_to_come(fresh: Fresh) -> None:
                         (wrench_message((9.0,) * 6, 'platform'), 'wrong frame_id'),
                         (raw(wrench_message((9.0,) * 6))[:50], 'malformed')):
         node.publish('wrench', bad)
-        node.refuses('wrench', reason)
+        node.rejects('wrench', reason)
     node.until_counted()
     # The last sound one still holds; one in a frame without a name is sound.
     node.answer(MOVING, loads[-1])
@@ -775,7 +775,7 @@ BAD_CHANGES: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_a_bad_change_is_refused_with_its_reason(node: DynamicsNode) -> None:
+def test_a_bad_change_is_rejected_with_its_reason(node: DynamicsNode) -> None:
     for changes, reason in BAD_CHANGES:
         result = node.set_atomically([
             RosParameter(name, value=value) for name, value in changes.items()])
@@ -931,7 +931,7 @@ def test_a_broken_rule_is_said_in_one_line(domain: int, tmp_path: Path, case: st
     assert good in GOOD
     file = tmp_path / 'machine.yaml'
     file.write_text(GOOD.replace(good, bad), encoding='utf-8')
-    line = refused(domain, tmp_path / 'node', '--params-file', str(file))
+    line = rejected(domain, tmp_path / 'node', '--params-file', str(file))
     assert line.startswith(f'stewart_dynamics: {file}: {text}')
 
 
@@ -944,7 +944,7 @@ def test_the_file_that_those_spoil_is_good(tmp_path: Path) -> None:
 
 def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
     file = tmp_path / 'none.yaml'
-    assert refused(domain, tmp_path / 'node', '--params-file', str(file)) == (
+    assert rejected(domain, tmp_path / 'node', '--params-file', str(file)) == (
         f'stewart_dynamics: {file}: cannot be read: No such file or directory')
 
 
@@ -954,12 +954,12 @@ def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None
 ])
 def test_a_bad_parameter_on_the_command_line_is_said_in_one_line(
         domain: int, tmp_path: Path, override: str, text: str) -> None:
-    line = refused(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
+    line = rejected(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
     assert text in line
 
 
 def test_no_parameters_at_all_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
-    assert refused(domain, tmp_path / 'node') == (
+    assert rejected(domain, tmp_path / 'node') == (
         'stewart_dynamics: command line: geometry.base_joints: missing, it has no default')
 
 
@@ -1012,7 +1012,7 @@ def test_whatever_comes_nothing_but_numbers_goes_out_and_a_setpoint_is_answered(
 
 
 @pytest.mark.parametrize('program', ['stewart_dynamics', 'stewart_trajectory'])
-def test_help_is_given_and_a_stray_argument_is_refused(program: str) -> None:
+def test_help_is_given_and_a_stray_argument_is_rejected(program: str) -> None:
     path = Path(sys.executable).with_name(program)
     said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
     assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')

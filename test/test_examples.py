@@ -53,7 +53,7 @@ def run(tmp_path: Path) -> Iterator[Run]:
         program.kill()
 
 
-def test_a_planned_motion_is_answered_or_its_refusal_is_said(
+def test_a_planned_motion_is_answered_or_its_rejection_is_said(
         start: Callable[..., DynamicsNode], run: Run) -> None:
     node = start()
     node.until_active()

@@ -141,9 +141,9 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
                                    six(each.rates + 1e-4 * random.normal(size=6)),
                                    six(each.forces + 5.0 * random.normal(size=6))))
             for each in measured(MACHINE, motion, LOAD, stamps)]
-    refused: list[object] = []
+    rejected: list[object] = []
     step = ExternalWrench(MACHINE)
-    legs = MeasuredLegs(MACHINE, step, lambda *said: refused.append(said), refused.append)
+    legs = MeasuredLegs(MACHINE, step, lambda *said: rejected.append(said), rejected.append)
     expected = []
     for each in data:
         estimate = legs.take(each, NO_WRENCH, None)
@@ -151,7 +151,7 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
         if estimate.wrench is not None:
             expected.append(step.message(estimate))
         felt.publish(each)
-    assert not refused
+    assert not rejected
     felt.node.until(lambda: len(felt.raw) >= len(expected), 'all wrenches have come')
     assert felt.raw == expected
     assert felt.received()[0].header.frame_id == 'base'
@@ -224,7 +224,7 @@ SPOILT = {
     'out of range: numbers overflow': {'velocity': [1e308] * 6}}
 
 
-def test_measured_legs_that_are_unfit_are_refused(felt: Felt) -> None:
+def test_measured_legs_that_are_unfit_are_rejected(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     for number, (reason, fields) in enumerate(SPOILT.items()):
@@ -244,13 +244,13 @@ def test_measured_legs_that_are_unfit_are_refused(felt: Felt) -> None:
         status = felt.node.status(STATUS)
         return bool(status.level == WARN) and 'measured_legs: malformed' in status.message
 
-    felt.node.until(told, 'diagnostics say what is refused')
+    felt.node.until(told, 'diagnostics say what is rejected')
     assert any('measured_legs rejected: lacks one of the joints: leg_6; there are ' in line
                for line in log_lines(felt.node.program.stderr, 'WARN'))
     felt.until_status(OK, 'no overload')
 
 
-def test_stamps_of_measured_legs_that_are_none_or_late_are_refused(felt: Felt) -> None:
+def test_stamps_of_measured_legs_that_are_none_or_late_are_rejected(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     many = len(felt.raw)

@@ -39,7 +39,7 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
     bits, DEADLINE, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
-    Peer, Planner, PLATFORM, Program, raw, refused, ROOT, Sample, SEPARATE, STEP, wrench_message)
+    Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, SEPARATE, STEP, wrench_message)
 import yaml
 
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
@@ -105,31 +105,31 @@ SPOILT = [(topic, MOVING._replace(**{field: numbers}))
           for numbers in _spoilt(getattr(MOVING, field))]
 
 
-def test_nan_and_infinity_in_each_field_are_refused(at_work: DynamicsNode) -> None:
+def test_nan_and_infinity_in_each_field_are_rejected(at_work: DynamicsNode) -> None:
     node = at_work
     for number, (bad_topic, sample) in enumerate(SPOILT):
         node.send(sample)
         for topic in SEPARATE:
-            node.refuses(topic, 'not finite' if topic == bad_topic else NOT_JOINED)
+            node.rejects(topic, 'not finite' if topic == bad_topic else NOT_JOINED)
         if number % 8 == 0:
             node.answer(MOVING)
     node.answer(MOVING)
     for load in _spoilt((1.0,) * 6):
         node.publish('wrench', wrench_message(load))
-        node.refuses('wrench', 'not finite')
+        node.rejects('wrench', 'not finite')
     node.until_counted()
     assert log_lines(node.program.stderr, 'WARN')
 
 
-def test_nan_and_infinity_in_each_field_of_one_message_are_refused(renew: Start) -> None:
+def test_nan_and_infinity_in_each_field_of_one_message_are_rejected(renew: Start) -> None:
     node = renew('setpoint.source:=combined')
     for _, sample in SPOILT:
         node.send(sample)
-        node.refuses('setpoint/combined', 'not finite')
+        node.rejects('setpoint/combined', 'not finite')
 
     def told() -> bool:
         node.send(MOVING._replace(position=(0.0, 0.0, math.nan)))
-        node.refuses('setpoint/combined', 'not finite')
+        node.rejects('setpoint/combined', 'not finite')
         status = node.status('setpoints')
         return bool(status.level == STALE) and 'setpoint/combined: not finite' in status.message
 
@@ -140,13 +140,13 @@ def test_nan_and_infinity_in_each_field_of_one_message_are_refused(renew: Start)
     (0.0,) * 4, (0.0, 0.0, 0.0, 1.0011), (0.0, 0.0, 0.0, 0.9989), (0.0, 0.0, 0.0, 2.0),
     (5e-324,) * 4, (1e200,) * 4, (1.7e308,) * 4,
 ], ids=str)
-def test_a_quaternion_that_is_no_rotation_is_refused(
+def test_a_quaternion_that_is_no_rotation_is_rejected(
         at_work: DynamicsNode, quaternion: tuple[float, ...]) -> None:
     node = at_work
     node.send(MOVING._replace(quaternion=quaternion))
-    node.refuses('setpoint/pose', 'quaternion not of unit length')
+    node.rejects('setpoint/pose', 'quaternion not of unit length')
     for topic in SEPARATE[1:]:
-        node.refuses(topic, NOT_JOINED)
+        node.rejects(topic, NOT_JOINED)
 
 
 def test_a_quaternion_of_flipped_sign_is_the_same_rotation(at_work: DynamicsNode) -> None:
@@ -168,14 +168,14 @@ def test_a_setpoint_sent_twice_is_answered_once(at_work: DynamicsNode) -> None:
         for topic, message in MOVING.messages(stamp).items():
             node.publish(topic, message)
             node.publish(topic, message)
-            node.refuses(topic, 'same stamp twice')
+            node.rejects(topic, 'same stamp twice')
     node.state_of(stamps[-1])
     # The last once more when it is answered, those before it are older than the last.
     for stamp in stamps:
         node.send(MOVING, stamp)
     for topic in SEPARATE:
-        node.refuses(topic, 'older than the last used', len(stamps) - 1)
-        node.refuses(topic, 'same stamp twice')
+        node.rejects(topic, 'older than the last used', len(stamps) - 1)
+        node.rejects(topic, 'same stamp twice')
     node.until_counted()
     answered = [nanoseconds(state.header.stamp) for state in node.received('leg_states')]
     assert answered[before:] == stamps
@@ -193,7 +193,7 @@ def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: Dynam
     for _ in range(4):
         node.send()
         for topic in SEPARATE:
-            node.refuses(topic, 'older than the last used')
+            node.rejects(topic, 'older than the last used')
     node.stamp()
     node.answer(MOVING)
 
@@ -209,7 +209,7 @@ def test_a_stamp_of_the_far_future_on_one_topic_holds_up_nothing(
     # It waits for the others until time jumps back.
     node.stamp(1 - 10**9)  # to stamps that no other test has had
     node.answer(MOVING)
-    node.refuses(topic, NOT_JOINED)
+    node.rejects(topic, NOT_JOINED)
     node.asked[far] = 0
 
 
@@ -220,7 +220,7 @@ def test_a_zero_stamp_among_others_is_a_time(at_work: DynamicsNode) -> None:
     node.until_said('followed as a restart')
     node.send(MOVING, 0)
     for topic in SEPARATE:
-        node.refuses(topic, 'same stamp twice')
+        node.rejects(topic, 'same stamp twice')
     node.until_counted()
     node.asked[0] = 1
 
@@ -312,31 +312,31 @@ def test_a_late_topic_is_waited_for(at_work: DynamicsNode, late: str) -> None:
     for topic, message in MOVING.messages(stamp).items():
         if topic != late:
             node.publish(topic, message)
-            node.refuses(topic, NOT_JOINED)
+            node.rejects(topic, NOT_JOINED)
     node.answer()
     node.publish(late, MOVING.messages(stamp)[late])
-    node.refuses(late, 'older than the last used')
+    node.rejects(late, 'older than the last used')
     node.asked[stamp] = 0
 
 
-def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_given_up(
+def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_dropped(
         at_work: DynamicsNode) -> None:
     node = at_work
     stamps = [node.stamp() for _ in range(1010)]
     for n, stamp in enumerate(stamps, 1):
         node.publish('setpoint/pose', HOME.messages(stamp)['setpoint/pose'])
         if n > 1000:
-            node.refuses('setpoint/pose', NOT_JOINED)
+            node.rejects('setpoint/pose', NOT_JOINED)
         if n == 500:  # the middleware's queue is no longer: what it has is taken now
             node.publish('setpoint/pose', HOME.messages(stamps[0])['setpoint/pose'])
-            node.refuses('setpoint/pose', 'same stamp twice')
+            node.rejects('setpoint/pose', 'same stamp twice')
             node.until_counted()
     node.until_counted()
     for topic in SEPARATE[1:]:
         node.publish(topic, HOME.messages(stamps[10])[topic])
     node.state_of(stamps[10])
     node.answer()
-    node.refuses('setpoint/pose', NOT_JOINED, 999)
+    node.rejects('setpoint/pose', NOT_JOINED, 999)
 
 
 def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -> None:
@@ -361,12 +361,12 @@ def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -
     assert 'more came at once than can be answered' in node.program.stderr
 
 
-def test_of_a_series_of_refusals_the_first_and_the_last_are_logged(
+def test_of_a_series_of_rejections_the_first_and_the_last_are_logged(
         at_work: DynamicsNode) -> None:
     node = at_work
     for _ in range(50):
         node.publish('wrench', raw(wrench_message((1.0,) * 6))[:20])
-        node.refuses('wrench', 'malformed')
+        node.rejects('wrench', 'malformed')
     node.until_counted()
 
     def said() -> list[str]:
@@ -384,7 +384,7 @@ def test_at_the_end_the_last_of_a_series_is_logged(start: Start) -> None:
     node.until_active()
     for _ in range(20):
         node.publish('wrench', raw(wrench_message((1.0,) * 6))[:20])
-        node.refuses('wrench', 'malformed')
+        node.rejects('wrench', 'malformed')
     node.until_counted()
     node.at_work()
     node.stop()
@@ -422,7 +422,7 @@ def test_an_incompatible_quality_of_service_is_named(at_work: DynamicsNode) -> N
     said = log_lines(node.program.stderr, 'ERROR')[before]
     assert 'setpoint/twist: a publisher offers an incompatible quality of service' in said
     assert 'RELIABILITY' in said
-    assert 'it is not heard' in said
+    assert 'its messages are not received' in said
     node.answer(MOVING)
     node.peer.node.destroy_publisher(deaf)
 
@@ -503,13 +503,13 @@ def _until_one_writer(node: DynamicsNode) -> None:
 
 
 def _expect_what_was_cut_off(node: DynamicsNode) -> None:
-    """Expect the refusals, of whatever number, of setpoints that came when it was not ready."""
+    """Expect the rejections, of whatever number, of setpoints that came when it was not ready."""
     stamp = node.send()
     node.state_of(stamp)
     # What the diagnostics count with this is behind all that came before.
     for topic, message in HOME.messages(stamp).items():
         node.writers[topic].publish(message)
-        node.refuses(topic, 'same stamp twice')
+        node.rejects(topic, 'same stamp twice')
     node.until(lambda: all(node.counted()[key] == number for key, number in node.expected.items()
                            if key.endswith('same stamp twice')), 'it is counted')
     counted = node.counted()
@@ -527,7 +527,7 @@ def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_forgotte
     node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
     node.send(MOVING)
     for topic in SEPARATE:
-        node.refuses(topic, 'more than one writer')
+        node.rejects(topic, 'more than one writer')
     node.until_counted()
     second.kill()
     _until_one_writer(node)
@@ -762,7 +762,7 @@ def test_a_machine_that_is_singular_at_home_starts_and_gives_no_forces(
     ('platform.inertia', [1.0], 'platform.inertia: [1.0]: must have 6 entries, has 1'),
     ('platfrom.mass', 1.0, 'platfrom.mass: unknown parameter; do you mean platform.mass?'),
 ])
-def test_both_services_refuse_a_bad_parameter(
+def test_both_services_reject_a_bad_parameter(
         at_work: DynamicsNode, name: str, value: Any, reason: str) -> None:
     node = at_work
     change = RosParameter(name, value=value)
@@ -785,21 +785,21 @@ NO_MACHINE = [
 ]
 
 
-def test_legs_and_inertias_that_no_machine_has_are_refused(domain: int, tmp_path: Path) -> None:
+def test_legs_and_inertias_that_no_machine_has_are_rejected(domain: int, tmp_path: Path) -> None:
     given = Parameters.from_yaml(PLATFORM).given
     for name, value, reason in NO_MACHINE:
         with pytest.raises(ParameterError, match=f'^command line: {name}: .*{re.escape(reason)}'):
             Parameters({**given, name: yaml.safe_load(value)}, 'command line')
     for n in (0, -1):
         name, value, reason = NO_MACHINE[n]
-        line = refused(domain, tmp_path / str(n), '--params-file', PLATFORM, '-p',
-                       f'{name}:={value}')
+        line = rejected(domain, tmp_path / str(n), '--params-file', PLATFORM, '-p',
+                        f'{name}:={value}')
         assert line.startswith('stewart_dynamics: ')
         assert f'{name}: ' in line
         assert reason in line
 
 
-# Says why each file is refused, and the most memory [kB] after the first and after all.
+# Says why each file is rejected, and the most memory [kB] after the first and after all.
 MEASURED = """\
 import sys
 from stewart_dynamics import ParameterError, Parameters
@@ -832,33 +832,33 @@ HOSTILE = {
 }
 
 
-def test_a_hostile_parameter_file_is_refused_with_little_time_and_memory(
+def test_a_hostile_parameter_file_is_rejected_with_little_time_and_memory(
         domain: int, tmp_path: Path) -> None:
     files = []
     for n, (content, _) in enumerate(HOSTILE.values()):
         files.append(tmp_path / f'{n}.yaml')
         files[-1].write_text(content, encoding='utf-8')
-    _refused_in_little_memory(tmp_path, dict(zip(files, (
+    _rejected_in_little_memory(tmp_path, dict(zip(files, (
         reason for _, reason in HOSTILE.values()), strict=True)))
     # The node checks the file before ROS reads it.
-    line = refused(domain, tmp_path / 'node', '--params-file', files[0])
+    line = rejected(domain, tmp_path / 'node', '--params-file', files[0])
     assert line.startswith(f'stewart_dynamics: {files[0]}: ')
     assert next(iter(HOSTILE.values()))[1] in line
     assert not list(tmp_path.rglob('called'))
 
 
-def test_a_parameter_file_of_100_mb_or_without_an_end_is_refused(tmp_path: Path) -> None:
+def test_a_parameter_file_of_100_mb_or_without_an_end_is_rejected(tmp_path: Path) -> None:
     large, pipe = tmp_path / 'large.yaml', tmp_path / 'pipe'
     large.touch()
     os.truncate(large, 100_000_000)
     os.mkfifo(pipe)
-    _refused_in_little_memory(tmp_path, {
+    _rejected_in_little_memory(tmp_path, {
         large: 'larger than ', pipe: 'not a regular file',
         Path('/dev/zero'): 'not a regular file'})
 
 
-def _refused_in_little_memory(folder: Path, reasons: dict[Path, str]) -> None:
-    """Check that files are refused for these reasons, with hardly more memory than any other."""
+def _rejected_in_little_memory(folder: Path, reasons: dict[Path, str]) -> None:
+    """Check that files are rejected for these reasons, with hardly more memory than any other."""
     file = folder / 'usual.yaml'
     file.write_text('/**:\n  ros__parameters:\n    mass: 1.0\n', encoding='utf-8')
     done = subprocess.run([sys.executable, '-c', MEASURED, file, *reasons], cwd=folder,

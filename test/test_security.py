@@ -203,8 +203,8 @@ def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> N
 
 # What would start with less security than is asked for does not start
 
-def refused(domain: int, folder: Path, name: str, *arguments: str | Path,
-            **environment: str) -> str:
+def rejected(domain: int, folder: Path, name: str, *arguments: str | Path,
+             **environment: str) -> str:
     """Return the one line, beside ROS's log, that a program ends with."""
     program = Program([executable(name), '--ros-args', *arguments], domain, folder, **environment)
     assert program.wait() == 1, program.stderr
@@ -221,10 +221,10 @@ def test_without_dds_security_nothing_starts(domain: int, tmp_path: Path, name: 
                                              parameters: Path) -> None:
     """A keystore is given, but Fast DDS cannot use it: that is said in one line."""
     (tmp_path / 'keystore' / 'enclaves' / name).mkdir(parents=True)
-    line = refused(domain, tmp_path / 'program', name, '--params-file', parameters,
-                   '--enclave', f'/{name}', ROS_SECURITY_ENABLE='true',
-                   ROS_SECURITY_STRATEGY='Enforce',
-                   ROS_SECURITY_KEYSTORE=str(tmp_path / 'keystore'))
+    line = rejected(domain, tmp_path / 'program', name, '--params-file', parameters,
+                    '--enclave', f'/{name}', ROS_SECURITY_ENABLE='true',
+                    ROS_SECURITY_STRATEGY='Enforce',
+                    ROS_SECURITY_KEYSTORE=str(tmp_path / 'keystore'))
     if 'built without DDS Security' not in line:
         pytest.skip(f'this Fast DDS has DDS Security: {line}')
     assert line.startswith(f'{name}: ROS_SECURITY_ENABLE: true: but this Fast DDS is built ')
@@ -297,8 +297,8 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
     ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, 'set it to SYSTEM_DEFAULT'),
     ({'ROS_LOCALHOST_ONLY': '1'}, 'and ROS_LOCALHOST_ONLY not at all'),
 ])
-def test_what_would_be_open_is_refused(environment: Callable[..., None], tmp_path: Path,
-                                       changes: dict[str, str], text: str) -> None:
+def test_what_would_be_open_is_rejected(environment: Callable[..., None], tmp_path: Path,
+                                        changes: dict[str, str], text: str) -> None:
     """Each is a mistake with which ROS or Fast DDS goes on without a word, open to others."""
     environment(**KEYSTORE, **TLS)
     check_environment(['--enclave', '/mine'])
@@ -592,12 +592,12 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     crowd.until_tried([plain])
     crowd.until(flows(receiver, 1), 'forces flow on')
     impostor = crowd.partner('self_signed_listens', 8, file=of['spare'], **own)
-    crowd.until(lambda: 'certificate verify failed' in node.stdout, 'the node refuses it')
+    crowd.until(lambda: 'certificate verify failed' in node.stdout, 'the node rejects it')
     crowd.until_tried([impostor])
     for intruder in (plain, impostor):
         assert_left_out(intruder)
         crowd.end(intruder)
-    # Fast DDS waits for 5 s after a certificate that it refuses, and nothing flows meanwhile.
+    # Fast DDS waits for 5 s after a certificate that it rejects, and nothing flows meanwhile.
     crowd.until(flows(receiver, 1), 'forces flow again')
     assert_only(receiver, 1)
 
@@ -633,9 +633,9 @@ def test_a_key_that_cannot_be_read_is_said_in_one_line(
     """Fast DDS would go on, and turn everybody away without a word."""
     folder = keys('source') / 'node'
     (folder / 'ca.pem').unlink()
-    line = refused(domain, tmp_path / 'node', 'stewart_dynamics', '--params-file', PLATFORM,
-                   FASTRTPS_DEFAULT_PROFILES_FILE=str(folder / 'profile.xml'),
-                   STEWART_KEYS=str(folder), ROS_AUTOMATIC_DISCOVERY_RANGE='SYSTEM_DEFAULT')
+    line = rejected(domain, tmp_path / 'node', 'stewart_dynamics', '--params-file', PLATFORM,
+                    FASTRTPS_DEFAULT_PROFILES_FILE=str(folder / 'profile.xml'),
+                    STEWART_KEYS=str(folder), ROS_AUTOMATIC_DISCOVERY_RANGE='SYSTEM_DEFAULT')
     assert line == (f'stewart_dynamics: FASTRTPS_DEFAULT_PROFILES_FILE: {folder}/profile.xml: '
                     f'verify_file: {folder}/ca.pem: cannot be read: No such file or directory')
 

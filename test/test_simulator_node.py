@@ -404,7 +404,7 @@ def test_bad_wrenches_are_rejected_and_the_last_holds(begin: Start) -> None:
     assert simulator.last('accel').accel.linear.z > 0.5
 
 
-def test_forces_beyond_their_limit_saturate(begin: Start) -> None:
+def test_forces_above_their_limit_saturate(begin: Start) -> None:
     simulator = begin(STEPPED)
     simulator.step([1000.0, -7000.0, 6000.0, 6001.0, 0.0, 1e300])
     assert simulator.last().effort.tolist() == [
