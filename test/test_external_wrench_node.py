@@ -39,6 +39,7 @@ from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.external_wrench import ExternalWrench, Measurement
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
+from stewart_dynamics.runtime.output_messages import OutputMessages
 
 Start = Callable[..., DynamicsNode]
 
@@ -142,14 +143,15 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
                                    six(each.forces + 5.0 * random.normal(size=6))))
             for each in measured(MACHINE, motion, LOAD, stamps)]
     rejected: list[object] = []
-    step = ExternalWrench(MACHINE)
-    legs = MeasuredLegs(MACHINE, step, lambda *said: rejected.append(said), rejected.append)
+    messages = OutputMessages(MACHINE)
+    legs = MeasuredLegs(MACHINE, ExternalWrench(MACHINE), lambda *said: rejected.append(said),
+                        rejected.append)
     expected = []
     for each in data:
         estimate = legs.take(each, NO_WRENCH, None)
         assert estimate is not None
         if estimate.wrench is not None:
-            expected.append(step.message(estimate))
+            expected.append(messages.of_estimate(estimate))
         felt.publish(each)
     assert not rejected
     felt.node.until(lambda: len(felt.raw) >= len(expected), 'all wrenches have come')
