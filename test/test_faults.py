@@ -699,8 +699,10 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
         assert np.abs(state.effort).max() <= 6000.0
         node.until(lambda: node.warning, 'it warns')
     # One sample crossed, the next ones are only near: it is reported for a second nevertheless.
-    node.until_status('singularity', ERROR, 'det(J) crossed zero 0.005 s before stamp ')
-    node.until_status('singularity', WARN, 'exceeds singularity.warn_condition, 20')
+    before, after = (abs(float(result.determinant)) for result in clear[1:3])
+    node.until_reported('singularity', ERROR, 'det(J) crossed zero '
+                        f'{0.01 * after / (before + after):.3g} s before stamp ')
+    node.until_status('singularity', WARN, 'singularity.warn_condition, 20')
     # Back with one leap, from where nothing is near into where nothing is.
     for degrees in (130.0, 130.0, 50.0):
         node.answer(_turned(degrees))
