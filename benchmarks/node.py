@@ -50,6 +50,7 @@ from stewart_dynamics.nodes.markers import Markers
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import ExternalWrench
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
+from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.step import Setpoint, Step
 
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
@@ -400,15 +401,16 @@ def measurement_words() -> str:
     """Return how long a measurement takes, from its message to the wrench's."""
     parameters = Parameters.from_yaml(PARAMETERS)
     messages = legs(parameters, FIRST_STAMP)
-    step = ExternalWrench(parameters)
+    step, written = ExternalWrench(parameters), OutputMessages(parameters)
 
     def follow() -> None:
         measured = MeasuredLegs(parameters, step, lambda *said: None, lambda said: None)
         for message in messages:
             estimate = measured.take(message, NO_WRENCH, None)
             if estimate is None:
-                raise SystemExit('a measurement was refused')
-            step.message(estimate)
+                raise SystemExit('a measurement was rejected')
+            if estimate.wrench is not None:
+                written.of_estimate(estimate)
 
     times = repeat(follow, timer=time.process_time, repeat=21, number=1)
     return (f'A measurement takes {median(times) / len(messages) * 1e6:.1f} us of processor time, '
