@@ -23,6 +23,7 @@ with measured length q and rate v, and q_d, v_d, effort_d as published by stewar
 """
 
 import math
+import signal
 import sys
 import time
 
@@ -30,9 +31,9 @@ import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException
-from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -114,19 +115,18 @@ class LegController(Node):
 
 
 def main() -> None:
-    rclpy.init()
+    signals: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: signals.append(number))
+    # The handlers of rclpy would shut ROS down in the middle of a callback.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     executor = EventsExecutor()
     try:
         executor.add_node(LegController())
-        while rclpy.ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # SIGINT or SIGTERM
+        while not signals:
+            executor.spin_once(timeout_sec=0.1)
     except (InvalidParameterTypeException, ValueError) as exc:
         sys.exit(f'leg_controller: {exc}')
-    except Exception:
-        if rclpy.ok():  # otherwise a signal has shut down ROS during the call
-            raise
     finally:
         executor.shutdown()
         rclpy.try_shutdown()

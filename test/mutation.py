@@ -17,8 +17,8 @@ Mutation testing: how many wrong lines of the package the tests notice.
 
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
-the tests that import the module, its own first, until one fails. It prints the share killed and
-every survivor. Mutants of ``mechanics`` run uncompiled, so that they need no compilation.
+the tests that import the module, its own first, until one fails. It prints the share killed, every
+survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run uncompiled, so that they need no compilation.
 """
 
 from __future__ import annotations
@@ -182,8 +182,8 @@ def tests_of(path: Path, tests: list[Path]) -> list[Path]:
     return sorted(naming, key=lambda test: (test.stem != f'test_{name}', test.stat().st_size))
 
 
-def survives(mutant: Mutant, tests: list[Path], seconds: float, deselect: list[str]) -> bool:
-    """Return whether all tests of a mutant pass; one that does not end in time is killed."""
+def fate(mutant: Mutant, tests: list[Path], seconds: float, deselect: list[str]) -> str:
+    """Return whether a mutant was killed, survived all tests, or did not end in time."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / PACKAGE
         shutil.copytree(ROOT / PACKAGE, target)  # with the machine code kept so far
@@ -191,16 +191,17 @@ def survives(mutant: Mutant, tests: list[Path], seconds: float, deselect: list[s
         (Path(folder) / changed).write_text(mutant.text(), encoding='utf-8')
         uncompiled = {'NUMBA_DISABLE_JIT': '1'} if 'mechanics' in changed.parts else {}
         try:
-            return subprocess.run(
+            code = subprocess.run(
                 [sys.executable, '-m', 'pytest', '-x', '-q', '-p', 'no:cacheprovider',
                  *(part for name in deselect for part in ('--deselect', name)),
                  *(str(test.relative_to(ROOT)) for test in tests)],
                 cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=seconds,
                 env={**os.environ, 'PYTHONPATH': folder, 'PYTHONSAFEPATH': '1',
                      'PYTHONDONTWRITEBYTECODE': '1', **uncompiled},
-            ).returncode == 0
+            ).returncode
         except subprocess.TimeoutExpired:
-            return False
+            return 'timed out'
+    return 'killed' if code else 'survived'
 
 
 def main() -> None:
@@ -224,10 +225,11 @@ def main() -> None:
     sample = random.Random(given.seed).sample(everything, min(given.sample, len(everything)))
     killed = 0
     for n, mutant in enumerate(sample, start=1):
-        if survives(mutant, tests_of(mutant.path, tests), given.seconds, given.deselect):
-            print(f'survived: {mutant}', flush=True)
-        else:
+        end = fate(mutant, tests_of(mutant.path, tests), given.seconds, given.deselect)
+        if end != 'survived':  # an endless loop is noticed, too
             killed += 1
+        if end != 'killed':
+            print(f'{end}: {mutant}', flush=True)
         if n % 10 == 0:
             print(f'{killed} of {n} killed', flush=True)
     print(f'{killed} of {len(sample)} mutants killed, {100.0 * killed / len(sample):.1f} %; '
