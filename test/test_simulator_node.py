@@ -74,14 +74,13 @@ class Simulator:
         Parameters on the command line, ``name:=value``.
     files : sequence of Path
         Its parameter files; by default those of config/.
-    said : callable, optional
-        What this process says on stderr, where the simulator is to be in it, and not in a process
-        of its own.
+    inside : bool, optional
+        Whether it is to be in this process, and not in one of its own.
 
     """
 
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
-                 said: Callable[[], str] | None = None) -> None:
+                 inside: bool = False) -> None:
         self.peer = Peer(domain)
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
@@ -93,7 +92,7 @@ class Simulator:
             part for override in overrides for part in ('-p', override))]
         self._stepped = STEPPED in overrides
         try:
-            self.program: Any = Inside(SimulatorNode, arguments, domain, said) if said else (
+            self.program: Any = Inside(SimulatorNode, arguments, domain) if inside else (
                 Program([executable('stewart_simulator'), *arguments], domain, folder))
         except StewartError:
             self.peer.close()
@@ -203,10 +202,10 @@ def start(domain: int, tmp_path: Path) -> Iterator[Start]:
 
 
 @pytest.fixture
-def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that makes a simulator in this process; in the end it must be at work."""
     begun: list[Simulator] = []
-    make = partial(Simulator, domain, said=lambda: capfd.readouterr().err)
+    make = partial(Simulator, domain, inside=True)
     with one_after_the_other(make, tmp_path) as start:
         def started(*overrides: str, **options: Any) -> Simulator:
             begun.append(start(*overrides, **options))
@@ -483,18 +482,17 @@ CANNOT = [
 
 
 def test_what_it_cannot_simulate_is_said_in_one_line(
-        domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: Start) -> None:
-    for overrides, said in CANNOT:
-        with pytest.raises(StewartError, match=re.escape(said)):
-            Simulator(domain, tmp_path / 'inside', *overrides,
-                      said=lambda: capfd.readouterr().err)
-    for overrides, said in (CANNOT[0], CANNOT[-1]):
+        domain: int, tmp_path: Path, start: Start) -> None:
+    for overrides, words in CANNOT:
+        with pytest.raises(StewartError, match=re.escape(words)):
+            Simulator(domain, tmp_path / 'inside', *overrides, inside=True)
+    for overrides, words in (CANNOT[0], CANNOT[-1]):
         program = start(*overrides).program
         assert program.wait() == 1, program.stderr
         lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
         assert len(lines) == 1, program.stderr
         assert lines[0].startswith('stewart_simulator: ')
-        assert said in lines[0]
+        assert words in lines[0]
 
 
 def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
