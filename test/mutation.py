@@ -18,7 +18,8 @@ Mutation testing: how many wrong lines of the package the tests notice.
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
 the tests that import the module, its own first, until one fails. It prints the share killed, every
-survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run uncompiled, so that they need no compilation.
+survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run uncompiled, so
+that they need no compilation.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the nodes say of their parameters, and what they do with changes of them."""
+"""Parameters of the nodes: descriptions, and changes."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ from stewart_dynamics.parameters import PARAMETERS
 
 SECONDS = 30.0
 
-# Asks a node's service, over ROS.
+# Calls a node's service over ROS.
 Ask = Callable[[str, Any], Any]
 
 
 @pytest.fixture
 def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
              ) -> Iterator[Callable[..., Ask]]:
-    """Return a function that makes a node with declared parameters, and gives how to ask it."""
+    """Return a function that makes a node with declared parameters, and how to call it."""
     monkeypatch.setenv('ROS_DOMAIN_ID', f'{domain}')
     context = rclpy.Context()
     made: list[Any] = []  # the executor, then the nodes
@@ -141,7 +141,7 @@ def test_the_node_describes_each_parameter(declared: Any) -> None:
             'set also while active' if parameter.while_active else 'set only while unconfigured')
 
 
-def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
+def test_types_sizes_and_ranges_are_described(declared: Any) -> None:
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     mass, inertia, cylinder, force, joints, action, autostart, friction = described(
         ask, 'platform.mass', 'platform.inertia', 'legs.cylinder.mass', 'limits.force_max',
@@ -164,13 +164,13 @@ def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
 
 
 def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
-    # It has none here: rclpy's would reject these two, in its words.
+    # It has none here: rclpy's would reject these two, with its own text.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     assert set_to(ask, 'platform.mass', -1.0) == (True, '')
     assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
 
 
-def test_a_value_that_ros_drops_without_a_word_is_rejected(declared: Any) -> None:
+def test_a_value_that_ros_drops_silently_is_rejected(declared: Any) -> None:
     # rclpy would go on with the file's 150.0.
     with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
         declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
@@ -237,7 +237,7 @@ def test_a_value_equal_to_the_present_one_is_no_change(
     ask = declared(kind, parameters, file)
     same = [RosParameter(name, value=value).to_parameter_msg(),
             RosParameter('use_sim_time', value=False).to_parameter_msg(),
-            # Read-only, and of ROS's own.
+            # Read-only, and of ROS itself.
             RosParameter('start_type_description_service', value=True).to_parameter_msg(),
             # As `ros2 param load` sends them.
             RosParameter(name, value=f'{value:.5e}').to_parameter_msg()]
@@ -250,7 +250,7 @@ def test_a_value_equal_to_the_present_one_is_no_change(
 
 def test_a_dump_can_be_loaded_again(declared: Any) -> None:
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
-    # None is what `ros2 param load` makes of the null that `ros2 param dump` has written.
+    # `ros2 param load` sends None for the null that `ros2 param dump` has written.
     unset = RosParameter('external_wrench.force_max', value='None').to_parameter_msg()
     inertia = [1e-5, 0.0, 0.0, 1e-5, 0.0, 1e-5]
     texts = RosParameter('platform.inertia', value=f'{inertia}').to_parameter_msg()
@@ -280,7 +280,7 @@ def test_a_time_that_ros_cannot_hold_is_not_followed(
         context.try_shutdown()
 
 
-def test_null_in_a_file_is_not_given(declared: Any, tmp_path: Path) -> None:
+def test_null_in_a_file_is_a_parameter_not_given(declared: Any, tmp_path: Path) -> None:
     # As `ros2 param dump` writes what has no value.
     file = tmp_path / 'dump.yaml'
     text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
@@ -296,7 +296,7 @@ def test_null_in_a_file_is_not_given(declared: Any, tmp_path: Path) -> None:
     assert values[-1].string_value == 'base'
 
 
-def test_a_file_for_another_node_says_so(declared: Any, tmp_path: Path) -> None:
+def test_a_file_for_another_node_is_named(declared: Any, tmp_path: Path) -> None:
     file = tmp_path / 'other.yaml'
     text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
     file.write_text(text.replace('/**:', 'stewart_dynamic:'))

@@ -44,7 +44,7 @@ from stewart_dynamics.parameter_files import is_of_ros, other_nodes
 from stewart_dynamics.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters_yaml import NULL
 
-# Errors that the user can mend: said in one line. All else is a defect of this package.
+# Errors that the user can correct: reported in one line. All others are defects of this package.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
 
 _TYPES = {
@@ -68,15 +68,17 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     Return the node's parameters, checked, and declare all of the table.
 
     The node must have been made with ``automatically_declare_parameters_from_overrides``. Types
-    and ranges are left to the table's own check, whose texts say more than ROS's. A node without
-    a lifecycle accepts no changes. Raises ParameterError, for an unknown name as well.
+    and ranges are left to the table's own check, whose texts are more precise than those of ROS.
+    A node without a lifecycle accepts no changes.
+
+    Raises ParameterError where a rule is broken or a name unknown.
     """
     files = parameter_files(sys.argv)
     sources = list(files)
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
-    # ROS drops a value without a word that is of another type than that in a file.
+    # ROS silently drops a value of another type than that in a file.
     for name, text in _overrides(sys.argv, kind.node):
         kind.check_value(name, text, 'command line')
     declared: dict[str, Any] = node.get_parameters_by_prefix('')
@@ -107,7 +109,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
 
 
 def _of_other_nodes(files: Sequence[str], node: str) -> ParameterError | None:
-    """Return what is wrong where no file has a section for the node."""
+    """Return the error where no file has a section for the node."""
     others = [other_nodes(file, node) for file in files]
     if not others or not all(others):
         return None
@@ -159,7 +161,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
     Parameters
     ----------
     make_node : callable
-        Called after rclpy.init; a StewartError that it raises is said in one line, exit code 1.
+        Called after rclpy.init; a StewartError that it raises is printed in one line, exit code 1.
     kind : type of ParameterSet
         Its parameters; their files have been checked by ``programs``.
     done : Future, optional
