@@ -23,6 +23,7 @@ import math
 from pathlib import Path
 import sys
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -60,13 +61,13 @@ def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
     made: list[Any] = []  # the executor, then the nodes
 
     def make(kind: type[Node], parameters: type[ParameterSet], file: str,
-             *overrides: str) -> Ask:
+             *overrides: str, name: str = '') -> Ask:
         arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
         arguments += [each for override in overrides for each in ('-p', override)]
         monkeypatch.setattr(sys, 'argv', [parameters.node, *arguments])
         rclpy.init(args=arguments, context=context)
         executor = SingleThreadedExecutor(context=context)
-        node = kind(parameters.node, context=context, allow_undeclared_parameters=True,
+        node = kind(name or parameters.node, context=context, allow_undeclared_parameters=True,
                     automatically_declare_parameters_from_overrides=True)
         made.extend((executor, node))
         declare_parameters(node, parameters)
@@ -175,6 +176,53 @@ def test_a_value_that_ros_drops_silently_is_rejected(declared: Any) -> None:
     with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
         declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
                  'stewart_dynamics:platform.mass:=0,5')
+
+
+FORMS: dict[str, Any] = {'one number': 1000.0, 'a list of one': [2000.0],
+                         'a list': [3000.0, 4000.0, 5000.0, 6000.0, 7000.0, 8000.0]}
+
+
+@pytest.mark.parametrize('last', FORMS)
+@pytest.mark.parametrize('first', FORMS)
+def test_the_last_value_on_the_command_line_is_used(
+        first: str, last: str, domain: int, tmp_path: Path) -> None:
+    def source(value: Any, how: str) -> list[str]:
+        if how == '-p':
+            return ['-p', f'limits.force_max:={value}']
+        file = tmp_path / f'{len(list(tmp_path.iterdir()))}.yaml'
+        file.write_text(f'{how}:\n  ros__parameters:\n    limits: {{force_max: {value}}}\n')
+        return ['--params-file', str(file)]
+
+    # Of files ROS uses the section with the node's name, whatever their order.
+    for before, after in (('-p', '-p'), ('-p', '/**'), ('/**', '-p'), ('/**', '/**'),
+                          ('stewart_dynamics', '-p')):
+        arguments = ['--params-file', str(ROOT / 'config' / 'platform.yaml'),
+                     *source(FORMS[first], before), *source(FORMS[last], after)]
+        given, of_ros = force_max(arguments, domain)
+        wanted = tuple(FORMS[last]) if isinstance(FORMS[last], list) else FORMS[last]
+        assert (given, of_ros) == (wanted, wanted), f'{before}, then {after}'
+
+
+def force_max(arguments: list[str], domain: int) -> tuple[Any, Any]:
+    """Return limits.force_max of a node with a command line: what it uses, what ROS says."""
+    context = rclpy.Context()
+    with patch.object(sys, 'argv', ['stewart_dynamics', '--ros-args', *arguments]):
+        rclpy.init(args=sys.argv, context=context, domain_id=domain)
+        node = Node('stewart_dynamics', context=context, allow_undeclared_parameters=True,
+                    automatically_declare_parameters_from_overrides=True, enable_rosout=False,
+                    start_parameter_services=False)
+        try:
+            given = declare_parameters(node, Parameters).given['limits.force_max']
+            of_ros = node.get_parameter('limits.force_max').value
+            return given, of_ros if isinstance(of_ros, float) else tuple(of_ros)
+        finally:
+            node.destroy_node()
+            context.try_shutdown()
+
+
+def test_a_value_for_a_renamed_node_is_checked(declared: Any) -> None:
+    with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
+        declared(LifecycleNode, Parameters, 'platform.yaml', 'arm:platform.mass:=0,5', name='arm')
 
 
 def test_what_ros_declares_is_described_by_ros(declared: Any) -> None:
