@@ -193,9 +193,8 @@ def test_the_last_value_on_the_command_line_is_used(
         file.write_text(f'{how}:\n  ros__parameters:\n    limits: {{force_max: {value}}}\n')
         return ['--params-file', str(file)]
 
-    # Of files ROS uses the section with the node's name, whatever their order.
     for before, after in (('-p', '-p'), ('-p', '/**'), ('/**', '-p'), ('/**', '/**'),
-                          ('stewart_dynamics', '-p')):
+                          ('stewart_dynamics', '-p'), ('stewart_dynamics', '/**')):
         arguments = ['--params-file', str(ROOT / 'config' / 'platform.yaml'),
                      *source(FORMS[first], before), *source(FORMS[last], after)]
         given, of_ros = force_max(arguments, domain)

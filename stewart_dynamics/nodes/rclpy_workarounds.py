@@ -95,7 +95,7 @@ def set_parameters_together(node: Node) -> None:
     def set_together(messages: Sequence[Any]) -> SetParametersResult:
         try:
             received = [_received(node, message) for message in messages]
-            changes = [each for each in received if not _is_present(node, each)]
+            changes = [each for each in received if not is_present(node, each)]
             return node.set_parameters_atomically(changes)
         except (ParameterException, RuntimeError, TypeError, ValueError) as exc:
             return SetParametersResult(successful=False, reason=str(exc))
@@ -135,7 +135,7 @@ def _received(node: Node, message: Any) -> RosParameter:
     return parameter
 
 
-def _is_present(node: Node, parameter: RosParameter) -> bool:
+def is_present(node: Node, parameter: RosParameter) -> bool:
     """Return whether a parameter has this type and value already."""
     if not node.has_parameter(parameter.name):
         return False

@@ -38,11 +38,12 @@ from rclpy.utilities import remove_ros_args
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.nodes.programs import parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
-    describe_by, make_executor, reject_impossible_times, set_parameters_together, shut_down, spin)
+    describe_by, is_present, make_executor, reject_impossible_times, set_parameters_together,
+    shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries
 from stewart_dynamics.parameter_files import is_of_ros, other_nodes, parameters_of
 from stewart_dynamics.parameter_set import Parameter, ParameterSet
-from stewart_dynamics.parameters_yaml import NULL, read_document, read_value
+from stewart_dynamics.parameters_yaml import read_document, read_value
 
 # Errors that the user can correct: reported in one line. All others are defects of this package.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
@@ -55,25 +56,26 @@ _TYPES = {
 Kind = TypeVar('Kind', bound=ParameterSet)
 
 
-def _overrides(arguments: Sequence[str], node: str, kind: type[ParameterSet]) -> dict[str, Any]:
+def _given(arguments: Sequence[str], node: str, kind: type[ParameterSet]) -> dict[str, Any]:
     """
-    Return the values of ``-p`` for a node that no later argument replaces, each of them checked.
+    Return the values that a command line gives a node, in files and by ``-p``: the last of each.
 
-    rcl keeps both a number and a list that ``-p`` sets in its place, and rclpy takes the number;
-    it silently drops a value of another type than that in a file.
+    ROS may use another one. rcl keeps both a number and a list that ``-p`` sets in its place, and
+    rclpy takes the number; values for ``/**`` and those for the node's name are applied in the
+    order in which these two first appear; a ``-p`` of another type than in a file is dropped.
     """
     values: dict[str, Any] = {}
     for option, argument in zip(arguments, arguments[1:], strict=False):
         if option == '--params-file':
-            for name, _ in parameters_of(read_document(argument), node, argument):
-                values.pop(name, None)
+            values.update(parameters_of(read_document(argument), node, argument))
         elif option in ('-p', '--param'):
             target, _, text = argument.partition(':=')
             section, _, name = target.rpartition(':')
             if section in ('', node.lstrip('/')):
                 kind.check_value(name, text, 'command line')
                 values[name] = read_value(text, name)
-    return {name: value for name, value in values.items() if not is_of_ros(name)}
+    return {name: value for name, value in values.items()
+            if value is not None and not is_of_ros(name)}
 
 
 def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
@@ -91,12 +93,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
-    overrides = _overrides(sys.argv, node.get_fully_qualified_name(), kind)
-    declared: dict[str, Any] = node.get_parameters_by_prefix('')
-    # A null of a file, as `ros2 param dump` writes it, is a text for rcl.
-    given = {name: parameter.value for name, parameter in declared.items()
-             if not is_of_ros(name) and parameter.value not in NULL}
-    given.update(overrides)
+    given = _given(sys.argv, node.get_fully_qualified_name(), kind)
     try:
         parameters = kind(given, source, exact_types=True)
     except ParameterError as exc:
@@ -105,8 +102,9 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
         unchecked = ParameterDescriptor(dynamic_typing=True)
         if name in given:
             node.set_descriptor(name, unchecked)
-            if name in overrides:
-                node.set_parameters([RosParameter(name, value=overrides[name])])
+            value = RosParameter(name, value=given[name])
+            if not is_present(node, value):
+                node.set_parameters([value])
             continue
         if node.has_parameter(name):
             node.undeclare_parameter(name)
