@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The known load on the platform: what ``~/wrench`` said last."""
+"""The known load on the platform: the last message on ``~/wrench``."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class WrenchInput:
     parameters : Parameters
         For ``base_frame``.
     rejections : Rejections
-        Told of what is rejected.
+        Counts what is rejected.
 
     """
 
