@@ -15,7 +15,7 @@
 """
 Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs, for ROS 2.
 
-Names are imported when they are first used: checking a parameter file needs no compiler.
+Names are imported on first use, so that checking a parameter file needs no compiler.
 """
 
 from importlib import import_module

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The compiled functions on batches: rows as they take them, large batches on all processors."""
+"""The compiled functions on batches; large batches are divided among all processors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from stewart_dynamics.mechanics import kernel
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import RESULT, WRENCH
 
-# A thread gets at least so many samples: a millisecond's work, far more than starting it costs.
+# Samples for one thread at least: a millisecond of work, far more than the start of a thread.
 _SAMPLES_FOR_A_THREAD = 4096
 _PARTS_OF_A_THREAD = 8
 _CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
@@ -59,12 +59,12 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
 
 
 def in_parts(many: int, do: Callable[[slice], object]) -> None:
-    """Call ``do`` for all of so many samples in parts, for large batches on all processors."""
+    """Call ``do`` with slices of ``many`` samples; large batches on all processors."""
     threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
     if threads < 2:
         do(slice(0, many))
         return
-    # More parts than threads: a thread that is held up leaves more to the others.
+    # More parts than threads: if one thread is slow, the others take more parts.
     edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(do, map(slice, edges[:-1], edges[1:])))

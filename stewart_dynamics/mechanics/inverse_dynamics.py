@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the inverse dynamics of a platform returns."""
+"""The result of the inverse dynamics."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.singularity import time_to_crossing
 
 class InverseDynamics(NamedTuple):
     """
-    What the six legs do in a motion; (...) is the motion's leading shape.
+    Lengths, rates and forces of the legs in a motion; (...) is the motion's leading shape.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class InverseDynamics(NamedTuple):
 
     @classmethod
     def of_rows(cls, results: Array) -> InverseDynamics:
-        """Return what rows of results (..., RESULT) hold."""
+        """Return the fields of rows of results (..., RESULT)."""
         return cls(
             results[..., LENGTHS], results[..., RATES], results[..., FORCES],
             results[..., UNIT_LOAD_FORCES],

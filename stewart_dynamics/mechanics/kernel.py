@@ -13,36 +13,32 @@
 # limitations under the License.
 
 """
-The inverse dynamics: leg lengths, rates and forces, and how near a singularity, of many samples.
+The inverse dynamics of many samples: leg lengths, rates and forces, det(J), condition number.
 
-Compiled by numba where it is installed; written once, for one sample and for millions, and each
-sample's bits are the same in either case. The equations are those of ``lagrange``, evaluated as
-vectors of three and never as 6x6 matrices. Numbers in brackets are the paper's equations:
+Compiled by numba where it is installed; one implementation for one sample and for millions, and
+each sample's bits are the same in either case. Numbers in brackets are the paper's equations:
 
-1. ``leg_line`` and ``leg_dynamics``: the leg's length, rate and rows of J_inv (1)-(3), and the
-   force ``F_i = M_i x_i'' + C_i x_i' + G_i`` that it takes to move the leg at its platform joint
-   (section 5).
-2. ``platform_dynamics``: the wrench that moves the platform (5), (6).
-3. ``_dynamics``: six forces along the legs carry the sum, ``J_inv^T f = wrench``; with the
-   inverse of J_inv come det(J), its rate, and the forces under a unit load.
+1. ``body_dynamics.leg_dynamics``: the leg's length, rate and row of J_inv (1)-(3), and the force
+   ``F_i = M_i x_i'' + C_i x_i' + G_i`` that moves the leg at its platform joint (section 5).
+2. ``body_dynamics.platform_dynamics``: the wrench that moves the platform (5), (6).
+3. ``_dynamics``: six forces along the legs balance the sum, ``J_inv^T f = wrench``; the inverse of
+   J_inv gives det(J), its rate, and the forces under a unit load as well.
 4. ``_tile_eigenvalues``: the condition number, from the largest eigenvalues of J J^T and of its
    inverse.
 
-``solve`` takes ``LANES`` samples through these steps side by side, so that one vector instruction
-computes several; hence tuples instead of arrays, no branches, and every function inlined.
+``solve`` computes ``LANES`` samples side by side in each of these steps, so that one vector
+instruction computes several; hence tuples instead of arrays, no branches, and inlined functions.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.friction import with_friction
-from stewart_dynamics.mechanics.hexapod_constants import (
-    characteristic_length_of, gravity_of, joints_of, Leg, leg_of, platform_of)
+from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
+from stewart_dynamics.mechanics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Rows, Tridiagonal, tridiagonal)
@@ -50,12 +46,10 @@ from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES,
     LENGTHS, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSITION, RATES, RESULT, ROTATION,
     UNIT_LOAD_FORCES, WRENCH)
-from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, dot6, Matrix3, rotate, rotate_back, scale, subtract, symmetric, Vector3,
-    Vector6)
+from stewart_dynamics.mechanics.vectors import add, dot6, Matrix3, scale, subtract, Vector3
 
-# Samples go through the arithmetic in tiles, number by number: entry n of lane k stands at
-# n * LANES + k. That is what lets the compiler put neighbouring samples into one register.
+# Samples are computed in tiles, number by number: entry n of lane k is at n * LANES + k, so that
+# the compiler puts neighbouring samples into one register.
 LANES = 32
 _WRENCH = MOTION * LANES
 _RESULT = _WRENCH + WRENCH * LANES
@@ -64,116 +58,6 @@ _TRIDIAGONAL = _EIGENVALUE + 2 * LANES
 _TILE = _TRIDIAGONAL + 22 * LANES
 # Laguerre's iteration takes 4 to 7 steps, with a fourfold eigenvalue up to 42.
 _MOST_STEPS = 64
-
-
-class LegDynamics(NamedTuple):
-    """What one leg does in a motion."""
-
-    length: float
-    """[m]"""
-    rate: float
-    """[m/s]"""
-    force: Vector3
-    """That moves the leg, on its platform joint [N], base axes."""
-    moment: Vector3
-    """Of that force about the platform's origin [N m]."""
-    actuator: float
-    """Force [N] that moves the actuator itself: its reflected mass and its friction."""
-    row: Vector6
-    """The leg's row of J_inv, its right half divided by the characteristic length."""
-    row_rate: Vector6
-    """Time derivative of that row."""
-    arm: Vector3
-    """a = R p: the platform joint from the platform's origin, base axes [m]."""
-    inertia: float
-    """What resists motion across the leg, I_e / L^2 + m_ce [kg]."""
-
-
-@inlined
-def leg_line(
-        constants: Array, leg: int, position: Vector3, rotation: Matrix3,
-) -> tuple[Vector3, float, float, Vector3]:
-    """Return a leg's a = R p, length L, 1 / L (0 where L is 0) and direction s: (1), (2)."""
-    base_joint, platform_joint = joints_of(constants, leg)
-    a = rotate(rotation, platform_joint)
-    leg_vector = subtract(add(position, a), base_joint)
-    length = math.sqrt(dot(leg_vector, leg_vector))
-    inverse_length = 1.0 / length if length > 0.0 else 0.0
-    return a, length, inverse_length, scale(inverse_length, leg_vector)
-
-
-@inlined
-def _leg_inertia(leg: Leg, length: float, inverse_length: float) -> tuple[float, float]:
-    """Return m2 c2 with c2 = L - S2 [kg m], and what resists motion across a leg [kg]."""
-    piston_distance = length - leg.piston_center
-    piston_moment = leg.piston_mass * piston_distance
-    return piston_moment, ((leg.joint_inertia + piston_moment * piston_distance)
-                           * inverse_length * inverse_length)
-
-
-@inlined
-def leg_dynamics(
-        constants: Array, leg: int, position: Vector3, rotation: Matrix3, velocity: Vector3,
-        omega: Vector3, acceleration: Vector3, alpha: Vector3,
-) -> LegDynamics:
-    """Return what a leg does in a motion of the platform; equation numbers are the paper's."""
-    gravity = gravity_of(constants)
-    inverse_size = 1.0 / characteristic_length_of(constants)
-    own = leg_of(constants, leg)
-    a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
-
-    # the platform joint's velocity and acceleration (x_i', x_i''), along and across the leg
-    a_rate = cross(omega, a)
-    x_rate = add(velocity, a_rate)
-    rate = dot(s, x_rate)
-    across = subtract(x_rate, scale(rate, s))
-    across_squared = dot(across, across)
-    x_acc = add(add(acceleration, cross(alpha, a)), cross(omega, a_rate))
-    along_acc = dot(s, x_acc)
-    across_acc = subtract(x_acc, scale(along_acc, s))
-    along_gravity = dot(s, gravity)
-    across_gravity = subtract(gravity, scale(along_gravity, s))
-
-    # M_i, C_i, G_i as in ``lagrange``; skew(s)^2 y is -(y across the leg)
-    piston_moment, inertia = _leg_inertia(own, length, inverse_length)
-    gravity_mass = (own.cylinder_moment + piston_moment) * inverse_length
-    coriolis_mass = piston_moment * inverse_length - inertia
-    force = add(
-        add(subtract(scale(inertia, across_acc), scale(gravity_mass, across_gravity)),
-            scale(2.0 * coriolis_mass * rate * inverse_length, across)),
-        scale(own.piston_mass * (along_acc - along_gravity + own.piston_center * inverse_length
-                                 * inverse_length * across_squared), s))
-
-    length_acc = along_acc + across_squared * inverse_length
-    actuator = with_friction(own.reflected_mass * length_acc, rate, own.viscous_friction,
-                             own.coulomb_friction)
-
-    # (3): the row of J_inv and its rate
-    s_rate = scale(inverse_length, across)
-    moment = scale(inverse_size, cross(a, s))
-    moment_rate = scale(inverse_size, add(cross(a_rate, s), cross(a, s_rate)))
-    return LegDynamics(
-        length, rate, force, cross(a, force), actuator,
-        (s[0], s[1], s[2], moment[0], moment[1], moment[2]),
-        (s_rate[0], s_rate[1], s_rate[2], moment_rate[0], moment_rate[1], moment_rate[2]),
-        a, inertia)
-
-
-@inlined
-def platform_dynamics(
-        constants: Array, rotation: Matrix3, omega: Vector3, acceleration: Vector3,
-        alpha: Vector3,
-) -> tuple[Vector3, Vector3]:
-    """Return force and moment at the platform's origin that move the platform: (5), (6)."""
-    mass, center, inertia = platform_of(constants)
-    com = rotate(rotation, center)
-    force = scale(mass, subtract(
-        add(add(acceleration, cross(alpha, com)), cross(omega, cross(omega, com))),
-        gravity_of(constants)))
-    omega_p = rotate_back(rotation, omega)
-    alpha_p = rotate_back(rotation, alpha)
-    moment_p = add(symmetric(inertia, alpha_p), cross(omega_p, symmetric(inertia, omega_p)))
-    return force, add(rotate(rotation, moment_p), cross(com, force))
 
 
 @inlined
@@ -223,7 +107,7 @@ def _tridiagonal(tile: Array, at: int) -> Tridiagonal:
 
 @inlined
 def _put_unit_load_forces(tile: Array, k: int, rows: Rows, inverse: Rows) -> None:
-    """Store the forces under a unit load, and what the condition number is made of."""
+    """Store the forces under a unit load, and the matrices that give the condition number."""
     at = k + _RESULT
     g, h = gram(*rows), gram(*inverse)
     g_trace = g[0][0] + g[1][0] + g[2][0] + g[3][0] + g[4][0] + g[5][0]
@@ -233,14 +117,14 @@ def _put_unit_load_forces(tile: Array, k: int, rows: Rows, inverse: Rows) -> Non
     tile[at + CONDITION * LANES] = math.sqrt(g_trace) * math.sqrt(h_trace)
     _put_scaled(tile, k + _TRIDIAGONAL, tridiagonal(g), g_trace)
     _put_scaled(tile, k + _TRIDIAGONAL + 11 * LANES, tridiagonal(h), h_trace)
-    # The trace is no less than the largest eigenvalue, but for rounding.
+    # Scaled by its trace, no eigenvalue is larger than 1 but for rounding.
     tile[k + _EIGENVALUE] = 1.0 + 1e-14
     tile[k + _EIGENVALUE + LANES] = 1.0 + 1e-14
 
 
 @inlined
 def _dynamics(constants: Array, tile: Array, k: int) -> None:
-    """Compute the sample in lane k, except for the last steps to its condition number."""
+    """Compute the sample in lane k, except for the eigenvalues of its condition number."""
     size = characteristic_length_of(constants)
     inverse_size = 1.0 / size
     position = _vector3(tile, k + POSITION.start * LANES)
@@ -297,7 +181,7 @@ def _tile_dynamics(constants: Array, tile: Array, lanes: int) -> None:
 
 @compiled
 def _tile_eigenvalues(tile: Array, lanes: int) -> None:
-    """Take the two largest eigenvalues of every lane to where no step changes any of them."""
+    """Iterate on both largest eigenvalues of all lanes until no step changes any of them."""
     for _ in range(_MOST_STEPS):
         changed = 0
         for k in range(min(lanes, LANES)):
