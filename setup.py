@@ -26,7 +26,7 @@ share = f'share/{package_name}'
 version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py').read_text(
     encoding='utf-8'), re.MULTILINE)[0]
 
-# No ROS package is in install_requires: with a ROS installation they come from package.xml, and pip
+# No ROS package is in install_requires: with a ROS installation they come from package.xml, and
 # has them under other names. Everything else that an executable imports is listed here.
 install_requires = [
     'jinja2>=3.1',  # the replay's pages

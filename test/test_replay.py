@@ -508,10 +508,10 @@ def test_other_topics_do_not_matter(tmp_path: Path) -> None:
 
 
 def test_another_name_of_the_node(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/machine')
-    assert run(bag, tmp_path / 'out', '--node', 'cell/machine') == DONE
+    bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
+    assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
-        f'/cell/machine/{topic}' for topic in OUTPUT_TYPES}
+        f'/cell/hexapod/{topic}' for topic in OUTPUT_TYPES}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:

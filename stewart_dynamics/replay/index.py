@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, TextIO
 from urllib.parse import quote
 
 from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
-from stewart_dynamics.replay.pages import page
+from stewart_dynamics.replay.html_pages import page
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]

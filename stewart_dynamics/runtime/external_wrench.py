@@ -51,7 +51,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
 from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.home_pose import homes
@@ -196,7 +196,7 @@ def _one(numbers: Array) -> None:
     if dt > 0.0:
         motions = numbers[_MOTIONS].reshape(2, MOTION)
         forces, results = numbers[_FORCES], np.empty((2, RESULT))
-        kernel.solve(constants, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
+        inverse_dynamics.solve(constants, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
         for end in range(2):  # the mean of both ends
             model_forces = results[end, FORCES]
             _add_external_wrench(constants, motions[end], model_forces, forces, 0.5, wrench)
