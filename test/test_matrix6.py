@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 64  # as the kernel has it
+MOST_STEPS = 64  # as the inverse dynamics have it
 
 
 @pytest.fixture(scope='module')

@@ -23,7 +23,7 @@ import os
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import RESULT, WRENCH
 
@@ -52,7 +52,7 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     results = np.empty((len(motions), RESULT))
-    in_parts(len(motions), lambda part: kernel.solve(
+    in_parts(len(motions), lambda part: inverse_dynamics.solve(
         constants, motions[part], wrenches if len(wrenches) == 1 else wrenches[part],
         results[part]))
     return results

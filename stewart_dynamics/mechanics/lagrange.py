@@ -18,8 +18,8 @@ The Lagrange equations as the paper assembles them: the readable reference.
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
 base axes. Numbers in brackets are equations of Alwan and Sarhan, Dynamic Analysis of Gough
 Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng. Sci. 26(10),
-2018, in their correct form: docs/misprints.md lists what is printed instead. ``kernel`` computes
-the same forces without a matrix and is validated against these. Every function takes any
+2018, in their correct form: docs/misprints.md lists what is printed instead. ``inverse_dynamics``
+computes the same forces without a matrix and is validated against these. Every function takes any
 leading shape of samples.
 """
 

@@ -28,10 +28,9 @@ from stewart_dynamics.mechanics import (
     batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility, stiffness)
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
-from stewart_dynamics.mechanics.force_breakdown import (
-    ForceBreakdown, ForceBreakdownRows, SOURCES)
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
-from stewart_dynamics.mechanics.inverse_dynamics import InverseDynamics
+from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.platform_arguments import (
     check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)

@@ -42,8 +42,8 @@ from stewart_dynamics import (
     InverseDynamics, Motion, MotionError, Parameters, Pose, SingularityError, StewartError,
     StewartPlatform)
 from stewart_dynamics.mechanics import batch, lagrange
+from stewart_dynamics.mechanics.inverse_dynamics import LANES, solve
 from stewart_dynamics.mechanics.jit import COMPILED
-from stewart_dynamics.mechanics.kernel import LANES, solve
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, MOTION, RESULT
 
 Array = NDArray[np.float64]
@@ -538,9 +538,9 @@ def test_where_machine_code_cannot_be_kept_it_is_compiled_at_every_start(
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 print(compiled.HINT)
-print(kernel.solve.py_func.__name__)
+print(inverse_dynamics.solve.py_func.__name__)
 """
     printed = run(code, path=tmp_path).splitlines()
     if COMPILED:
@@ -564,14 +564,14 @@ def test_a_platform_can_be_copied_and_sent_to_another_process() -> None:
 
 UNCOMPILED = """
 import numpy as np
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import RESULT
 assert not COMPILED
 given = np.load({source!r})
 results = np.empty((len(given['rows']), RESULT))
 with np.errstate(all='ignore'):
-    kernel.solve(given['constants'], given['rows'], given['wrenches'], results)
+    inverse_dynamics.solve(given['constants'], given['rows'], given['wrenches'], results)
 np.save({target!r}, results)
 """
 
@@ -611,10 +611,10 @@ def test_kept_machine_code_is_not_used_after_a_change_of_a_module_it_was_made_of
     shutil.copytree(PACKAGE, tmp_path / 'stewart_dynamics')
     code = f"""
 import numpy as np
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 results = np.empty((1, {RESULT}))
-kernel.solve(*np.load({str(tmp_path / "given.npy")!r}, allow_pickle=True), results)
-print(kernel.__file__, results[0, 0], sep='|')
+inverse_dynamics.solve(*np.load({str(tmp_path / "given.npy")!r}, allow_pickle=True), results)
+print(inverse_dynamics.__file__, results[0, 0], sep='|')
 """
     platform = StewartPlatform(symmetric_parameters())
     given_arrays = np.empty(3, dtype=object)
