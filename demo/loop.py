@@ -53,6 +53,7 @@ import yaml
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion
@@ -76,10 +77,10 @@ LOOK = 0.1  # interval between checks of programs and progress [s]
 
 # Started in this order; the last one, which starts the motion, when the others are connected.
 PROGRAMS: dict[str, list[str | Path]] = {
-    'stewart_simulator': [Path(sys.executable).with_name('stewart_simulator')],
-    'stewart_dynamics': [Path(sys.executable).with_name('stewart_dynamics')],
+    'stewart_simulator': [executable('stewart_simulator')],
+    'stewart_dynamics': [executable('stewart_dynamics')],
     'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py'],
-    'stewart_trajectory': [Path(sys.executable).with_name('stewart_trajectory')]}
+    'stewart_trajectory': [executable('stewart_trajectory')]}
 
 UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position': 'um',
          'rotation': 'urad'}

@@ -72,6 +72,7 @@ from trajectory_msgs.msg import (
 import yaml
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 
@@ -111,11 +112,6 @@ LOG_LINE = re.compile(
 _DOMAINS = range(1, 101)
 _LOCKS: dict[int, int] = {}  # file descriptors
 _ENDLESS = 10_000_000
-
-
-def executable(name: str) -> str:
-    """Return the path of an executable of the package, that of this Python's environment."""
-    return str(Path(sys.executable).with_name(name))
 
 
 @contextmanager

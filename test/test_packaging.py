@@ -197,6 +197,29 @@ def test_colcon_result_runs(install: Path) -> None:
     where = call(['bash', '-c', f'{setup}"{sys.executable}" -c '
                   f'"import {NAME}; print({NAME}.__file__)"'], cwd=install)
     assert str(install) in where
+    # With the Python that a workspace has, where no executable is beside it.
+    python = Path(sys.base_prefix, 'bin', 'python3')
+    found = call(['bash', '-c', f'{setup}"{python}" -c "from {NAME}.executables import '
+                  'executable; print(executable(\'stewart_replay\'))"'], cwd=install)
+    assert found.strip() == str(script)
+
+
+# As launch_testing 3.4 and launch_testing_ros 0.26 have it: pytest 9 rejects the argument path.
+OLD_PLUGIN = 'def pytest_pycollect_makemodule(path, parent): pass\n'
+
+
+def test_pytest_starts_beside_the_plugins_of_launch(tmp_path: Path) -> None:
+    info = tmp_path / 'old_plugins-1.0.dist-info'
+    info.mkdir()
+    (info / 'METADATA').write_text('Metadata-Version: 2.1\nName: old_plugins\nVersion: 1.0\n')
+    names = 'launch_testing', 'launch_ros', 'launch_pytest'
+    (info / 'entry_points.txt').write_text('\n'.join(
+        ['[pytest11]', *(f'{name} = old_{name}' for name in names)]))
+    for name in names:
+        (tmp_path / f'old_{name}.py').write_text(OLD_PLUGIN)
+    paths = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get('PYTHONPATH')]))
+    call([sys.executable, '-m', 'pytest', '--markers'], cwd=ROOT,
+         env={**os.environ, 'PYTHONPATH': paths})
 
 
 def test_wheel_has_entry_points_and_no_scripts(
