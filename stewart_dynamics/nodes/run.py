@@ -22,6 +22,7 @@ import math
 import signal
 import sys
 from typing import Any, TypeVar
+import warnings
 
 from rcl_interfaces.msg import (
     FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult)
@@ -30,6 +31,7 @@ from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import NameValidationException, ROSInterruptException
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
@@ -203,6 +205,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         warning = check_environment(sys.argv)
         reject_impossible_times()
         rclpy.init()
+        warnings.showwarning = lambda message, *_: get_logger(kind.node).warning(str(message))
         with without_security_libraries():
             node = make_node()
         if warning:
