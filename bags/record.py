@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Record the bags of this folder: what stewart_trajectory publishes, over real topics.
+Record the bags in this folder: the setpoints that stewart_trajectory publishes.
 
-``python bags/record.py`` records all of them anew, ``python bags/record.py clear`` one. The
-flawed one goes through a relay that spoils some of the messages on their way.
+``python bags/record.py`` records all of them again, ``python bags/record.py clear`` one. The
+flawed bag is recorded through a relay that damages some of the messages.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ TYPES = {'setpoint/pose': PoseStamped, 'setpoint/twist': TwistStamped,
          'setpoint/accel': AccelStamped}
 QOS = QoSProfile(depth=1000)
 
-# Name of the bag, the motion, and whether it is spoiled.
+# Name of the bag, the motion, and whether messages are damaged.
 BAGS = {'singular': ('trajectory_singular.yaml', False), 'clear': ('trajectory_clear.yaml', False),
         'flawed': ('trajectory_clear.yaml', True)}
 
 
 class Recorder(Node):
-    """Writes every setpoint message that comes, with the time when it came."""
+    """Writes each setpoint message, with the time when it was received."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__('recorder')
@@ -75,40 +75,40 @@ class Recorder(Node):
         return write
 
     def close(self) -> None:
-        """Finish the bag."""
+        """Complete the bag."""
         self._writer.close()
 
 
-class Spoiler(Node):
+class DamagingRelay(Node):
     """
-    Passes on what /unspoiled/... brings, but for some messages, always the same ones.
+    Publishes the messages of /undamaged/..., some of them damaged, the same in each run.
 
-    One in a hundred each: dropped, doubled, held back until the next has passed, and the first
-    of its numbers made a NaN.
+    One in a hundred each: dropped, published twice, published after the next one, and with its
+    first number replaced by NaN.
     """
 
     def __init__(self) -> None:
-        super().__init__('spoiler')
+        super().__init__('damaging_relay')
         self._random = random.Random(2018)
         self._held: dict[str, bytes] = {}
         for topic, kind in TYPES.items():
             publisher = self.create_publisher(kind, f'/{NODE}/{topic}', QOS)
             self.create_subscription(
-                kind, f'/unspoiled/{topic}', self._spoils(topic, publisher), QOS, raw=True)
+                kind, f'/undamaged/{topic}', self._relay_of(topic, publisher), QOS, raw=True)
 
-    def _spoils(self, topic: str, publisher: Any) -> Callable[[bytes], None]:
-        def spoil(data: bytes) -> None:
+    def _relay_of(self, topic: str, publisher: Any) -> Callable[[bytes], None]:
+        def relay(data: bytes) -> None:
             held = self._held.pop(topic, None)
-            fate = self._random.randrange(100)
-            if fate == 0:
+            fault = self._random.randrange(100)
+            if fault == 0:
                 pass
-            elif fate == 1:
+            elif fault == 1:
                 publisher.publish(data)
                 publisher.publish(data)
-            elif fate == 2:
+            elif fault == 2:
                 self._held[topic] = data
-            elif fate == 3:
-                # the doubles stand at the end: 7 of a pose, 6 of the others
+            elif fault == 3:
+                # the doubles are at the end: 7 of a pose, 6 of the others
                 first = len(data) - 8 * (7 if topic == 'setpoint/pose' else 6)
                 publisher.publish(data[:first] + struct.pack('<d', float('nan'))
                                   + data[first + 8:])
@@ -116,23 +116,23 @@ class Spoiler(Node):
                 publisher.publish(data)
             if held is not None:
                 publisher.publish(held)
-        return spoil
+        return relay
 
 
 def record(name: str) -> None:
-    """Record one bag in place of the one that is there."""
-    config, spoiled = BAGS[name]
+    """Record one bag, and replace the existing one."""
+    config, damaged = BAGS[name]
     partial, final = HERE / f'{name}.partial', HERE / name
     shutil.rmtree(partial, ignore_errors=True)
     recorder = Recorder(partial)
-    nodes: list[Any] = [recorder, *([Spoiler()] if spoiled else [])]
+    nodes: list[Any] = [recorder, *([DamagingRelay()] if damaged else [])]
     executor = rclpy.executors.SingleThreadedExecutor()
     for node in nodes:
         executor.add_node(node)
     command = [Path(sys.executable).with_name('stewart_trajectory'), '--ros-args',
                '--params-file', HERE.parent / 'config' / config, '-p', 'start_timeout:=60.0']
-    if spoiled:
-        command += ['-p', 'target:=unspoiled']
+    if damaged:
+        command += ['-p', 'target:=undamaged']
     with subprocess.Popen(command) as trajectory:
         quiet_since = time.monotonic()
         while trajectory.poll() is None or time.monotonic() - quiet_since < 1.0:
@@ -144,8 +144,9 @@ def record(name: str) -> None:
         raise SystemExit(f'stewart_trajectory ended with exit code {trajectory.returncode}')
     expected = 3 * len(sample_times(ReferenceMotionParameters.from_yaml(
         HERE.parent / 'config' / config)))
-    if not spoiled and recorder.messages != expected:
-        raise SystemExit(f'{name}: {recorder.messages} of {expected} messages came: record again')
+    if not damaged and recorder.messages != expected:
+        raise SystemExit(f'{name}: {recorder.messages} of {expected} messages received: record '
+                         'again')
     recorder.close()
     for node in nodes:
         executor.remove_node(node)
@@ -162,7 +163,7 @@ def record(name: str) -> None:
 
 
 def main() -> None:
-    """Record the bags that the command line names, or all."""
+    """Record the bags named on the command line, or all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('names', nargs='*', metavar='NAME',
                         help=f'one of {", ".join(BAGS)} (default: all)')

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, ExitStack, suppress
+from contextlib import contextmanager, ExitStack, redirect_stderr, suppress
 import fcntl
 from functools import partial
 import gc
@@ -229,6 +229,38 @@ class Program:
                 'threads': int(status['Threads']), 'memory': int(status['VmRSS'].split()[0])}
 
 
+class _Stderr:
+    """
+    What this process says on stderr while this is entered.
+
+    Nothing is lost of what threads write at any time, as it is with pytest's ``capfd`` between
+    reading and emptying its file.
+    """
+
+    def __enter__(self) -> _Stderr:
+        self._file = tempfile.TemporaryFile('a+', buffering=1)
+        self._python = redirect_stderr(self._file)
+        self._python.__enter__()
+        self._original = os.dup(2)
+        os.dup2(self._file.fileno(), 2)
+        self._whole = ''
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.dup2(self._original, 2)
+        os.close(self._original)
+        self._python.__exit__(None, None, None)
+        self._whole = self.text()
+        self._file.close()
+
+    def text(self) -> str:
+        """Return all that it has said so far."""
+        if self._file.closed:
+            return self._whole
+        file = self._file.fileno()
+        return os.pread(file, os.fstat(file).st_size, 0).decode()
+
+
 class Inside:
     """
     A node of the package in this process, spun by a thread, where a test asks for no process.
@@ -241,39 +273,38 @@ class Inside:
         The command line, without the executable.
     domain : int
         Its ROS domain.
-    said : callable
-        Returns what this process has said on stderr since it was last asked.
     done : Future, optional
         When it is done, its result is the exit code.
 
     """
 
     def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
-                 said: Callable[[], str], done: Future | None = None) -> None:
-        self._said, self._stderr, self._done = said, '', done
-        self._stack = ExitStack()
-        with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
-            rclpy.init(args=sys.argv, domain_id=domain)
-            try:
-                node = kind()
-            except BaseException:
-                rclpy.shutdown()
-                raise
-        self._executor = EventsExecutor()
-        self._executor.add_node(node)
-        stop = Event()
-        self._thread = Thread(target=spin, args=(
-            self._executor, node, done or Future(), stop.is_set))
-        for end in (rclpy.try_shutdown, gc.unfreeze, node.destroy_node, self._executor.shutdown,
-                    self._thread.join, stop.set):
-            self._stack.callback(end)
-        self._thread.start()
+                 done: Future | None = None) -> None:
+        self._done = done
+        with ExitStack() as stack:
+            self._said = stack.enter_context(_Stderr())
+            with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
+                rclpy.init(args=sys.argv, domain_id=domain)
+                try:
+                    node = kind()
+                except BaseException:
+                    rclpy.shutdown()
+                    raise
+            self._executor = EventsExecutor()
+            self._executor.add_node(node)
+            stop = Event()
+            self._thread = Thread(target=spin, args=(
+                self._executor, node, done or Future(), stop.is_set))
+            for end in (rclpy.try_shutdown, gc.unfreeze, node.destroy_node,
+                        self._executor.shutdown, self._thread.join, stop.set):
+                stack.callback(end)  # the last one first
+            self._thread.start()
+            self._stack = stack.pop_all()
 
     @property
     def stderr(self) -> str:
         """Its output so far, and that of this process."""
-        self._stderr += self._said()
-        return self._stderr
+        return self._said.text()
 
     @property
     def ended(self) -> bool:

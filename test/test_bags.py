@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Where bags are found, and where the results of each go."""
+"""Finding bags, and the folders of their results."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_bag_is_itself(tmp_path: Path, names: list[str]) -> None:
     assert find_bags(folder / names[0]) == [folder / names[0]]
 
 
-def test_what_is_not_there_is_left_for_its_reader_to_say(tmp_path: Path) -> None:
+def test_a_missing_path_is_left_to_the_reader(tmp_path: Path) -> None:
     assert find_bags(tmp_path / 'none') == [tmp_path / 'none']
 
 
@@ -69,13 +69,13 @@ def test_bags_are_found_at_any_depth_in_order(tmp_path: Path) -> None:
 @pytest.mark.parametrize('names', [
     ['one.mcap', 'two.mcap'], ['x_0.mcap', 'x_0.db3'], ['x_0.mcap', 'y_1.mcap'],
     ['x.mcap', 'x_0.mcap'], ['one.mcap', 'deeper/metadata.yaml']])
-def test_files_that_are_no_recording_together_are_bags_of_their_own(
+def test_unrelated_files_in_a_folder_are_separate_bags(
         tmp_path: Path, names: list[str]) -> None:
     assert found(make(tmp_path, *names)) == sorted(
         name.removesuffix('/metadata.yaml') for name in names)
 
 
-def test_hidden_names_and_links_are_passed_over(tmp_path: Path) -> None:
+def test_hidden_names_and_links_are_skipped(tmp_path: Path) -> None:
     make(tmp_path / 'far', 'metadata.yaml')
     make(tmp_path / 'far' / 'file.mcap')
     near = make(tmp_path / 'near', 'bag/metadata.yaml', '.hidden/metadata.yaml', 'a/.x.mcap')
@@ -83,24 +83,24 @@ def test_hidden_names_and_links_are_passed_over(tmp_path: Path) -> None:
     (near / 'around').symlink_to(near)
     (near / 'linked.mcap').symlink_to(tmp_path / 'far' / 'metadata.yaml')
     assert found(near) == ['bag']
-    # what is named itself is followed
+    # a link given by its path is followed
     (tmp_path / 'link').symlink_to(near)
     assert found(tmp_path / 'link') == ['bag']
 
 
-def test_results_are_no_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_are_not_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make(tmp_path, 'bag/metadata.yaml', 'out/x/metadata.yaml',
          'earlier/x/summary.json', 'earlier/x/bag/metadata.yaml', 'earlier/x/bag/bag.mcap')
     assert found(tmp_path, tmp_path / 'out') == ['bag']
     monkeypatch.chdir(tmp_path / 'bag')
     assert found(tmp_path, Path('..', 'out')) == ['bag']
-    # unless somebody wants them
+    # unless given by their path
     assert find_bags(tmp_path / 'earlier' / 'x' / 'bag') == [tmp_path / 'earlier' / 'x' / 'bag']
 
 
 def test_a_folder_without_bags_is_an_error(tmp_path: Path) -> None:
     make(tmp_path, 'notes.txt', '.hidden/metadata.yaml', 'old.bag.active')
-    with pytest.raises(BagError, match='holds no bag') as caught:
+    with pytest.raises(BagError, match='contains no bag') as caught:
         find_bags(tmp_path)
     assert f'{caught.value}'.startswith(f'{tmp_path}: ')
     assert '\n' not in f'{caught.value}'
@@ -129,7 +129,7 @@ def test_a_bag_that_is_the_working_folder_has_a_name(
     assert folders_of_results([Path('.')], Path('out')) == [(Path('.'), Path('out', 'bag'))]
 
 
-def test_files_keep_their_suffix_where_names_would_meet(tmp_path: Path) -> None:
+def test_files_keep_their_suffix_if_names_would_be_equal(tmp_path: Path) -> None:
     bags = make(tmp_path / 'bags', 'a.mcap', 'a.db3', 'b.mcap', 'c.mcap', 'c/metadata.yaml',
                 'd.mcap', 'd/deeper/metadata.yaml')
     assert results(tmp_path, bags) == {
@@ -138,7 +138,7 @@ def test_files_keep_their_suffix_where_names_would_meet(tmp_path: Path) -> None:
         'd/deeper': bags / 'd/deeper'}
 
 
-def test_results_that_would_meet_are_refused(tmp_path: Path) -> None:
+def test_results_in_the_same_folder_are_rejected(tmp_path: Path) -> None:
     make(tmp_path, 'one/x/metadata.yaml', 'one/y/metadata.yaml', 'two/x/metadata.yaml',
          'three/a/x/in/metadata.yaml', 'three/a/y/metadata.yaml', 'index.html/metadata.yaml')
     output = tmp_path / 'out'
@@ -147,7 +147,7 @@ def test_results_that_would_meet_are_refused(tmp_path: Path) -> None:
                   [tmp_path / 'one' / 'x', tmp_path / 'one' / '..' / 'one' / 'x']):
         with pytest.raises(BagError, match=f'the results of both would be {output / "x"}'):
             folders_of_results(paths, output)
-    with pytest.raises(BagError, match=f'{output / "x" / "in"}, would be inside'):
+    with pytest.raises(BagError, match=f'{output / "x" / "in"}, would be '):
         folders_of_results([tmp_path / 'three' / 'a', tmp_path / 'two'], output)
-    with pytest.raises(BagError, match='where the table of all bags goes'):
+    with pytest.raises(BagError, match='where the table of all bags is written'):
         folders_of_results([tmp_path / 'index.html', tmp_path / 'one' / 'x'], output)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Twist and acceleration of poses: against analytic motions, and whatever way they are cut."""
+"""Twist and acceleration of poses: against analytic motions, for any split into batches."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_the_response_is_the_same_however_the_samples_are_spaced() -> None:
             middle]) < 5e-3
 
 
-def test_noise_of_the_acceleration_is_what_the_module_says() -> None:
+def test_noise_of_the_acceleration_agrees_with_the_docstring() -> None:
     cutoff, h, noise = 20.0, 1e-3, 1e-5
     spline = smoothing_spline(
         h * np.arange(200_000), rng().normal(0.0, noise, (200_000, 1)), cutoff)
@@ -199,7 +199,7 @@ def test_a_straight_line_stays_one_to_the_ends() -> None:
 @pytest.mark.parametrize(('rate', 'cutoff', 'velocity', 'acceleration'), [
     (1000.0, 20.0, 2e-4, 4e-4), (1000.0, 100.0, 1e-6, 2e-5), (100.0, 20.0, 2e-4, 1e-3),
     (100.0, 45.0, 5e-5, 6e-4)])
-def test_a_motion_is_given_its_derivatives(
+def test_derivatives_of_a_motion(
         rate: float, cutoff: float, velocity: float, acceleration: float) -> None:
     times = np.arange(0.0, 20.0, 1.0 / rate)
     exact = motion_at(times).rows
@@ -276,7 +276,7 @@ def test_the_integral_of_the_twist_gives_the_pose_back() -> None:
     assert most[1] < 1e-5
 
 
-# Windows, stretches and batches
+# Windows, segmentes and batches
 
 def test_windows_change_nothing() -> None:
     times = np.cumsum(rng().uniform(5e-4, 1.5e-3, 30_000))
@@ -324,7 +324,7 @@ def test_batches_change_nothing_and_no_setpoint_is_lost(
     assert np.array_equal(batch.wrenches[kept], whole.wrenches)
     assert np.array_equal(batch.motions[kept, POSE], whole.motions[:, POSE])
     assert np.isfinite(whole.motions).all()
-    # every jump back is told, unless nothing comes after it or nothing came before
+    # every jump back is a restart, unless it is at the begin or the end
     back = np.flatnonzero(np.diff(whole.stamps) < 0) + 1
     assert whole.restarts[back].all()
     passes = np.cumsum(batch.restarts)[kept]
@@ -340,7 +340,7 @@ def test_every_pose_singly_gives_the_same() -> None:
     assert same(whole, singly)
 
 
-def test_no_spline_passes_over_a_gap_or_a_restart() -> None:
+def test_no_spline_continues_across_a_gap_or_a_restart() -> None:
     times = np.arange(0.0, 2.0, 1e-2)
     exact = motion_at(times).rows
     alone = differentiated(Differentiator(10.0, 0.1), [batch_of(times, exact)])
@@ -396,7 +396,7 @@ def test_one_wrench_for_all_is_given_to_each() -> None:
     assert np.array_equal(done.wrenches, np.tile(np.arange(6.0), (100, 1)))
 
 
-def test_nothing_gives_nothing() -> None:
+def test_no_poses_give_no_setpoints() -> None:
     differentiator = Differentiator(10.0, 0.1)
     done = differentiator.finish()
     assert [each.shape for each in done] == [(0,), (0, 24), (0, 6), (0,), (0,)]
@@ -404,7 +404,7 @@ def test_nothing_gives_nothing() -> None:
     assert differentiator.deviation == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_the_notice_says_what_was_done() -> None:
+def test_the_notice_states_the_cutoff_and_the_deviation() -> None:
     times = np.arange(0.0, 4.0, 1e-2)
     differentiator = Differentiator(12.5, 0.1)
     differentiated(differentiator, [batch_of(times, motion_at(times).rows)])
@@ -414,22 +414,22 @@ def test_the_notice_says_what_was_done() -> None:
     assert ends.startswith('16 setpoints are within 0.08 s')
 
 
-# What is refused
+# What is rejected
 
 @pytest.mark.parametrize('cutoff', [0.0, -1.0, math.nan, math.inf])
-def test_a_cutoff_that_is_none_is_refused(cutoff: float) -> None:
+def test_a_cutoff_that_is_not_positive_is_rejected(cutoff: float) -> None:
     with pytest.raises(StewartError, match=r'cut-off frequency: .* Hz: must be a positive'):
         Differentiator(cutoff, 0.1)
 
 
-def test_a_cutoff_too_low_for_the_digits_of_a_double_is_refused() -> None:
+def test_a_cutoff_too_low_for_the_digits_of_a_double_is_rejected() -> None:
     times = np.arange(5000) * 1e-3
     batch = batch_of(times, motion_at(times).rows)
     with pytest.raises(StewartError, match=r'cut-off frequency: 0.4 Hz: must be at least 0.5 Hz'):
         differentiated(Differentiator(0.4, 0.1), [batch])
 
 
-def test_without_scipy_one_line_says_what_to_install() -> None:
+def test_missing_scipy_is_reported_in_one_line() -> None:
     program = (
         'import sys\n'
         'sys.modules["scipy"] = None\n'

@@ -14,7 +14,7 @@
 
 
 """
-Many bags: on this machine and on a cluster, whatever becomes of one of them.
+Many bags on this computer and on a cluster, and errors in some of them.
 
 Processes are killed for real, where the files that they hold open show that they are in the
 middle of a bag.
@@ -115,7 +115,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 
 
 def until(condition: Callable[[], Any], what: str) -> Any:
-    """Return what a condition gives as soon as it is something."""
+    """Return the value of a condition as soon as it is true."""
     end = time.monotonic() + 60.0
     while not (found := condition()):
         assert time.monotonic() < end, f'waited for {what}'
@@ -127,10 +127,10 @@ def process_in(folder: Path, bag: str) -> int | None:
     """Return the other process that is writing the results of a bag."""
     for process in Path('/proc').glob('[0-9]*'):
         if process.name == f'{os.getpid()}':
-            continue  # it clears away what others left, and has that folder open meanwhile
+            continue  # it removes the partial results of others, and has that folder open
         try:
             held = [os.readlink(file) for file in (process / 'fd').iterdir()]
-        except OSError:  # has ended, or is not ours
+        except OSError:  # has ended, or belongs to another user
             continue
         if any(file.startswith(f'{folder}/.{bag}.') for file in held):
             return int(process.name)
@@ -178,10 +178,10 @@ def check_each_once(fleet: Fleet, pairs: list[tuple[Path, Path]], output: Path) 
     assert (output / 'index.html').stat().st_size > 1000
 
 
-# On this machine
+# On this computer
 
 @pytest.mark.parametrize('jobs', [1, 2])
-def test_every_bag_is_done_once(bags: Path, tmp_path: Path, jobs: int) -> None:
+def test_every_bag_is_replayed_once(bags: Path, tmp_path: Path, jobs: int) -> None:
     output = tmp_path / 'out' / 'of two'
     pairs = folders_of_results([bags], output)
     assert len(pairs) == 11
@@ -240,7 +240,7 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     assert hidden(output) == []
 
 
-def test_results_are_not_written_over(bags: Path, tmp_path: Path) -> None:
+def test_results_are_not_overwritten(bags: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags / 'short'], output)
     first = replay_fleet(pairs, PARAMETERS, output, PLAIN)
@@ -258,9 +258,9 @@ def test_results_are_not_written_over(bags: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('jobs', [1, 2])
-def test_a_bag_that_its_run_has_finished_is_done(
+def test_a_bag_finished_by_the_same_run_is_not_replayed_again(
         bags: Path, tmp_path: Path, jobs: int, cluster: LocalCluster) -> None:
-    """As a process leaves it that dies before it can say so."""
+    """As left by a process that dies before it can report it."""
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
     options = PLAIN._replace(run='this')
@@ -274,12 +274,12 @@ def test_a_bag_that_its_run_has_finished_is_done(
     assert 'exists already' in fleet.ended[-1].error
     assert {folder: folder.stat().st_mtime_ns for folder in times} == times
     assert {check_whole(folder, bag) for bag, folder in pairs[:-1]} == {'this'}
-    # what it says of them is what it says of the others
+    # its row is complete
     rest = replay_fleet(pairs[:3], PARAMETERS, tmp_path / 'rest', PLAIN._replace(force=True))
     assert [each.row for each in rest.ended] == [each.row for each in fleet.ended[:3]]
 
 
-def test_a_process_that_dies_takes_no_bag_along(bags: Path, tmp_path: Path) -> None:
+def test_bags_of_a_process_that_dies_are_replayed_by_others(bags: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
     with ThreadPoolExecutor() as apart:
@@ -293,7 +293,7 @@ def test_a_process_that_dies_takes_no_bag_along(bags: Path, tmp_path: Path) -> N
     check_each_once(fleet, pairs, output)
 
 
-def test_a_bag_whose_processes_die_is_given_up(bags: Path, tmp_path: Path) -> None:
+def test_a_bag_whose_process_dies_twice_fails(bags: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
     with ThreadPoolExecutor() as apart:
@@ -315,7 +315,7 @@ def test_a_bag_whose_processes_die_is_given_up(bags: Path, tmp_path: Path) -> No
     assert len(rows(output)) == len(pairs)
 
 
-def test_processes_that_cannot_begin_are_told_of_at_once(bags: Path, tmp_path: Path) -> None:
+def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: Path) -> None:
     script = tmp_path / 'script.py'
     script.write_text(
         'from pathlib import Path\n'
@@ -337,9 +337,9 @@ def test_processes_that_cannot_begin_are_told_of_at_once(bags: Path, tmp_path: P
     assert "if __name__ == '__main__':" in ended.stderr
 
 
-def test_replaced_results_come_back_where_new_ones_were_never_whole(
+def test_replaced_results_are_restored_if_their_replacement_is_incomplete(
         bags: Path, tmp_path: Path) -> None:
-    """As a process leaves them that dies between the two renames."""
+    """As left by a process that dies between the two renames."""
     output = tmp_path / 'out'
     pairs = folders_of_results([bags / 'short'], output)
     old = output / '.long.this.partial.abc.replaced'
@@ -354,7 +354,7 @@ def test_replaced_results_come_back_where_new_ones_were_never_whole(
         '.0.other.partial.abc']
 
 
-def test_names_as_bad_as_they_come(
+def test_hostile_names(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = ['=1+1', '-1', '@x', '+x', '<b>', 'a\nb', 'a;b', "'", os.fsdecode(b'caf\xe9')]
     for name in names:
@@ -371,10 +371,10 @@ def test_names_as_bad_as_they_come(
         output / name for name in names}
 
 
-# How far it is
+# Progress
 
 @pytest.mark.parametrize('jobs', [1, 2])
-def test_progress_comes_from_inside_the_bags(
+def test_progress_is_reported_within_a_bag(
         bags: Path, tmp_path: Path, jobs: int, capfd: pytest.CaptureFixture[str]) -> None:
     pairs = folders_of_results([bags], tmp_path / 'out')
     fleet = replay_fleet(pairs, PARAMETERS, tmp_path / 'out', PLAIN, jobs, show_progress=True)
@@ -392,7 +392,7 @@ def test_progress_comes_from_inside_the_bags(
     assert float(rate.removesuffix('k')) > 0.0
 
 
-def test_progress_is_for_terminals(
+def test_progress_is_shown_only_in_terminals(
         bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     pairs = folders_of_results([bags / 'short'], tmp_path / 'out')
     replay_fleet(pairs, PARAMETERS, tmp_path / 'out', PLAIN)
@@ -408,14 +408,14 @@ def test_progress_is_for_terminals(
     try:
         while more := os.read(ours, 65536):
             seen += more
-    except OSError as exc:  # so Linux says that nobody holds the other end
+    except OSError as exc:  # on Linux: the other end is closed
         assert exc.errno == errno.EIO
     assert program.wait(60) == DONE
     assert re.search(r'\D[1-8]\d%.* \d+/11 bags, \d\S*k setpoints, \S+/s, 00:\d\d left',
                      seen.decode())
 
 
-# How it is ended
+# Interrupts
 
 def program(bags: Path, output: Path, *options: str) -> subprocess.Popen[str]:
     """Start the program as the head of a group of processes, as a shell does."""
@@ -444,7 +444,7 @@ def group_is_gone(leader: int) -> bool:
 
 
 @pytest.mark.parametrize('where', ['here', 'processes', 'cluster'])
-def test_an_interrupt_leaves_nothing_half_done(
+def test_an_interrupt_leaves_no_partial_results(
         huge: Path, tmp_path: Path, where: str, cluster: LocalCluster) -> None:
     output = tmp_path / 'out'
     options = {'here': (), 'processes': ('--jobs', '2'),
@@ -461,7 +461,7 @@ def test_an_interrupt_leaves_nothing_half_done(
     assert not (output / 'fleet.csv').exists()
     assert not (output / 'index.html').exists()
     until(lambda: group_is_gone(running.pid), 'the end of its processes')
-    # those that were finished are whole
+    # finished results are complete
     for folder in (path.parent for path in output.rglob('summary.json')):
         check_whole(folder, huge / folder.relative_to(output))
 
@@ -479,7 +479,7 @@ def test_processes_end_with_the_one_that_started_them(huge: Path, tmp_path: Path
 
 # On a cluster
 
-def test_a_cluster_gives_what_this_machine_gives(
+def test_a_cluster_gives_the_results_of_this_computer(
         bags: Path, tmp_path: Path, cluster: LocalCluster,
         monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     heave(bags / 'wrong', 3)
@@ -494,7 +494,7 @@ def test_a_cluster_gives_what_this_machine_gives(
     assert [(each.bag, each.folder) for each in fleet.ended] == pairs
     assert [each.row for each in fleet.ended][:-1] == [each.row for each in own.ended][:-1]
     assert list(rows(there)) == list(rows(here))
-    # but that workers say in full where a bag is
+    # except that workers write absolute paths
     assert fleet.ended[-1].error == f'{tmp_path}/{own.ended[-1].error}'
     for folder in (folder for bag, folder in pairs if bag.name != 'wrong'):
         ours = here / folder.relative_to(there)
@@ -505,7 +505,7 @@ def test_a_cluster_gives_what_this_machine_gives(
     assert '100%' in capfd.readouterr().err
 
 
-def test_every_bag_is_done_once_though_a_worker_is_killed(
+def test_every_bag_is_replayed_once_when_a_worker_is_killed(
         bags: Path, tmp_path: Path, cluster: LocalCluster) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
@@ -518,16 +518,16 @@ def test_every_bag_is_done_once_though_a_worker_is_killed(
         os.kill(pid, signal.SIGKILL)
         left = hidden(output)
         fleet = running.result()
-    # It left a part behind, and somebody else did the whole.
+    # Its partial results are left, and another worker has replayed the bag.
     assert any(path.name.startswith('.long.') for path in left)
     check_each_once(fleet, pairs, output)
 
 
-def test_a_bag_that_kills_its_workers_takes_no_other_along(
+def test_a_bag_that_kills_its_workers_does_not_affect_others(
         bags: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
-    # One death is enough for Dask to give up all bags that wait for the same worker.
+    # With one death Dask fails all bags that wait for the same worker.
     with dask.config.set({'distributed.scheduler.allowed-failures': 0,
                           'distributed.scheduler.worker-saturation': 3.0}), LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address='127.0.0.1:0',
@@ -551,7 +551,7 @@ def test_a_bag_that_kills_its_workers_takes_no_other_along(
         check_whole(folder, bag)
 
 
-def test_a_cluster_that_is_lost_is_said_of_each_bag(
+def test_a_lost_cluster_is_reported_for_each_bag(
         huge: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     script = tmp_path / 'cluster.py'
     script.write_text(
@@ -596,7 +596,7 @@ def test_a_cluster_that_is_not_there_is_an_error(
     assert list(output.iterdir()) == []
 
 
-def test_dask_is_asked_for_only_where_it_is_needed(bags: Path, tmp_path: Path) -> None:
+def test_dask_is_imported_only_for_a_cluster(bags: Path, tmp_path: Path) -> None:
     (tmp_path / 'sitecustomize.py').write_text(
         "import sys\nsys.modules['distributed'] = sys.modules['dask'] = None\n")
     arguments = [sys.executable, '-m', 'stewart_dynamics.replay', f'{bags / "short"}',
@@ -612,7 +612,7 @@ def test_dask_is_asked_for_only_where_it_is_needed(bags: Path, tmp_path: Path) -
         assert re.match(said, ended.stderr)
 
 
-def test_what_goes_to_other_processes_can_go_there() -> None:
+def test_tasks_and_outcomes_can_be_pickled() -> None:
     fleet = Fleet(())
     for each in (PLAIN, Options(topics={'pose': '/p'}), fleet):
         assert pickle.loads(pickle.dumps(each)) == each

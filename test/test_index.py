@@ -86,7 +86,7 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'error': '', 'results': 'deep/a'}]
 
 
-def test_a_bag_without_answers_is_not_partly_read(tmp_path: Path) -> None:
+def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
     unanswered = summary([None] * 6, setpoints={'answered': 0, 'duration_s': 0.0})
     write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
                            row('b', 3, summary([1.0]), 'cut off')])
@@ -103,7 +103,7 @@ def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
         'bag': 'bad', 'code': '2', 'result': 'failed', 'error': 'why'}
 
 
-def test_no_cell_is_taken_for_a_formula_nor_falls_apart(tmp_path: Path) -> None:
+def test_no_cell_is_a_formula_or_is_split(tmp_path: Path) -> None:
     write_fleet(tmp_path, [row(name, 2, None, name) for name in HOSTILE])
     rows = table(tmp_path)
     assert len(rows) == len(HOSTILE)
@@ -133,16 +133,16 @@ def test_files_are_replaced_whole(tmp_path: Path) -> None:
 # index.html
 
 class Page:
-    """The page in a browser; what it complained of is kept."""
+    """The page in a browser, with its errors."""
 
     def __init__(self, page: Any) -> None:
         self.page = page
-        self.complaints: list[str] = []
+        self.errors: list[str] = []
         self.requests: list[str] = []
-        page.on('console', lambda message: self.complaints.append(message.text))
-        page.on('pageerror', lambda error: self.complaints.append(f'{error}'))
+        page.on('console', lambda message: self.errors.append(message.text))
+        page.on('pageerror', lambda error: self.errors.append(f'{error}'))
         page.on('request', lambda request: self.requests.append(request.url))
-        page.on('dialog', lambda dialog: (self.complaints.append(dialog.message),
+        page.on('dialog', lambda dialog: (self.errors.append(dialog.message),
                                           dialog.dismiss()))
 
     def show(self, folder: Path, rows: list[dict[str, Any]]) -> None:
@@ -177,12 +177,12 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def page(browser: Any) -> Iterator[Page]:
-    """Return a page that must not have complained, nor asked for anything but itself."""
+    """Return a page that must have no errors and load nothing but itself."""
     context = browser.new_context(viewport={'width': 1500, 'height': 800})
     made = Page(context.new_page())
     yield made
     context.close()
-    assert made.complaints == []
+    assert made.errors == []
     assert {url.rpartition('/')[2] for url in made.requests} <= {'index.html', 'report.html'}
 
 
@@ -213,10 +213,10 @@ def test_a_click_on_a_head_sorts(page: Page, tmp_path: Path) -> None:
     page.sort('force_margin_n')
     assert page.column('bag') == ['e', 'a10', 'C', 'b', 'd', 'a9']
     assert page.column('force_margin_n')[0] == '−900.00'
-    # names as a person sorts them
+    # numbers in names in their order
     page.sort('bag')
     assert page.column('bag') == ['a9', 'a10', 'b', 'C', 'd', 'e']
-    # results by how grave they are; what is alike stays in the order of the table
+    # results by severity; equal ones in the order of the table
     page.sort('result')
     page.sort('result')
     assert page.column('bag') == ['a9', 'C', 'a10', 'e', 'b', 'd']
@@ -224,7 +224,7 @@ def test_a_click_on_a_head_sorts(page: Page, tmp_path: Path) -> None:
 
 
 @in_browser
-def test_what_is_wrong_is_plain_to_see(page: Page, tmp_path: Path) -> None:
+def test_failed_bags_and_exceeded_limits_are_highlighted(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, six())
 
     def color(selector: str) -> list[int]:
@@ -236,12 +236,12 @@ def test_what_is_wrong_is_plain_to_see(page: Page, tmp_path: Path) -> None:
                      'tr:nth-child(6) td.bad'):
         red, green, blue = color(f'tbody {selector}')
         assert red > 2 * max(green, blue), selector
-    # a failed bag's words are beside its name, not beyond the numbers that it has not
+    # the error of a failed bag is beside its name, in place of its numbers
     assert page.page.inner_text('tbody tr:nth-child(3) td:nth-child(3)') == 'some words'
 
 
 @in_browser
-def test_rows_are_chosen_by_result_and_by_text(page: Page, tmp_path: Path) -> None:
+def test_rows_are_filtered_by_result_and_by_text(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, six())
     buttons = page.page.locator('nav button')
     assert buttons.all_inner_texts() == ['all 6', 'done 2', 'limit met 2', 'partly read 1',
@@ -275,7 +275,7 @@ def test_hostile_names_are_text(page: Page, tmp_path: Path) -> None:
 
 
 @in_browser
-def test_links_lead_to_reports(page: Page, tmp_path: Path) -> None:
+def test_rows_link_to_reports(page: Page, tmp_path: Path) -> None:
     names = [name.replace('/', '_') for name in HOSTILE] + ['deep/er/x']
     for name in names:
         (tmp_path / name).mkdir(parents=True)
@@ -289,7 +289,7 @@ def test_links_lead_to_reports(page: Page, tmp_path: Path) -> None:
 
 
 @in_browser
-def test_a_bag_without_a_report_leads_to_its_folder(page: Page, tmp_path: Path) -> None:
+def test_a_row_without_a_report_links_to_its_folder(page: Page, tmp_path: Path) -> None:
     (tmp_path / 'x').mkdir()
     page.show(tmp_path, [row('x', 0, summary([1.0]), results='x')])
     link = page.page.eval_on_selector('tbody a', 'link => link.href')
@@ -299,7 +299,7 @@ def test_a_bag_without_a_report_leads_to_its_folder(page: Page, tmp_path: Path) 
 @in_browser
 def test_thousands_of_bags(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, [row(f'{n}', 0, summary([float(n % 997)])) for n in range(1500)])
-    # a page that stays small, and a browser that is not asked for all rows at once
+    # the page is small, and the rows are not drawn all at once
     assert (tmp_path / 'index.html').stat().st_size < 300_000
     assert 50 < len(page.column('bag')) < 500
     page.page.fill('#filter', '1499')

@@ -27,14 +27,14 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from test_cdr import same, SECOND, sixes, stamps, texts
-from test_efforts import joined, joint_state, JOINTS
+from test_recorded_efforts import joined, joint_state, JOINTS
 
 from stewart_dynamics.messages.cdr import MALFORMED, MalformedError
 from stewart_dynamics.messages.joint_state import (
     FIELDS, JointStateError, JointStateReader, JointStateWriter)
 
-
 # Writing
+
 
 def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
     """Return the fields of a JointState's bytes, and nothing of what stands between them."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Measured leg forces against computed ones: known loads, clocks out of line."""
+"""Measured leg forces against computed ones: known loads, stamps out of order."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TIMEOUT = 0.1
 
 
 class Case(NamedTuple):
-    """A machine in a motion, and what the step gives for it."""
+    """A hexapod in a motion, and the outputs of the step."""
 
     parameters: Parameters
     motion: Motion
@@ -49,7 +49,7 @@ class Case(NamedTuple):
     outputs: Outputs
 
     def forces(self, wrench: Any = None, parameters: Parameters | None = None) -> Array:
-        """Return the leg forces of the motion under a load, of this machine or another."""
+        """Return the leg forces of the motion under a load, of this hexapod or another."""
         forces: Array = StewartPlatform(parameters or self.parameters).inverse_dynamics(
             self.motion, wrench).forces
         return forces
@@ -67,7 +67,7 @@ class Case(NamedTuple):
 
 def case_of(seed: int = 0, many: int = 500, step: float = 0.01,
             stamps: Sequence[int] | None = None) -> Case:
-    """Return a random machine that moves about its middle."""
+    """Return a random hexapod that moves about its home pose."""
     random = rng(seed)
     parameters = random_parameters(random)
     size = size_of(parameters)
@@ -104,7 +104,7 @@ def compared(comparison: Comparison, *given: Any) -> list[Array]:
 # The residual and the external wrench
 
 @pytest.mark.parametrize('seed', range(4))
-def test_the_external_wrench_is_the_load_that_the_model_does_not_know(seed: int) -> None:
+def test_the_external_wrench_is_the_load_missing_in_the_model(seed: int) -> None:
     case = case_of(seed)
     load = rng(seed).uniform(-300.0, 300.0, (500, 6))
     forces = case.forces(load)
@@ -150,7 +150,7 @@ def test_the_external_wrench_is_the_load_that_the_model_does_not_know(seed: int)
     assert 'NaN' not in json.dumps(values)
 
 
-def test_a_load_that_the_model_knows_leaves_no_residual() -> None:
+def test_a_load_in_the_model_leaves_no_residual() -> None:
     case = case_of()
     load = rng().uniform(-300.0, 300.0, (500, 6))
     batch = case.setpoints
@@ -183,7 +183,7 @@ def test_a_contact_may_last_for_nearly_half_of_the_bag() -> None:
     assert all(leg['viscous_friction_n_s_m'] is None for leg in values['legs'].values())
 
 
-def test_the_friction_that_is_missing_is_found() -> None:
+def test_missing_friction_is_found() -> None:
     case = case_of()
     given = case.parameters
     more = given.replaced({
@@ -201,7 +201,7 @@ def test_the_friction_that_is_missing_is_found() -> None:
         assert leg['friction_share'] == pytest.approx(1.0, abs=1e-9)
 
 
-def test_a_payload_that_is_missing_is_found() -> None:
+def test_a_missing_payload_is_found() -> None:
     case = case_of()
     given = case.parameters
     # about the platform's origin: the mass there, the center of mass and inertia made up for it
@@ -298,7 +298,7 @@ def test_the_strongest_hundred_contacts_are_listed_in_order_of_time() -> None:
 
 # Time
 
-def test_between_two_samples_forces_are_interpolated_and_never_beyond_them() -> None:
+def test_forces_are_interpolated_between_samples_and_never_extrapolated() -> None:
     case = case_of(many=100)
     stamps = case.setpoints.stamps
     slope, level = rng().normal(size=(2, 6))
@@ -320,7 +320,7 @@ def test_between_two_samples_forces_are_interpolated_and_never_beyond_them() -> 
     assert np.array_equal(seconds, case.seconds[[*range(10, 21), 50]])
 
 
-def test_where_forces_cannot_be_computed_nothing_is_compared() -> None:
+def test_setpoints_without_computed_forces_are_not_compared() -> None:
     case = case_of()
     case.outputs.demanded_forces[7:11] = np.nan
     comparison = Comparison(case.parameters)
@@ -347,7 +347,7 @@ def test_nothing_compared_gives_null() -> None:
     assert values['contacts']['count'] == 0
 
 
-def test_standing_still_tells_no_friction() -> None:
+def test_standing_still_gives_no_friction() -> None:
     case = case_of(many=1)
     still = Motion(case.motion.position, case.motion.rotation)
     rows = np.repeat(still.rows, 50, axis=0)
@@ -387,7 +387,7 @@ def test_a_pass_is_compared_with_the_samples_of_the_same_pass() -> None:
         assert comparison.values()['samples_jumped_back'] == 2
 
 
-def test_samples_without_the_setpoints_jump_are_not_taken_for_another_pass() -> None:
+def test_measured_samples_without_a_jump_begin_no_pass() -> None:
     case = case_of(many=80, stamps=looping(40, 2))
     efforts = np.ones((40, 6))
     comparison = Comparison(case.parameters)
@@ -396,7 +396,7 @@ def test_samples_without_the_setpoints_jump_are_not_taken_for_another_pass() -> 
     assert comparison.values()['setpoints_not_compared']['without_measurement'] == 40
 
 
-def test_single_samples_out_of_line_are_left_out() -> None:
+def test_single_samples_out_of_order_are_left_out() -> None:
     case = case_of(many=100)
     stamps, efforts = case.setpoints.stamps.copy(), rng().normal(size=(100, 6))
     whole = compared(Comparison(case.parameters), case, (stamps, efforts))
@@ -462,7 +462,7 @@ def test_cuts_and_turns_change_nothing(
     assert again.values()['setpoints_not_compared'] == once.values()['setpoints_not_compared']
 
 
-def test_what_waits_in_vain_is_given_up_and_counted() -> None:
+def test_unmatched_samples_are_dropped_and_counted() -> None:
     case = case_of(many=5000)
     comparison = Comparison(case.parameters)
     far = 0

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a replay writes, as independent readers see it: the output bag and the tables."""
+"""The output bag and the tables of a replay, as read by other programs."""
 
 from __future__ import annotations
 
@@ -369,7 +369,7 @@ def test_numbers_at_the_edges(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
-def test_names_of_legs_come_back_whatever_they_are(table: Any, tmp_path: Path) -> None:
+def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
     legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
     writer = table(tmp_path, legs)
     writer.write(turning(2))

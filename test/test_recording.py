@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Bags as recorders, crashes and bad disks leave them: what is read of each, and what is said."""
+"""Bags of all kinds, whole and damaged: what is read of each, and what is reported."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def shifted(content: bytes, chance: random.Random) -> bytes:
 
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('spoil', [cut, flipped, zeroed, shifted])
-def test_a_damaged_bag_gives_nothing_wrong_and_never_silently_less(
+def test_a_damaged_bag_gives_no_wrong_messages_and_reports_missing_ones(
         spoil: Callable[[bytes, random.Random], bytes], kind: str, tmp_path: Path) -> None:
     given_ = motion(60)
     content = mcap(given_, **KINDS[kind])
@@ -268,7 +268,7 @@ def test_the_rows_of_a_damaged_bag_are_rows_of_the_whole_one(
 
 
 @pytest.mark.parametrize('kind', ['plain', 'without a summary'])
-def test_no_bit_of_the_chain_of_records_can_mislead(kind: str, tmp_path: Path) -> None:
+def test_a_flipped_bit_in_the_records_gives_no_wrong_messages(kind: str, tmp_path: Path) -> None:
     given_ = motion(16)
     content = mcap(given_, chunk_size=1000, **KINDS[kind])
     file = tmp_path / 'bag.mcap'
@@ -297,7 +297,7 @@ def test_a_bag_cut_by_twenty_bytes_is_read_to_its_end(kind: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_a_damage_costs_its_chunk_or_what_follows_without_an_index(
+def test_a_damaged_chunk_is_lost_and_without_an_index_all_after_it(
         kind: str, tmp_path: Path) -> None:
     given_ = motion(60)
     content = mcap(given_, **KINDS[kind])
@@ -349,18 +349,18 @@ def test_a_topic_that_two_records_declare_differently_is_not_used(tmp_path: Path
     assert [topic for topic, _, _ in read(file).messages] == ['/c']
 
 
-def test_messages_of_a_topic_that_nothing_declares_are_missing(tmp_path: Path) -> None:
+def test_messages_on_an_undeclared_channel_are_missing(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'),
                              chunk(message(2, 5) + message(3, 6), 5), chunk(message(3, 7), 7)))
     found = read(file)
     assert [(topic, when) for topic, when, _ in found.messages] == [('/a', 5)]
-    assert found.missing == ['bag.mcap: messages of a topic that no whole record declares']
+    assert found.missing == ['bag.mcap: messages on a channel that no valid record declares']
 
 
 # Files as recorders write them
 
-def test_unchunked_bags_are_read_and_said_to_have_no_checksums(tmp_path: Path) -> None:
+def test_unchunked_bags_are_read_with_a_notice(tmp_path: Path) -> None:
     given_ = motion(30)
     file = tmp_path / 'bag.mcap'
     for options in ({}, WITHOUT_INDEX):  # the latter is rosbag2's preset fastwrite
@@ -407,7 +407,7 @@ def test_messages_among_chunks_need_a_checksum(tmp_path: Path) -> None:
         assert word in found.missing[0]
 
 
-def test_chunks_without_checksums_are_said_to_have_none(tmp_path: Path) -> None:
+def test_chunks_without_checksums_are_read_with_a_notice(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'),
                              chunk(message(2, 5), 5, checksum=0)))
@@ -416,7 +416,7 @@ def test_chunks_without_checksums_are_said_to_have_none(tmp_path: Path) -> None:
     assert 'no checksums' in found.notices[0]
 
 
-def test_attachments_and_metadata_stand_between_without_harm(tmp_path: Path) -> None:
+def test_attachments_and_metadata_between_chunks_are_skipped(tmp_path: Path) -> None:
     given_ = motion(20)
     stream = BytesIO()
     writer = McapWriter(stream, chunk_size=500, compression=CompressionType.NONE)
@@ -461,7 +461,7 @@ def test_two_channels_of_a_topic_are_one(tmp_path: Path) -> None:
     assert [when for _, when, _ in read(file).messages] == [1, 1, 2]
 
 
-def test_times_that_no_clock_shows(tmp_path: Path) -> None:
+def test_times_out_of_range(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     times = [0, (1 << 63) - 1, 1 << 63, (1 << 64) - 1]
     file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(1, '/a'), *(
@@ -507,7 +507,7 @@ def test_messages_come_in_the_order_in_which_rosbags_has_them(
     assert read(file).messages == sorted(written, key=lambda each: each[1])
 
 
-def test_topics_that_stand_one_behind_the_other_are_read_together(tmp_path: Path) -> None:
+def test_topics_recorded_one_after_the_other_are_merged(tmp_path: Path) -> None:
     given_ = motion(3000)
     file = tmp_path / 'bag.mcap'
     by_topic = sorted(given_, key=lambda each: each[0])
@@ -531,7 +531,7 @@ def peak_of(file: Path, *topics: str) -> int:
         tracemalloc.stop()
 
 
-def test_large_messages_between_do_not_stay_in_memory(tmp_path: Path) -> None:
+def test_large_messages_of_other_topics_are_not_kept_in_memory(tmp_path: Path) -> None:
     given_ = [('/image', RECORDED + 10 * MS * n + 5, bytes(2_000_000)) for n in range(1, 31)]
     file = tmp_path / 'bag.mcap'
     ordered = sorted([*motion(30), *given_], key=lambda each: each[1])
@@ -540,7 +540,7 @@ def test_large_messages_between_do_not_stay_in_memory(tmp_path: Path) -> None:
         assert peak_of(file, *TYPES) < 12_000_000
 
 
-def test_long_bags_do_not_stay_in_memory(tmp_path: Path) -> None:
+def test_long_bags_are_not_kept_in_memory(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     peaks = []
     for number in (40_000, 160_000):
@@ -562,7 +562,7 @@ def test_attachments_are_not_read_into_memory(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('compression', ['', 'lz4', 'zstd'])
-def test_what_a_chunk_says_of_its_size_is_not_believed(
+def test_a_chunk_with_a_wrong_size_is_not_decompressed(
         compression: str, tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
     frame = zstandard.ZstdCompressor().compress(bytes(50_000_000))
@@ -576,7 +576,7 @@ def test_what_a_chunk_says_of_its_size_is_not_believed(
         assert peak_of(file) < 10_000_000
 
 
-def test_messages_that_become_large_do_not_fill_the_memory(tmp_path: Path) -> None:
+def test_large_compressed_messages_do_not_fill_the_memory(tmp_path: Path) -> None:
     zeros = zstandard.ZstdCompressor().compress(bytes(1 << 24))
     small = zstandard.ZstdCompressor().compress(bytes(1 << 20))
     file = tmp_path / 'bag.mcap'
@@ -607,7 +607,7 @@ def test_a_chunk_that_is_too_large_is_missing(compression: str, tmp_path: Path) 
     assert peak_of(file) < 10_000_000
 
 
-def test_a_compressed_file_is_not_unpacked_without_a_bound(
+def test_a_compressed_file_is_unpacked_up_to_a_limit(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
     packer = zstandard.ZstdCompressor().compressobj()
@@ -630,7 +630,7 @@ def test_a_compressed_file_is_not_unpacked_without_a_bound(
 @given(st.binary(max_size=300), st.sampled_from([MAGIC, b'SQLite format 3\0', b'']),
        st.sampled_from(['.mcap', '.db3', '.mcap.zstd']))
 @settings(deadline=None, max_examples=300)
-def test_no_bytes_make_it_crash(
+def test_random_bytes_never_raise(
         tmp_path_factory: pytest.TempPathFactory, content: bytes, begin: bytes, suffix: str,
         ) -> None:
     file = tmp_path_factory.mktemp('bytes') / f'bag{suffix}'
@@ -658,7 +658,7 @@ RECORDS = st.one_of(
     lambda of, start, name: chunk(b''.join(of), start, compression=name),
     st.lists(RECORDS, max_size=6), st.integers(0, 9), st.sampled_from(['', '', '', 'lz4'])))))
 @settings(deadline=None, max_examples=300)
-def test_no_records_make_it_crash(
+def test_random_records_never_raise(
         tmp_path_factory: pytest.TempPathFactory, of: list[bytes]) -> None:
     file = tmp_path_factory.mktemp('records') / 'bag.mcap'
     file.write_bytes(file_of(*of))
@@ -702,7 +702,7 @@ def test_sqlite3_is_read_in_the_order_of_time(tmp_path: Path) -> None:
     assert len(list(bag.iterdir())) == 2
 
 
-def test_damaged_sqlite3_is_never_a_crash(tmp_path: Path) -> None:
+def test_damaged_sqlite3_never_raises(tmp_path: Path) -> None:
     given_ = motion(60)
     file = storage(write_bag(tmp_path / 'bag', given_))
     content = file.read_bytes()
@@ -717,7 +717,7 @@ def test_damaged_sqlite3_is_never_a_crash(tmp_path: Path) -> None:
             assert all('\n' not in said for said in found.missing)
 
 
-def test_sqlite3_that_has_lost_rows_says_so(tmp_path: Path) -> None:
+def test_lost_rows_of_sqlite3_are_reported(tmp_path: Path) -> None:
     given_ = motion(400)
     file = storage(write_bag(tmp_path / 'bag', given_))
     content = file.read_bytes()
@@ -739,7 +739,7 @@ def test_sqlite3_that_has_lost_rows_says_so(tmp_path: Path) -> None:
     assert rejected > 10
 
 
-def test_rows_that_are_no_messages_are_missing(tmp_path: Path) -> None:
+def test_rows_that_are_not_messages_are_missing(tmp_path: Path) -> None:
     given_ = motion(2)
     file = storage(write_bag(tmp_path / 'bag', given_))
     with sqlite3.connect(file) as database:
@@ -755,7 +755,7 @@ def test_rows_that_are_no_messages_are_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('suffix', ['-wal', '-journal'])
-def test_what_a_killed_recorder_left_beside_sqlite3_is_said(suffix: str, tmp_path: Path) -> None:
+def test_the_journal_of_a_killed_recorder_is_reported(suffix: str, tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(2))
     journal = bag / f'{storage(bag).name}{suffix}'
     journal.write_bytes(b'')
@@ -807,7 +807,7 @@ def test_bags_of_ros_1_are_converted(
     assert read(files[0], '/none').messages == []
 
 
-def test_damaged_bags_of_ros_1_are_never_a_crash(tmp_path: Path) -> None:
+def test_damaged_bags_of_ros_1_never_raise(tmp_path: Path) -> None:
     given_ = motion(60)
     file = write_ros_1(tmp_path / 'bag.bag', given_, Writer1.CompressionFormat.LZ4)
     content = file.read_bytes()
@@ -860,17 +860,18 @@ def test_a_bag_of_several_files_is_read_in_their_order(tmp_path: Path) -> None:
     (bag / 'metadata.yaml').unlink()
     found = read(bag)
     assert found[:2] == (given_, [])
-    assert found.notices == ['its metadata.yaml is missing or damaged: read by its files']
+    assert found.notices == [
+        'metadata.yaml is missing or damaged: the files in the folder are read']
 
 
-def test_old_recorders_put_the_name_of_the_folder_before(tmp_path: Path) -> None:
+def test_paths_of_old_recorders_begin_with_the_folder(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 2, lambda n: f'bag_{n}.mcap')
     listed(bag, ['bag/bag_0.mcap', '/home/robot/bag/bag_1.mcap', 'bag_1.mcap'])
     assert read(bag) == (given_, [], [])
 
 
-def test_a_file_that_is_listed_and_is_not_there_is_missing(tmp_path: Path) -> None:
+def test_a_listed_file_that_does_not_exist_is_missing(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     given_ = split_bag(bag, 3, lambda n: f'bag_{n}.mcap')
     (bag / 'bag_1.mcap').unlink()
@@ -930,7 +931,7 @@ def test_no_file_outside_of_the_folder_is_read(tmp_path: Path) -> None:
     assert read(tmp_path / 'named').messages == given_
 
 
-def test_what_is_no_file(tmp_path: Path) -> None:
+def test_paths_that_are_not_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / 'pipe.mcap')
     (tmp_path / 'circle').symlink_to(tmp_path / 'circle')
     for path in (tmp_path / 'pipe.mcap', tmp_path / 'circle', tmp_path / 'none', tmp_path,

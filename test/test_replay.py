@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The replay: its bags and tables as other readers see them, and every way in which it ends."""
+"""The replay: bags and tables as read by other programs, and every exit code."""
 
 from __future__ import annotations
 
@@ -294,9 +294,9 @@ def test_the_warning_is_written_at_every_change(replayed: dict[str, Outputs]) ->
 # The flawed bag
 
 def expected_of(name: str) -> tuple[list[int], Counter[tuple[str, str]]]:
-    """Return stamps answered and refusals, by the rules of bad input written down anew."""
+    """Return stamps answered and rejections, by an independent form of the rules of bad input."""
     sound: dict[str, list[int]] = {topic: [] for topic in TOPICS}
-    refused: Counter[tuple[str, str]] = Counter()
+    expected: Counter[tuple[str, str]] = Counter()
     answered: list[int] = []
     for topic, _, data in recorded(bag_file(name)):
         message = STORE.deserialize_cdr(data, INPUT_TYPES[topic])
@@ -305,36 +305,36 @@ def expected_of(name: str) -> tuple[list[int], Counter[tuple[str, str]]]:
                    for axis in 'xyzw' if hasattr(v, axis)]
         stamp = nanoseconds(message)
         if not np.all(np.isfinite(numbers)):
-            refused[topic, NOT_FINITE] += 1
+            expected[topic, NOT_FINITE] += 1
         elif answered and stamp < answered[-1]:
-            refused[topic, TOO_OLD] += 1
+            expected[topic, TOO_OLD] += 1
         elif stamp in sound[topic]:
-            refused[topic, TWICE] += 1
+            expected[topic, TWICE] += 1
         else:
             sound[topic].append(stamp)
             if all(stamp in sound[other] for other in TOPICS):
                 answered.append(stamp)
     for topic in TOPICS:
-        refused[topic, NOT_JOINED] = len(set(sound[topic]) - set(answered))
-    return answered, +refused
+        expected[topic, NOT_JOINED] = len(set(sound[topic]) - set(answered))
+    return answered, +expected
 
 
-def refusals(result: Replayed) -> dict[tuple[str, str], int]:
+def rejections(result: Replayed) -> dict[tuple[str, str], int]:
     return {(each['topic'], each['reason']): each['count']
             for each in result.summary['rejected']}
 
 
 def test_the_flaws_are_counted_as_they_are_in_the_bag(tmp_path: Path) -> None:
     result = replay(ROOT / 'bags' / 'flawed', PARAMETERS, tmp_path / 'flawed')
-    answered, refused = expected_of('flawed')
-    assert refusals(result) == refused
+    answered, expected = expected_of('flawed')
+    assert rejections(result) == expected
     assert [int(row['stamp (ns)']) for row in outputs_of(tmp_path / 'flawed').rows] == answered
     # every message of the bag is in a setpoint or in a count
     held = Counter(topic for topic, _, _ in recorded(bag_file('flawed')))
     for topic in TOPICS:
         assert held[topic] == len(answered) + sum(
-            n for (of, _), n in refusals(result).items() if of == topic)
-    reasons = {reason for _, reason in refusals(result)}
+            n for (of, _), n in rejections(result).items() if of == topic)
+    reasons = {reason for _, reason in rejections(result)}
     assert reasons == {NOT_FINITE, TOO_OLD, TWICE, NOT_JOINED}
 
 
@@ -352,10 +352,10 @@ def test_the_flawed_bag_gives_the_numbers_of_the_whole_one(
     assert all(clear[when + offset] == row for when, row in flawed.items())
 
 
-def test_what_a_bag_leaves_waiting_is_counted(tmp_path: Path) -> None:
+def test_setpoints_incomplete_at_the_end_are_counted(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(10)[:-2] + [(POSE, RECORDED + SECOND, b'\0\1')])
     result = replay(bag, PARAMETERS, tmp_path / 'out')
-    assert refusals(result) == {(POSE, NOT_JOINED): 1, (POSE, MALFORMED): 1}
+    assert rejections(result) == {(POSE, NOT_JOINED): 1, (POSE, MALFORMED): 1}
     assert result.summary['setpoints']['answered'] == 9
 
 
@@ -412,36 +412,36 @@ def test_a_bag_of_poses_is_quasi_static(
     rows = outputs_of(tmp_path / 'out' / 'poses').rows
     assert [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']]
             for row in rows] == still.forces.tolist()
-    # what poses cannot tell is not known, and not zero
+    # values that depend on velocities are not known, and not zero
     assert {row[f'{leg} rate (m/s)'] for row in rows for leg in PARAMETERS['joints']} == {''}
     assert {row['d(det(J))/dt (m^3/s)'] for row in rows} == {''}
     capsys.readouterr()
     for options, code in (((), LIMIT_MET), (('--differentiate', '--cutoff', '5'), DONE)):
         assert main([str(bag), '--params', str(params), '--output', str(tmp_path / f'{code}'),
                      '--strict', '--no-report', *options]) == code
-        said = capsys.readouterr().out
-        assert ('limits.velocity_max could not be checked' in said) is (code == LIMIT_MET)
-        assert ('all limits held' in said) is (code == DONE)
+        text = capsys.readouterr().out
+        assert ('limits.velocity_max could not be checked' in text) is (code == LIMIT_MET)
+        assert ('all limits held' in text) is (code == DONE)
 
 
-def test_names_of_a_bag_do_not_control_the_terminal(
+def test_control_characters_in_names_are_escaped(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     hostile = '/a\x1b[2J\rb'
     bag = write_bag(tmp_path / 'bag', [*motion(3), (hostile, RECORDED, messages.wrench(0))],
                     **{hostile[1:]: INPUT_TYPES[WRENCH]})
     assert run(bag, tmp_path / 'out', '--no-report') == DONE
-    said = capsys.readouterr().out
-    assert '/a\\x1b[2J\\rb' in said
-    assert not set(said) & {'\x1b', '\r'}
+    text = capsys.readouterr().out
+    assert '/a\\x1b[2J\\rb' in text
+    assert not set(text) & {'\x1b', '\r'}
 
 
 @pytest.mark.parametrize('name', ['', '/', 'a b', '1st', 'a//b'])
-def test_a_name_that_no_node_can_have_is_rejected(
+def test_an_invalid_node_name_is_rejected(
         name: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), '--node', name])
     assert caught.value.code == BAD_INPUT
-    assert 'not a name of a node' in capsys.readouterr().err
+    assert 'not a valid node name' in capsys.readouterr().err
 
 
 def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
@@ -460,7 +460,7 @@ def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
         RECORDED + n * 10 * MS + 2 for n in range(1, 31)]
 
 
-def test_a_bag_without_metadata_is_read_by_its_file(
+def test_a_bag_without_metadata_is_read_by_its_files(
         tmp_path: Path, replayed: dict[str, Outputs]) -> None:
     shutil.copy(bag_file('clear'), tmp_path / 'alone.mcap')
     assert run(tmp_path / 'alone.mcap', tmp_path / 'out') == DONE
@@ -476,7 +476,7 @@ def test_setpoints_without_stamps_are_stamped_as_they_were_recorded(tmp_path: Pa
         RECORDED + n * 10 * MS for n in range(5)]
 
 
-def test_a_time_that_no_stamp_can_hold_is_counted(
+def test_a_time_out_of_range_of_a_stamp_is_counted(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     late = 2 ** 31 * SECOND
     bag = write_bag(tmp_path / 'bag', [
@@ -487,7 +487,7 @@ def test_a_time_that_no_stamp_can_hold_is_counted(
     assert len(outputs_of(tmp_path / 'out' / 'bag').rows) == 1
 
 
-def test_a_bag_that_loops_is_followed_and_said(
+def test_a_bag_that_loops_is_followed_with_a_notice(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lap = motion(50)
     bag = write_bag(tmp_path / 'bag', lap + [(t, when + SECOND, d) for t, when, d in lap])
@@ -508,10 +508,10 @@ def test_other_topics_do_not_matter(tmp_path: Path) -> None:
 
 
 def test_another_name_of_the_node(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/machine')
-    assert run(bag, tmp_path / 'out', '--node', 'cell/machine') == DONE
+    bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
+    assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
-        f'/cell/machine/{topic}' for topic in OUTPUT_TYPES}
+        f'/cell/hexapod/{topic}' for topic in OUTPUT_TYPES}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
@@ -529,11 +529,11 @@ def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
 
 # Exit codes
 
-def test_nothing_that_can_be_answered_is_said(
+def test_a_bag_without_answers_is_reported(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cut = [(topic, when, data[:-1]) for topic, when, data in motion(3)]
     bag = write_bag(tmp_path / 'bag', cut)
-    # nothing was checked: that must not pass for good
+    # nothing was checked: that must not pass as done
     assert run(bag, tmp_path / 'out') == PARTLY_READ
     printed = capsys.readouterr().out
     assert 'no setpoint could be answered' in printed
@@ -545,7 +545,7 @@ def test_nothing_that_can_be_answered_is_said(
 @pytest.mark.parametrize(('name', 'options', 'code'), [
     ('clear', (), DONE), ('clear', ('--strict',), DONE), ('singular', (), DONE),
     ('singular', ('--strict',), LIMIT_MET)])
-def test_strict_is_for_limits_and_warnings(
+def test_strict_exits_with_1_at_limits_and_warnings(
         name: str, options: tuple[str, ...], code: int, tmp_path: Path,
         capsys: pytest.CaptureFixture[str]) -> None:
     assert run(ROOT / 'bags' / name, tmp_path, *options) == code
@@ -556,7 +556,7 @@ def test_strict_is_for_limits_and_warnings(
     assert (tmp_path / name / 'legs.csv').exists()
 
 
-def test_strict_minds_a_limit_without_a_warning(tmp_path: Path) -> None:
+def test_strict_exits_with_1_at_a_limit_without_a_warning(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(3))
     params = tmp_path / 'platform.yaml'
     params.write_text(PARAMS.read_text(encoding='utf-8').replace(
@@ -567,8 +567,8 @@ def test_strict_minds_a_limit_without_a_warning(tmp_path: Path) -> None:
         assert {abs(float(row[f'{leg} force (N)'])) for leg in PARAMETERS['joints']} == {100.0}
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """Return the one line that is said of bad arguments; the code is 2, stdout empty."""
+def rejected(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Return the one line printed for bad arguments; the code is 2, stdout empty."""
     assert main([str(argument) for argument in arguments]) == BAD_INPUT
     printed = capsys.readouterr()
     assert not printed.out
@@ -578,24 +578,24 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 
 
 def test_a_missing_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = refused(capsys, tmp_path / 'none', '--params', PARAMS, '--output', tmp_path / 'out')
-    assert str(tmp_path / 'none') in said
+    text = rejected(capsys, tmp_path / 'none', '--params', PARAMS, '--output', tmp_path / 'out')
+    assert str(tmp_path / 'none') in text
     assert not (tmp_path / 'out').exists()
 
 
 @pytest.mark.parametrize('content', [b'', b'no bag', b'\x89MCAP0\r\n', bytes(range(256)) * 20])
 @pytest.mark.parametrize('suffix', ['.mcap', '.db3', '.bag', '.txt'])
-def test_a_file_that_is_no_bag(
+def test_a_file_that_is_not_a_bag(
         content: bytes, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / f'file{suffix}'
     file.write_bytes(content)
-    assert str(file) in refused(
+    assert str(file) in rejected(
         capsys, file, '--params', PARAMS, '--output', tmp_path / 'out')
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_a_folder_that_is_no_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert 'metadata' in refused(
+def test_a_folder_that_is_not_a_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert 'metadata' in rejected(
         capsys, tmp_path, '--params', PARAMS, '--output', tmp_path / 'out')
 
 
@@ -608,35 +608,36 @@ def test_a_folder_that_is_no_bag(tmp_path: Path, capsys: pytest.CaptureFixture[s
     ids=['no YAML', 'no parameters', 'a rule broken', 'unknown', 'missing'])
 def test_bad_parameters(text: str, words: str, tmp_path: Path,
                         capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / 'machine.yaml'
+    file = tmp_path / 'hexapod.yaml'
     file.write_text(text, encoding='utf-8')
-    said = refused(capsys, ROOT / 'bags' / 'clear', '--params', file, '--output',
-                   tmp_path / 'out')
-    assert str(file) in said
-    assert words in said
+    text = rejected(capsys, ROOT / 'bags' / 'clear', '--params', file, '--output',
+                    tmp_path / 'out')
+    assert str(file) in text
+    assert words in text
     assert not (tmp_path / 'out').exists()
 
 
 def test_missing_parameters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert 'none.yaml: cannot be read' in refused(
+    assert 'none.yaml: cannot be read' in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', tmp_path / 'none.yaml')
 
 
-def test_a_missing_topic_lists_what_the_bag_holds(
+def test_a_missing_topic_lists_the_topics_of_the_bag(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_bag(tmp_path / 'bag', motion(3)[:2])
-    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
-    assert f'has no topic {NODE}/{ACCEL}' in said
-    assert f'{NODE}/{POSE} (geometry_msgs/msg/PoseStamped)' in said
-    assert f'{NODE}/{TWIST} (geometry_msgs/msg/TwistStamped)' in said
-    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out', '--node', 'x')
-    assert f'has no topic /x/{ACCEL}' in said
+    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert f'has no topic {NODE}/{ACCEL}' in text
+    assert f'{NODE}/{POSE} (geometry_msgs/msg/PoseStamped)' in text
+    assert f'{NODE}/{TWIST} (geometry_msgs/msg/TwistStamped)' in text
+    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out', '--node', 'x')
+    assert f'has no topic /x/{ACCEL}' in text
     assert not (tmp_path / 'out').exists()
 
 
-def test_an_empty_bag_holds_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = refused(capsys, write_bag(tmp_path / 'bag', []), '--params', PARAMS)
-    assert 'holds nothing' in said
+def test_an_empty_bag_contains_no_topics(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = rejected(capsys, write_bag(tmp_path / 'bag', []), '--params', PARAMS)
+    assert 'contains no topics' in text
 
 
 @pytest.mark.parametrize('topic', [*TOPICS, WRENCH])
@@ -645,27 +646,27 @@ def test_a_topic_of_another_type(
     of = [*motion(1), (WRENCH, RECORDED + SECOND, messages.wrench(0))]
     bag = write_bag(tmp_path / 'bag', of, **{
         topic.rpartition('/')[2]: 'geometry_msgs/msg/PointStamped'})
-    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
     assert (f'{NODE}/{topic}: is a geometry_msgs/msg/PointStamped, must be a '
-            f'{INPUT_TYPES[topic]}') in said
+            f'{INPUT_TYPES[topic]}') in text
     assert not (tmp_path / 'out').exists()
 
 
-def test_an_output_folder_that_exists_is_left_alone(
+def test_an_existing_output_folder_is_not_changed(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = tmp_path / 'out' / 'clear' / 'legs.csv'
     kept.parent.mkdir(parents=True)
     kept.write_text('kept')
-    said = refused(capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output',
-                   tmp_path / 'out')
-    assert f'{kept.parent}: exists already' in said
+    text = rejected(capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output',
+                    tmp_path / 'out')
+    assert f'{kept.parent}: exists already' in text
     assert kept.read_text() == 'kept'
     assert [path.name for path in (tmp_path / 'out').iterdir()] == ['clear']
 
 
 def test_an_output_that_is_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'out').write_text('a file')
-    assert str(tmp_path / 'out') in refused(
+    assert str(tmp_path / 'out') in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path / 'out')
 
 
@@ -687,7 +688,7 @@ def test_a_bag_of_ros_1_gives_the_same(
     assert len(new.rows) == 30
     assert old.rows == new.rows
     capsys.readouterr()
-    assert 'has no topic /none' in refused(
+    assert 'has no topic /none' in rejected(
         capsys, tmp_path / 'old.bag', '--params', PARAMS, '--output', tmp_path / 'again',
         '--pose', '/none')
 
@@ -703,14 +704,14 @@ def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str])
 
 # Several bags
 
-def test_bags_of_one_name_are_refused_before_anything_is_written(
+def test_bags_of_one_name_are_rejected_before_anything_is_written(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for folder in ('a', 'b'):
         write_bag(tmp_path / folder / 'x', motion(3))
     a, b, out = tmp_path / 'a' / 'x', tmp_path / 'b' / 'x', tmp_path / 'out'
     for second in (b, a, tmp_path / 'a' / '..' / 'a' / 'x', a / 'x.mcap'):
-        said = refused(capsys, a, second, '--params', PARAMS, '--output', out)
-        assert f'{a}, {second}: the results of both would be {out / "x"}' in said
+        text = rejected(capsys, a, second, '--params', PARAMS, '--output', out)
+        assert f'{a}, {second}: the results of both would be {out / "x"}' in text
         assert not out.exists()
 
 
@@ -729,7 +730,7 @@ def test_the_current_folder_has_a_name(tmp_path: Path, monkeypatch: pytest.Monke
     assert (tmp_path / 'out' / 'here' / 'legs.csv').exists()
 
 
-def test_a_bad_bag_among_good_ones_is_told_and_the_rest_done(
+def test_a_bad_bag_is_reported_and_the_others_are_replayed(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     good = [write_bag(tmp_path / name, motion(3)) for name in ('one', 'two')]
     assert main([str(good[0]), str(tmp_path / 'none'), str(good[1]), '--params', str(PARAMS),
@@ -744,7 +745,7 @@ def test_a_bad_bag_among_good_ones_is_told_and_the_rest_done(
 # Damaged bags
 
 def damaged_bag(file: Path) -> Path:
-    """Write a bag of 100 setpoints in chunks, and spoil a byte of a chunk in the middle."""
+    """Write a bag of 100 setpoints in chunks, and damage a byte of a chunk in the middle."""
     with file.open('wb') as stream:
         writer = McapWriter(stream, chunk_size=4000, compression=CompressionType.NONE)
         writer.start('ros2')
@@ -768,7 +769,7 @@ def damaged_bag(file: Path) -> Path:
     return file
 
 
-def test_what_is_around_a_damage_is_done(
+def test_the_rest_of_a_damaged_bag_is_replayed(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = damaged_bag(tmp_path / 'damaged.mcap')
     assert run(bag, tmp_path / 'out') == PARTLY_READ
@@ -787,7 +788,7 @@ def test_what_is_around_a_damage_is_done(
 
 
 @pytest.mark.parametrize('order', [(0, 1, 2), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
-def test_of_several_bags_the_gravest_decides(order: tuple[int, ...], tmp_path: Path) -> None:
+def test_the_most_severe_exit_code_of_several_bags(order: tuple[int, ...], tmp_path: Path) -> None:
     found = [ROOT / 'bags' / 'singular', damaged_bag(tmp_path / 'damaged.mcap'),
              ROOT / 'bags' / 'clear']
     bags = [str(found[n]) for n in order]
@@ -798,7 +799,7 @@ def test_of_several_bags_the_gravest_decides(order: tuple[int, ...], tmp_path: P
 
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
-def test_a_bag_cut_off_is_never_a_crash(
+def test_a_bag_cut_short_never_crashes_the_replay(
         plugin: StoragePlugin, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
     file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
@@ -810,7 +811,7 @@ def test_a_bag_cut_off_is_never_a_crash(
 
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
-def test_a_spoiled_bag_is_never_a_crash(plugin: StoragePlugin, tmp_path: Path) -> None:
+def test_a_damaged_bag_never_crashes_the_replay(plugin: StoragePlugin, tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
     file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
     whole = file.read_bytes()
@@ -832,9 +833,9 @@ def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> N
         assert again.rows == replayed[name].rows
         assert (again.folder / 'legs.csv').read_bytes() == (
             replayed[name].folder / 'legs.csv').read_bytes()
-    refusal = run_apart(tmp_path / 'none', '--params', PARAMS)
-    assert (refusal.returncode, refusal.stdout) == (BAD_INPUT, '')
-    assert refusal.stderr.count('\n') == 1
+    rejection = run_apart(tmp_path / 'none', '--params', PARAMS)
+    assert (rejection.returncode, rejection.stdout) == (BAD_INPUT, '')
+    assert rejection.stderr.count('\n') == 1
     partly = run_apart(damaged_bag(tmp_path / 'damaged.mcap'), '--params', PARAMS, '--output',
                        tmp_path / 'out')
     assert partly.returncode == PARTLY_READ
@@ -882,7 +883,7 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
         process.send_signal(signal.SIGKILL)
         assert process.wait(30) == -signal.SIGKILL
     assert not (tmp_path / 'out' / 'long').exists()
-    # what it left does not stand in the way of another
+    # its partial results do not prevent another replay
     assert run(ROOT / 'bags' / 'clear', tmp_path / 'out') == DONE
 
 
@@ -891,10 +892,10 @@ def test_an_interrupted_replay_leaves_nothing(
         sent: signal.Signals, long_bag: Path, tmp_path: Path) -> None:
     with begun(long_bag, tmp_path / 'out') as process:
         process.send_signal(sent)
-        _, said = process.communicate(timeout=30)
+        _, text = process.communicate(timeout=30)
         # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
         assert process.returncode in (130, -signal.SIGINT)
-    assert 'Traceback' not in said
+    assert 'Traceback' not in text
     assert not list((tmp_path / 'out').iterdir())
 
 
@@ -913,7 +914,7 @@ def test_a_full_disk_leaves_nothing(size: int, tmp_path: Path) -> None:
 
 # As a library
 
-def test_the_library_raises_what_the_program_says(tmp_path: Path) -> None:
+def test_the_library_raises_what_the_program_prints(tmp_path: Path) -> None:
     with pytest.raises(BagError, match='none'):
         replay(tmp_path / 'none', PARAMETERS, tmp_path / 'out')
     (tmp_path / 'there').mkdir()
@@ -923,20 +924,20 @@ def test_the_library_raises_what_the_program_says(tmp_path: Path) -> None:
     assert (result.bag, result.code) == (ROOT / 'bags' / 'clear', DONE)
     assert result.summary['complete']
     assert not result.summary['limit_met']
-    assert not refusals(result)
+    assert not rejections(result)
     assert json.loads((tmp_path / 'out' / 'summary.json').read_text()) == result.summary
 
 
-def test_limits_that_are_broken_are_named(
+def test_exceeded_limits_are_named(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / 'machine.yaml'
+    file = tmp_path / 'hexapod.yaml'
     text = PARAMS.read_text(encoding='utf-8')
     file.write_text(text.replace('force_max: 6000.0', 'force_max: 500.0'))
-    for params, said in ((PARAMS, 'all limits held'),
+    for params, text in ((PARAMS, 'all limits held'),
                          (file, 'limits.force_max, 500, exceeded by leg_4 in ')):
         assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
                      '--output', str(tmp_path / params.stem)]) == 0
-        assert said in capsys.readouterr().out
+        assert text in capsys.readouterr().out
 
 
 # Topics under other names
@@ -979,21 +980,21 @@ def test_a_namespace_is_found_by_the_end_of_the_name(tmp_path: Path) -> None:
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
 
 
-def test_what_is_ambiguous_is_listed_and_can_be_chosen(
+def test_ambiguous_topics_are_listed_and_can_be_selected(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     of = named(motion(20), pose='/a/where') + [
         ('/b/where2', RECORDED, messages.pose(0, (0.0, 0.0, 1.2)))]
     bag = write_bag(tmp_path / 'bag', of, where=INPUT_TYPES[POSE], where2=INPUT_TYPES[POSE],
                     twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
-    said = refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
-    assert '/a/where, /b/where2: choose one by --pose' in said
+    text = rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
+    assert '/a/where, /b/where2: select one by --pose' in text
     assert run(bag, tmp_path / 'out', '--pose', '/a/where', '--no-report') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 20
     capsys.readouterr()
-    for topic, words in (('/none', 'has no topic /none; it holds /a/where (geometry'),
+    for topic, words in (('/none', 'has no topic /none; it contains /a/where (geometry'),
                          (f'{NODE}/{TWIST}', 'must be a geometry_msgs/msg/PoseStamped')):
-        assert words in refused(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'x',
-                                '--pose', topic)
+        assert words in rejected(capsys, bag, '--params', PARAMS, '--output', tmp_path / 'x',
+                                 '--pose', topic)
     assert not (tmp_path / 'x').exists()
 
 
@@ -1013,7 +1014,7 @@ def test_combined_by_its_option(tmp_path: Path, capsys: pytest.CaptureFixture[st
     bag = write_bag(tmp_path / 'bag', [
         ('/cmd/all', RECORDED + n * MS, messages.combined(n * MS)) for n in range(1, 9)],
         all=INPUT_TYPES[COMBINED])
-    assert '--combined takes' in refused(
+    assert '--combined reads' in rejected(
         capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
     assert run(bag, tmp_path / 'out', '--combined', '/cmd/all', '--no-report') == DONE
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
@@ -1041,7 +1042,7 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
 
 
 def keys_of(value: Any, prefix: str = '') -> set[str]:
-    """Return the keys of a document, those of legs, causes and axes by one of them."""
+    """Return the keys of a document, those of legs, sources and axes by one of them."""
     found: set[str] = set()
     for key, inner in value.items() if isinstance(value, dict) else ():
         if prefix not in ('inputs.topics', 'parameters'):
@@ -1076,7 +1077,7 @@ def test_force_replaces_results_and_nothing_else(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(ROOT / 'bags' / 'clear', tmp_path) == DONE
     capsys.readouterr()
-    assert '--force replaces results' in refused(
+    assert '--force replaces results' in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path)
     (tmp_path / 'clear' / 'of before').touch()
     assert run(ROOT / 'bags' / 'clear', tmp_path, '--force', '--no-report') == DONE
@@ -1087,7 +1088,7 @@ def test_force_replaces_results_and_nothing_else(
     other = tmp_path / 'other' / 'clear'
     other.mkdir(parents=True)
     (other / 'thesis.tex').touch()
-    assert 'holds no results of a replay' in refused(
+    assert 'not a folder of replay results' in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', other.parent, '--force')
     assert [path.name for path in other.iterdir()] == ['thesis.tex']
 
@@ -1117,7 +1118,7 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
 
 
 def test_an_interrupt_while_results_are_replaced_keeps_some(tmp_path: Path) -> None:
-    # the second of the two renames is where it comes
+    # at the second of the two renames
     program = (
         'import pathlib, sys\nfrom stewart_dynamics.replay import main\n'
         'rename, done = pathlib.Path.rename, []\n'
@@ -1135,7 +1136,7 @@ def test_an_interrupt_while_results_are_replaced_keeps_some(tmp_path: Path) -> N
     assert [path.name for path in tmp_path.iterdir()] == ['clear']
 
 
-def test_a_terminal_without_the_letters_of_a_name(tmp_path: Path) -> None:
+def test_names_that_the_terminal_cannot_encode(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'ü', motion(3))
     done = run_apart(bag, '--params', PARAMS, '--output', tmp_path / 'out', '--no-report',
                      env={**os.environ, 'PYTHONIOENCODING': 'ascii'})
@@ -1143,9 +1144,9 @@ def test_a_terminal_without_the_letters_of_a_name(tmp_path: Path) -> None:
     assert '3 setpoints' in done.stdout
 
 
-def test_options_that_would_not_be_used_are_refused(
+def test_options_without_effect_are_rejected(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert '--combined: is not read' in refused(
+    assert '--combined: is not read' in rejected(
         capsys, ROOT / 'bags' / 'clear', '--params', PARAMS, '--output', tmp_path,
         '--differentiate', '--combined', '/all')
     for words in (['--cutoff', '5'], ['--differentiate', '--cutoff', '1e300']):
@@ -1158,7 +1159,7 @@ def test_options_that_would_not_be_used_are_refused(
 def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     of = motion(400)
     bag = write_bag(tmp_path / 'bag', of[::3])
-    assert '--differentiate makes' in refused(
+    assert '--differentiate computes' in rejected(
         capsys, bag, '--params', PARAMS, '--output', tmp_path / 'out')
     assert run(bag, tmp_path / 'out', '--differentiate', '--cutoff', '5', '--no-report') == DONE
     printed = capsys.readouterr().out
@@ -1192,7 +1193,7 @@ def joint_state(stamp: int, names: Sequence[str], efforts: Sequence[float]) -> b
                                             np.array(efforts)), 'sensor_msgs/msg/JointState'))
 
 
-def test_measured_forces_tell_the_external_load(tmp_path: Path) -> None:
+def test_measured_forces_give_the_external_load(tmp_path: Path) -> None:
     load = np.array([30.0, -10.0, -200.0, 5.0, 8.0, -4.0])
     of = motion(200)
     heave = Motion(
@@ -1204,11 +1205,11 @@ def test_measured_forces_tell_the_external_load(tmp_path: Path) -> None:
     names = list(PARAMETERS['joints'])[::-1]
     for n in range(200):
         stamp = (n + 1) * 10 * MS
-        of.append(('/machine/state', RECORDED + stamp + 3, joint_state(
+        of.append(('/hexapod/state', RECORDED + stamp + 3, joint_state(
             stamp, ['other', *names], [0.0, *forces[n][::-1]])))
     of.sort(key=lambda each: each[1])
     bag = write_bag(tmp_path / 'bag', of, state='sensor_msgs/msg/JointState')
-    assert run(bag, tmp_path / 'out', '--measured', '/machine/state') == DONE
+    assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state') == DONE
     found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
     assert found['setpoints_compared'] == 200
     # with the sign of the load

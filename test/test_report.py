@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The report of a bag: what is in the file, and what a real browser makes of it."""
+"""The report of a bag: the file, and the page in a browser."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def trajectory(name: str, parameters: Parameters = PARAMETERS) -> Given:
 
 
 class _Elements(HTMLParser):
-    """The elements of a page, and the text that a reader sees."""
+    """The elements of a page, and its visible text."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -177,7 +177,7 @@ def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
     assert path.stat().st_size < 10e6
 
 
-def test_what_is_drawn_are_the_samples_and_every_peak(tmp_path: Path) -> None:
+def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
     given = trajectory('singular')
     summary = given.write(tmp_path / 'report.html')
     data = data_of(tmp_path / 'report.html')
@@ -205,7 +205,7 @@ def test_what_is_drawn_are_the_samples_and_every_peak(tmp_path: Path) -> None:
         assert np.abs(parts - whole).max() <= 1e-6 * np.abs(whole).max()
 
 
-def test_angles_are_the_papers_and_go_on_past_half_a_turn(tmp_path: Path) -> None:
+def test_angles_are_those_of_the_paper_and_continue_past_half_a_turn(tmp_path: Path) -> None:
     seconds = np.arange(400) * 0.01
     angles = np.stack([0.4 * np.sin(seconds), 0.3 * np.cos(seconds), 3.0 * seconds], axis=1)
     motion = Motion(np.tile([0.0, 0.0, 1.1], (400, 1)), from_euler(angles))
@@ -246,17 +246,18 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
     assert data_of(paths[0])['legs'] == list(HOSTILE)
 
 
-def test_what_is_wrong_with_a_bag_is_told(tmp_path: Path) -> None:
+def test_the_report_shows_what_is_wrong_with_a_bag(tmp_path: Path) -> None:
     trajectory('singular').write(
         tmp_path / 'report.html', complete=False, missing=['chunk 3: its CRC is wrong'],
         notices=['the bag has no checksums'],
         rejected=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234,
                   'first': 'nan'}])
     text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
-    for told in ('Only a part could be read', 'chunk 3: its CRC is wrong', 'not finite', '1,234',
-                 'Limits are exceeded', 'limits.force_max', 'A singularity is met',
-                 'crosses zero once', 'the bag has no checksums', 'reflected_mass'):
-        assert told in text, told
+    for shown in ('The bag could not be read completely', 'chunk 3: its CRC is wrong',
+                  'not finite', '1,234',
+                  'Limits are exceeded', 'limits.force_max', 'A singularity is reached',
+                  'crosses zero once', 'the bag has no checksums', 'reflected_mass'):
+        assert shown in text, shown
 
 
 def test_measured_forces_and_contacts_are_shown_and_drawn(tmp_path: Path) -> None:
@@ -275,7 +276,7 @@ def test_measured_forces_and_contacts_are_shown_and_drawn(tmp_path: Path) -> Non
     assert 'Contact, most in' in text
 
 
-def test_plotly_that_is_missing_is_told_in_one_line(tmp_path: Path) -> None:
+def test_missing_plotly_is_reported_in_one_line(tmp_path: Path) -> None:
     # an entry that is None is how Python itself marks a module that cannot be imported
     script = ("import sys; sys.modules['plotly'] = None\n"
               'from pathlib import Path\n'
@@ -304,7 +305,7 @@ def browser() -> Iterator[Browser]:
     playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
-        pytest.skip(f'no browser on this machine: none of {", ".join(BROWSERS)}')
+        pytest.skip(f'no browser on this computer: none of {", ".join(BROWSERS)}')
     with playwright.sync_playwright() as driver:
         running = driver.chromium.launch(
             executable_path=found, args=FLAGS, timeout=1000.0 * PATIENCE)
@@ -313,7 +314,7 @@ def browser() -> Iterator[Browser]:
 
 
 class Opened:
-    """A report in the browser, and whatever went wrong in it."""
+    """A report in the browser, and its errors."""
 
     def __init__(self, page: Page, path: Path) -> None:
         self.page = page
@@ -345,7 +346,7 @@ class Opened:
             self.see(plot)
 
     def check(self) -> None:
-        """Nothing went wrong, and nothing but the file was asked for."""
+        """There are no errors, and nothing but the file was loaded."""
         assert self.faults == []
         assert [url for url in self.requests if not url.startswith(('data:', 'blob:'))] == [
             self.url]
@@ -393,7 +394,7 @@ def joints_of(given: Given, sample: int) -> Array:
     return joints
 
 
-def test_the_slider_moves_platform_colours_and_cursor(opened: Callable[..., Opened]) -> None:
+def test_the_slider_moves_platform_colors_and_cursor(opened: Callable[..., Opened]) -> None:
     given = trajectory('clear')
     report = opened(given)
     report.see('platform')
@@ -420,7 +421,7 @@ def test_the_slider_moves_platform_colours_and_cursor(opened: Callable[..., Open
     report.check()
 
 
-def test_playing_takes_the_motion_to_its_end(opened: Callable[..., Opened]) -> None:
+def test_playing_runs_to_the_end_of_the_motion(opened: Callable[..., Opened]) -> None:
     given = trajectory('clear')
     report = opened(given)
     report.see('platform')
@@ -458,7 +459,8 @@ def test_zooming_one_plot_zooms_all(opened: Callable[..., Opened]) -> None:
     report.check()
 
 
-def test_a_spike_flattens_nothing_but_can_be_seen_whole(opened: Callable[..., Opened]) -> None:
+def test_a_spike_does_not_set_the_scale_and_the_full_range_can_be_shown(
+        opened: Callable[..., Opened]) -> None:
     given = trajectory('singular')
     report = opened(given)
     report.see('plot_forces')
@@ -475,7 +477,7 @@ def test_a_spike_flattens_nothing_but_can_be_seen_whole(opened: Callable[..., Op
     report.check()
 
 
-def test_a_time_in_a_table_moves_the_cursor_there(opened: Callable[..., Opened]) -> None:
+def test_a_click_on_a_time_moves_the_cursor_there(opened: Callable[..., Opened]) -> None:
     given = trajectory('singular')
     report = opened(given)
     at = given.summary()['legs']['leg_5']['force_peak_at_s']
@@ -485,7 +487,7 @@ def test_a_time_in_a_table_moves_the_cursor_there(opened: Callable[..., Opened])
     report.check()
 
 
-def test_the_shown_leg_can_be_chosen_and_a_curve_hidden(opened: Callable[..., Opened]) -> None:
+def test_the_leg_can_be_selected_and_a_curve_hidden(opened: Callable[..., Opened]) -> None:
     given = trajectory('clear')
     report = opened(given)
     report.see('plot_force_breakdown')
@@ -531,7 +533,7 @@ def test_poses_that_cannot_be_solved_leave_gaps(opened: Callable[..., Opened]) -
 
 def test_without_any_setpoint(opened: Callable[..., Opened]) -> None:
     report = opened(Given(np.empty(0), np.empty((0, 24))))
-    report.until("document.getElementById('plots').textContent.includes('nothing to draw')")
+    report.until("document.getElementById('plots').textContent.includes('there are no plots')")
     assert 'No setpoint could be answered' in report.page.inner_text('#verdict')
     report.check()
 

@@ -36,8 +36,8 @@ from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.runtime.batch_joining import WAITING
 from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
-from stewart_dynamics.runtime.joining import WAITING
 from stewart_dynamics.runtime.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
     WRONG_FRAME)

@@ -74,14 +74,13 @@ class Simulator:
         Parameters on the command line, ``name:=value``.
     files : sequence of Path
         Its parameter files; by default those of config/.
-    said : callable, optional
-        What this process says on stderr, where the simulator is to be in it, and not in a process
-        of its own.
+    inside : bool, optional
+        Whether it is to be in this process, and not in one of its own.
 
     """
 
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
-                 said: Callable[[], str] | None = None) -> None:
+                 inside: bool = False) -> None:
         self.peer = Peer(domain)
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
@@ -93,7 +92,7 @@ class Simulator:
             part for override in overrides for part in ('-p', override))]
         self._stepped = STEPPED in overrides
         try:
-            self.program: Any = Inside(SimulatorNode, arguments, domain, said) if said else (
+            self.program: Any = Inside(SimulatorNode, arguments, domain) if inside else (
                 Program([executable('stewart_simulator'), *arguments], domain, folder))
         except StewartError:
             self.peer.close()
@@ -203,10 +202,10 @@ def start(domain: int, tmp_path: Path) -> Iterator[Start]:
 
 
 @pytest.fixture
-def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that makes a simulator in this process; in the end it must be at work."""
     begun: list[Simulator] = []
-    make = partial(Simulator, domain, said=lambda: capfd.readouterr().err)
+    make = partial(Simulator, domain, inside=True)
     with one_after_the_other(make, tmp_path) as start:
         def started(*overrides: str, **options: Any) -> Simulator:
             begun.append(start(*overrides, **options))
@@ -434,8 +433,11 @@ def test_what_cannot_be_computed_holds_it_at_rest(
     assert len(simulator.said('ERROR', '')) == 1
 
 
+TOO_STIFF = 'actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0'
+
+
 def test_a_hexapod_too_stiff_for_real_time_skips_time(begin: Start) -> None:
-    simulator = begin('actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0')
+    simulator = begin(*TOO_STIFF)
     simulator.command(holding())
     simulator.until_said('WARN', 'fell behind by')
     # Its stamps go on with the clock, with periods left out.
@@ -463,11 +465,14 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
 
 
 def test_a_signal_ends_it(start: Start) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        for overrides in ((), (STEPPED,)):
-            simulator = start(*overrides)
-            simulator.until_there()
-            simulator.stop(number)
+    for number, overrides in (
+            (signal.SIGINT, ()), (signal.SIGTERM, (STEPPED,)), (signal.SIGINT, TOO_STIFF)):
+        simulator = start(*overrides)
+        simulator.until_there()
+        simulator.command(holding())
+        if overrides == TOO_STIFF:
+            simulator.until_said('WARN', 'fell behind by')
+        simulator.stop(number)
 
 
 CANNOT = [
@@ -483,18 +488,17 @@ CANNOT = [
 
 
 def test_what_it_cannot_simulate_is_reported_in_one_line(
-        domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: Start) -> None:
-    for overrides, said in CANNOT:
-        with pytest.raises(StewartError, match=re.escape(said)):
-            Simulator(domain, tmp_path / 'inside', *overrides,
-                      said=lambda: capfd.readouterr().err)
-    for overrides, said in (CANNOT[0], CANNOT[-1]):
+        domain: int, tmp_path: Path, start: Start) -> None:
+    for overrides, words in CANNOT:
+        with pytest.raises(StewartError, match=re.escape(words)):
+            Simulator(domain, tmp_path / 'inside', *overrides, inside=True)
+    for overrides, words in (CANNOT[0], CANNOT[-1]):
         program = start(*overrides).program
         assert program.wait() == 1, program.stderr
         lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
         assert len(lines) == 1, program.stderr
         assert lines[0].startswith('stewart_simulator: ')
-        assert said in lines[0]
+        assert words in lines[0]
 
 
 def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:

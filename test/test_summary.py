@@ -37,7 +37,7 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME
-from stewart_dynamics.replay.gathering import LISTED
+from stewart_dynamics.replay.block_statistics import LISTED
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
@@ -52,7 +52,7 @@ LIMITS = {
     'limits.force_max': [90.0, 80.0, 70.0, 90.0, 80.0, 900.0]}
 
 
-def machine(**changes: Any) -> Parameters:
+def hexapod(**changes: Any) -> Parameters:
     """Return a hexapod whose first leg has a name with a blank."""
     return symmetric_parameters().replaced({
         'joints': ['front left', 'b', 'c', 'd', 'e', 'f'], 'setpoint.timeout': 0.5, **changes})
@@ -124,13 +124,13 @@ class Samples:
 
 
 def table_of(samples: Samples, parameters: Parameters) -> str:
-    """Return the summary as a person reads it."""
+    """Return the summary for the terminal."""
     return '\n'.join(summary_lines(samples.summary(parameters).values(), parameters))
 
 
 def values(many: int, **given: Any) -> dict[str, Any]:
     """Return what the summary of such samples has."""
-    found = Samples(many, **given).summary(machine()).values()
+    found = Samples(many, **given).summary(hexapod()).values()
     json.dumps(found, allow_nan=False)
     return found
 
@@ -309,8 +309,8 @@ def assert_same(found: Any, truth: Any, at: str = '') -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(st.integers(0, 10 ** 6), st.integers(1, 50))
-def test_it_is_what_its_definitions_say(seed: int, many: int) -> None:
-    samples, parameters = random_samples(seed, many), machine(**LIMITS)
+def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
+    samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
     found = samples.summary(parameters).values()
     assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
 
@@ -319,7 +319,7 @@ def test_it_is_what_its_definitions_say(seed: int, many: int) -> None:
 @given(st.data(), st.integers(0, 10 ** 6), st.integers(1, 60))
 def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> None:
     edges = sorted(data.draw(st.lists(st.integers(0, many), max_size=many)))
-    samples, parameters = random_samples(seed, many), machine(**LIMITS)
+    samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
     whole, split = samples.summary(parameters), samples.summary(parameters, edges)
     assert_same(split.values(), whole.values())
     assert_same(split.values(), whole.values())
@@ -327,8 +327,8 @@ def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> 
 
 @pytest.mark.parametrize('size', [1, 7, 999, 1000, 1001, 2500])
 def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
-    samples, parameters = random_samples(size, 3000), machine(**LIMITS)
-    # what is a usual step is told from the first thousand setpoints
+    samples, parameters = random_samples(size, 3000), hexapod(**LIMITS)
+    # the usual step is that of the first thousand setpoints
     samples.seconds[1500:] += np.arange(1500) * 0.4
     found = samples.summary(parameters, range(size, 3000, size)).values()
     assert found['setpoints']['gaps'] > 500
@@ -339,7 +339,7 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
 
 
 def test_it_can_be_read_before_the_end() -> None:
-    samples, parameters = random_samples(3, 40), machine(**LIMITS)
+    samples, parameters = random_samples(3, 40), hexapod(**LIMITS)
     outputs = samples.outputs()
     setpoints = batch(samples.stamps, samples.restarts)
     summary = Summary(parameters)
@@ -351,7 +351,7 @@ def test_it_can_be_read_before_the_end() -> None:
         assert summary.values() == summary.values()
 
 
-def test_it_sums_up_what_the_step_answers() -> None:
+def test_it_summarizes_the_outputs_of_the_step() -> None:
     random = rng()
     p = random_parameters(random).replaced({'limits.force_max': 2000.0})
     motion, wrench = random_motion(p, random, 200), random_wrench(p, random, 200)
@@ -377,7 +377,7 @@ def test_it_sums_up_what_the_step_answers() -> None:
 
 
 def test_it_keeps_no_samples() -> None:
-    samples, parameters = random_samples(1, 2000), machine(**LIMITS)
+    samples, parameters = random_samples(1, 2000), hexapod(**LIMITS)
     outputs = samples.outputs()
     setpoints = batch(samples.stamps, samples.restarts)
     summary = Summary(parameters)
@@ -405,7 +405,7 @@ def test_every_key_is_documented() -> None:
             return keys(tree[0], f'{at}[]')
         return {at.lstrip('.')}
 
-    samples, parameters = random_samples(1, 50), machine(**LIMITS)
+    samples, parameters = random_samples(1, 50), hexapod(**LIMITS)
     found = keys(samples.summary(parameters).values())
     for leg in parameters['joints']:
         found = {key.replace(f'legs.{leg}.', 'legs.NAME.').replace(
@@ -427,7 +427,7 @@ def test_energy_of_a_leg_that_drives_and_brakes() -> None:
     time = np.linspace(0.0, 2.0 * math.pi, 10001)
     samples = Samples(10001, seconds=time, demanded=100.0 * np.sin(time)[:, None],
                       rates=0.5 * np.cos(time)[:, None])
-    leg = samples.summary(machine()).values()['legs']['b']
+    leg = samples.summary(hexapod()).values()['legs']['b']
     # P = 25 sin 2t: two humps of 25 each way
     assert leg['energy_driving_j'] == pytest.approx(50.0, rel=1e-6)
     assert leg['energy_braking_j'] == pytest.approx(50.0, rel=1e-6)
@@ -457,7 +457,7 @@ def test_a_single_setpoint_has_an_rms_and_no_energy() -> None:
 
 
 def test_without_a_setpoint_there_is_nothing() -> None:
-    summary = Summary(machine(**LIMITS))
+    summary = Summary(hexapod(**LIMITS))
     found = summary.values()
     json.dumps(found, allow_nan=False)
     assert found['setpoints'] == {
@@ -465,19 +465,19 @@ def test_without_a_setpoint_there_is_nothing() -> None:
         'gaps': 0, 'gaps_s': 0.0, 'restarts': 0}
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
-    assert summary_lines(summary.values(), machine()) == ['no setpoint could be answered']
-    assert_same(Samples(0).summary(machine()).values(), Summary(machine()).values())
+    assert summary_lines(summary.values(), hexapod()) == ['no setpoint could be answered']
+    assert_same(Samples(0).summary(hexapod()).values(), Summary(hexapod()).values())
 
 
 def test_there_are_no_margins_without_limits() -> None:
     leg = values(2)['legs']['b']
     assert leg['length_margin_m'] is leg['rate_margin_m_s'] is leg['force_margin_n'] is None
     only = Samples(2, lengths=[[1.0] * 6, [1.25] * 6]).summary(
-        machine(**{'limits.length_max': 1.5})).values()['legs']['b']
+        hexapod(**{'limits.length_max': 1.5})).values()['legs']['b']
     assert only['length_margin_m'] == 0.25
 
 
-def test_numbers_that_json_cannot_hold_are_none() -> None:
+def test_numbers_that_are_not_finite_are_null() -> None:
     found = values(2, demanded=1e200, rates=1e200)['legs']['b']
     assert found['force_peak_n'] == 1e200
     assert found['force_rms_n'] is found['power_mean_w'] is found['energy_driving_j'] is None
@@ -504,14 +504,14 @@ def test_a_restart_is_no_crossing(
         determinants: list[float], restart: int, crossings: int, edges: tuple[int, ...]) -> None:
     restarts = np.arange(len(determinants)) == restart
     found = Samples(len(determinants), det=determinants, restarts=restarts).summary(
-        machine(), edges).values()['singularity']
+        hexapod(), edges).values()['singularity']
     assert found['crossings'] == crossings
 
 
 def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
     p = symmetric_parameters()
     time = np.linspace(0.0, 1.0, 101)
-    turn = 1.5 + 0.123 * time  # the machine is singular at a quarter turn
+    turn = 1.5 + 0.123 * time  # the hexapod is singular at a quarter turn
     rows = np.zeros((101, MOTION))
     rows[:, 2] = 1.0
     rows[:, 3], rows[:, 4] = np.cos(turn), -np.sin(turn)
@@ -538,7 +538,7 @@ def test_a_small_example() -> None:
                   [20.0, 25.0, 5.0, 0.0, 1.0, 3.0], [nan] * 6],
         rates=0.25, det=[3.0, 1.0, -1.0, -2.0], condition=[1.0, 2.0, 3.0, 2.0],
         warnings=[False, True, True, False])
-    assert table_of(samples, machine(**{
+    assert table_of(samples, hexapod(**{
         'limits.length_min': 0.75, 'limits.length_max': 10.0, 'limits.force_max': 25.0,
     })).splitlines() == [
         '4 setpoints in 4.00 s',
@@ -559,7 +559,7 @@ def test_a_small_example() -> None:
         '   0.2500',
         'f                 3.0      2.00      2.3     22.0       0.8  6.0000  6.0000  4.0000'
         '   0.2500',
-        '* reaches limits.force_max: published clipped to it, the leg would need more',
+        '* reaches limits.force_max: the published force is clipped to it',
         'limits.length_min, 0.75, exceeded by front left in 1 setpoint from t = 2.00 s on: 0.5 at '
         'worst',
         'limits.force_max, 25, exceeded by front left in 1 setpoint from t = 1.00 s on: -30 at '
@@ -579,7 +579,7 @@ def test_the_table_is_no_wider_than_100_columns(
     samples = random_samples(seed, many) if many else Samples(0)
     samples.demanded *= scale
     samples.forces *= scale
-    table = table_of(samples, machine(**LIMITS) if limited else machine())
+    table = table_of(samples, hexapod(**LIMITS) if limited else hexapod())
     assert all(len(line) <= 100 and line == line.rstrip() for line in table.splitlines())
     assert 'nan' not in table
     assert 'inf' not in table
@@ -587,45 +587,45 @@ def test_the_table_is_no_wider_than_100_columns(
 
 
 def test_a_leg_without_forces_has_no_columns_of_them() -> None:
-    table = table_of(Samples(3, demanded=math.nan), machine(**LIMITS))
+    table = table_of(Samples(3, demanded=math.nan), hexapod(**LIMITS))
     assert 'force [N]' not in table
     assert 'length [m]' in table
     assert 'no forces were published in 3 setpoints' in table
 
 
-def test_it_says_when_all_limits_hold_and_nothing_warned() -> None:
-    held = table_of(Samples(1), machine(**{'limits.force_max': 5.0}))
+def test_held_limits_and_missing_warnings_are_stated() -> None:
+    held = table_of(Samples(1), hexapod(**{'limits.force_max': 5.0}))
     assert 'all limits held' in held
     assert '1 setpoint in 0.00 s' in held
     assert 'det(J) did not cross zero' in held
     assert 'no singularity warning' in held
-    assert 'all limits held' not in table_of(Samples(1), machine())
-    # published forces that are clipped do not tell how much was demanded
-    clipped = table_of(Samples(1), machine(**{'limits.force_max': 1.0}))
+    assert 'all limits held' not in table_of(Samples(1), hexapod())
+    # clipped forces do not show how much was demanded
+    clipped = table_of(Samples(1), hexapod(**{'limits.force_max': 1.0}))
     assert 'all limits held' not in clipped
     assert '1.0*' in clipped
 
 
-def test_it_says_how_long_before_a_crossing_the_warning_came_and_not_all_of_many() -> None:
+def test_the_lead_time_of_warnings_is_stated_and_long_lists_are_cut() -> None:
     table = table_of(Samples(5, det=[2.0, 1.0, -1.0, -2.0, -3.0],
-                             warnings=[0, 1, 0, 1, 1]), machine())
+                             warnings=[0, 1, 0, 1, 1]), hexapod())
     assert 'warning from t = 1.00 s to 2.00 s: 0.50 s before the crossing' in table
     assert table.endswith('warning from t = 3.00 s to the end')
     many = np.arange(40)
-    table = table_of(Samples(40, det=(-1.0) ** many, warnings=many % 2), machine())
+    table = table_of(Samples(40, det=(-1.0) ** many, warnings=many % 2), hexapod())
     assert 't = 4.500 s and 34 times more: forces' in ' '.join(table.split())
     assert table.endswith('and 15 singularity warnings more, for 19.00 s in all')
 
 
-def test_gaps_and_restarts_stand_in_the_first_line() -> None:
+def test_gaps_and_restarts_are_in_the_first_line() -> None:
     samples = Samples(5, seconds=[0.0, 0.1, 0.2, 3.2, 3.2], restarts=[0, 0, 0, 0, 1])
-    assert table_of(samples, machine()).startswith(
+    assert table_of(samples, hexapod()).startswith(
         '5 setpoints in 3.20 s, of them 3.00 s in 1 gap, 1 restart\n')
 
 
-def test_what_only_poses_cannot_tell_is_not_known() -> None:
+def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     samples = Samples(3, rates=0.0, breakdown=1.0)
-    parameters = machine(**LIMITS)
+    parameters = hexapod(**LIMITS)
     summary = Summary(parameters, quasi_static=True)
     summary.add(samples.seconds, batch(samples.stamps), samples.outputs(), samples.breakdown)
     found = summary.values()
@@ -636,20 +636,20 @@ def test_what_only_poses_cannot_tell_is_not_known() -> None:
     assert {source for source, value in found['force_breakdown']['b'].items()
             if value['peak_n'] is not None} == {'gravity', 'wrench'}
     assert found['singularity']['time_to_crossing_min_s'] is None
-    # a limit that cannot be checked does not hold
+    # a limit that cannot be checked is not held
     assert (found['limits'], found['limits_not_checked']) == ([], ['limits.velocity_max'])
     assert found['limit_met']
     text = '\n'.join(summary_lines(found, parameters))
     assert 'limits.velocity_max could not be checked' in text
     assert 'all limits held' not in text
-    without = Summary(machine(**{'limits.force_max': 5.0}), quasi_static=True)
+    without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
     without.add(samples.seconds, batch(samples.stamps), samples.outputs())
     assert not without.values()['limit_met']
 
 
-def test_a_limit_is_exceeded_beyond_its_tolerance_alone() -> None:
+def test_a_limit_is_exceeded_only_above_its_tolerance() -> None:
     bound = 5.0
     for factor, exceeded in ((1.0 + 5e-10, False), (1.0 + 5e-9, True)):
         found = Samples(1, demanded=bound * factor).summary(
-            machine(**{'limits.force_max': bound})).values()
+            hexapod(**{'limits.force_max': bound})).values()
         assert bool(found['limits']) is exceeded

@@ -69,14 +69,13 @@ class Trajectory:
         Its parameter file.
     overrides : str
         Parameters on the command line, ``name:=value``.
-    said : callable, optional
-        What this process says on stderr, where the publisher is to be in it, and not in a process
-        of its own.
+    inside : bool, optional
+        Whether it is to be in this process, and not in one of its own.
 
     """
 
     def __init__(self, domain: int, folder: Path, file: Path, *overrides: str,
-                 said: Callable[[], str] | None = None) -> None:
+                 inside: bool = False) -> None:
         self.peer = Peer(domain)
         self._raw = {topic: self.peer.listen(f'/stewart_dynamics/{topic}', kind)
                      for topic, kind in INPUTS.items()}
@@ -85,7 +84,7 @@ class Trajectory:
                      *(part for override in overrides for part in ('-p', override))]
         done = Future()
         self.program: Any = Inside(
-            partial(TrajectoryNode, done), arguments, domain, said, done) if said else (
+            partial(TrajectoryNode, done), arguments, domain, done) if inside else (
                 Program([executable('stewart_trajectory'), *arguments], domain, folder))
 
     def received(self, topic: str) -> list[Any]:
@@ -123,9 +122,9 @@ def start(domain: int, tmp_path: Path) -> Iterator[Start]:
 
 
 @pytest.fixture
-def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that makes it in this process, with a parameter file's text."""
-    make = partial(Trajectory, domain, said=lambda: capfd.readouterr().err)
+    make = partial(Trajectory, domain, inside=True)
     with started(make, tmp_path) as begin:
         yield begin
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Recorded bags in; the node's outputs, summaries and reports out; needs no ROS."""
+"""Replay of recorded bags: the node's outputs, summaries and reports; needs no ROS."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ import sys
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program stewart_replay; say in one line which library it lacks."""
+    """Run the program stewart_replay; report a missing library in one line."""
     try:
         from stewart_dynamics.replay.command_line import main as program
     except ModuleNotFoundError as exc:

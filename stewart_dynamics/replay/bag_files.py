@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The files of a recording: which belong to a bag, in which order, and how they are unpacked."""
+"""The files of a bag, their order, and their decompression."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ import zstandard
 from stewart_dynamics.errors import BagError, one_line, ParameterError
 from stewart_dynamics.parameters_yaml import read_document
 
-# Files of a bag; those that are compressed as a whole too.
+# Suffixes of the files of a bag, also of files compressed as a whole.
 STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd', '.bag')
 METADATA = 'metadata.yaml'
 
-# What a compressed file may become: recordings that compress better than this do not exist.
+# The largest size of a decompressed file, relative to the compressed one, and in bytes.
 _TIMES, _AT_LEAST = 1000, 1 << 26
 _PART = 1 << 20
 _LARGEST_METADATA = 1_000_000
@@ -44,9 +44,9 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
     bag : Path
         A file, or a folder with the metadata of rosbag2 or without.
     missing, notices : list of str
-        Files that are listed and not there, and what a user should know, are appended.
+        Listed files that do not exist, and notices to the user, are appended.
 
-    Raises BagError where there is none, or one that is listed is outside of the folder.
+    Raises BagError if there is no file, or if a listed file is outside of the folder.
 
     """
     if not bag.is_dir():
@@ -55,7 +55,7 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
         return [bag]
     found = sorted((file for file in bag.iterdir() if file.name.endswith(STORAGES)
                     and _is_inside(file, bag)), key=_by_number)
-    # rosbags' own reader of this file opens, and unpacks, all that is listed, or nothing.
+    # rosbags' own reader of this file opens and decompresses all listed files, or none.
     try:
         document = read_document(bag / METADATA, _LARGEST_METADATA)
         names = document['rosbag2_bagfile_information']['relative_file_paths']
@@ -65,8 +65,8 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
         why = f'{exc}' if isinstance(exc, ParameterError) else (
             f'{bag / METADATA}: lists no files')
     else:
-        why = f'{bag / METADATA}: lists no file that there is'
-    # Older recorders put the folder's own name before that of the file.
+        why = f'{bag / METADATA}: lists no existing file'
+    # Older recorders put the folder's name before that of the file.
     listed = list(dict.fromkeys(file if file.exists() else bag / file.name for file in listed))
     outside = [file for file in listed if file.exists() and not _is_inside(file, bag)]
     if outside:
@@ -79,19 +79,19 @@ def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
     if not found:
         raise BagError(f'{bag}: not a bag that can be read: {why}')
     if not all(file.suffix == '.bag' for file in found):  # ROS 1 writes none
-        notices.append('its metadata.yaml is missing or damaged: read by its files')
+        notices.append('metadata.yaml is missing or damaged: the files in the folder are read')
     return found
 
 
 def unpack(file: Path, unpacked: Path) -> str:
-    """Write what a file was before zstd compressed it; return what is wrong, or nothing."""
+    """Decompress a file by zstd; return what is wrong, or an empty text."""
     room = max(_AT_LEAST, _TIMES * file.stat().st_size)
     with file.open('rb') as packed, unpacked.open('wb') as stream:
         try:
             reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
             while part := reader.read(_PART):
                 if len(part) > room:
-                    return (f'unpacks to more than {_TIMES} times its size: what follows is not '
+                    return (f'unpacks to more than {_TIMES} times its size: the rest is not '
                             'read')
                 room -= len(part)
                 stream.write(part)
@@ -101,11 +101,11 @@ def unpack(file: Path, unpacked: Path) -> str:
 
 
 def _is_inside(file: Path, folder: Path) -> bool:
-    """Return whether this is a file in a folder, and no link to one elsewhere."""
+    """Return whether this is a file in a folder, and not a link to another folder."""
     return file.is_file() and file.resolve().parent == folder.resolve()
 
 
 def _by_number(file: Path) -> list[tuple[int, str]]:
-    """Return what sorts names in the order of the numbers in them: rosbag2 counts its files."""
+    """Return a key that sorts names by the numbers in them: rosbag2 numbers its files."""
     return [(int(part), '') if part.isdecimal() else (-1, part)
             for part in re.split(r'(\d+)', file.name)]

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""One of many bags: replayed by whatever process it is given to, and what became of it."""
+"""One of many bags as a task for any process, and its outcome."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from stewart_dynamics.replay.index import Cell, row_of
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import BAD_INPUT, code_of, Options
 
-# Between two reports of progress [s]
-SOON, NOW_AND_THEN = 0.1, 1.0
+# Interval of progress reports, within one computer and on a cluster [s].
+LOCAL_INTERVAL, CLUSTER_INTERVAL = 0.1, 1.0
 
 
 class Ended(NamedTuple):
-    """What became of one bag."""
+    """The outcome of one bag."""
 
     bag: Path
     folder: Path
@@ -42,9 +42,9 @@ class Ended(NamedTuple):
     row: dict[str, Cell]
     """Of fleet.csv."""
     text: str = ''
-    """What a person reads of it; empty where it failed or was found finished."""
+    """The summary in the terminal; empty if the bag failed or was finished before."""
     error: str = ''
-    """Why it failed or was partly read; names it."""
+    """Why it failed or was read in part, with its path."""
 
 
 class Task(NamedTuple):
@@ -58,15 +58,15 @@ class Task(NamedTuple):
 
 
 Results = Generator[tuple[int, Ended], None, None]
-"""The number of a bag and what became of it, as they end; closed, it stops all."""
+"""Number and outcome of each bag, as they end; closing the generator stops the run."""
 
 
 class Cancelled(BaseException):
-    """The run was stopped by its user."""
+    """The user has stopped the run."""
 
 
 def replay_task(task: Task, progress: Callable[[int, int], None]) -> Ended:
-    """Replay a bag, unless this run has done so; whatever goes wrong, say it in words."""
+    """Replay a bag, unless this run has done so; errors are part of the outcome."""
     before = finished(task)
     if before is not None:
         return before
@@ -74,21 +74,21 @@ def replay_task(task: Task, progress: Callable[[int, int], None]) -> Ended:
         done = replay(task.bag, task.parameters, task.folder, task.options, progress)
     except (StewartError, OSError) as exc:
         why = f'{exc}'
-    except (Exception, Cancelled) as exc:  # a fault of one bag is no reason to stop the others
+    except (Exception, Cancelled) as exc:  # an error in one bag does not stop the others
         why = f'{type(exc).__name__}: {exc}'
     else:
         return _whole(task, done.code, done.summary, done.text)
-    # One that was taken for dead may have finished it meanwhile.
+    # A process that was believed dead may have finished it in the meantime.
     return finished(task) or failed(task, why)
 
 
 def finished(task: Task) -> Ended | None:
-    """Return what became of a bag that a process of this run has finished before it died."""
+    """Return the outcome of a bag that a process of this run finished before it died."""
     try:
         summary = json.loads((task.folder / 'summary.json').read_text(encoding='utf-8'))
         if summary['run'] != task.options.run:
             return None
-    except (OSError, ValueError, TypeError, KeyError):  # none, or not one of ours
+    except (OSError, ValueError, TypeError, KeyError):  # no summary, or not one of this program
         return None
     return _whole(task, code_of(summary), summary)
 
@@ -100,24 +100,25 @@ def _whole(task: Task, code: int, summary: dict[str, Any], text: str = '') -> En
 
 
 def failed(task: Task, why: str) -> Ended:
+    """Return the outcome of a bag that could not be replayed."""
     why = ' '.join(why.split())
     return Ended(task.bag, task.folder, BAD_INPUT,
                  row_of(BAD_INPUT, None, why.removeprefix(f'{task.bag}: ')),
                  error=why if why.startswith(f'{task.bag}') else f'{task.bag}: {why}')
 
 
-def counted(number: int, tell: Callable[[int, int, int], None],
+def counted(number: int, report: Callable[[int, int, int], None],
             every: float) -> Callable[[int, int], None]:
-    """Return what sums up the progress of a bag and reports it, but not too often."""
+    """Return a function that sums up the progress of a bag and reports it at an interval."""
     read = setpoints = 0
-    told = time.monotonic()
+    reported = time.monotonic()
 
     def progress(more_read: int, more_setpoints: int) -> None:
-        nonlocal read, setpoints, told
+        nonlocal read, setpoints, reported
         read, setpoints = read + more_read, setpoints + more_setpoints
         now = time.monotonic()
-        if now - told >= every:
-            told = now
-            tell(number, read, setpoints)
+        if now - reported >= every:
+            reported = now
+            report(number, read, setpoints)
 
     return progress

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Which topics of a bag are the inputs: as named, under the usual names, or by their type."""
+"""The input topics of a bag: given by name, under their usual names, or found by type."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from stewart_dynamics.runtime import input_topics as inputs
 
 MEASURED = 'measured'
 _MEASURED_TYPE = 'sensor_msgs/msg/JointState'
-# So many of a kind are listed one by one.
+# At most so many of a kind are listed.
 LISTED = 20
 
 
 def find_topics(recording: Recording, parameters: Parameters, options: Options) -> dict[str, str]:
-    """Return of each topic that is read its name in the bag."""
+    """Return the name in the bag of each topic that is read."""
     wanted = inputs.SOURCES[parameters['setpoint.source']]
     for name in options.topics:
         if name != 'wrench' and f'setpoint/{name}' not in wanted:
@@ -40,7 +40,7 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
                                f'{parameters["setpoint.source"]}')
     found = {key: _topic(recording, key, options) for key in wanted}
     wrench = options.topics.get('wrench')
-    # One found by its type could be anything: a load cell, an estimate.
+    # A WrenchStamped found by its type could be anything: a load cell, an estimate.
     if wrench or f'{options.node}/{inputs.WRENCH}' in recording.topics:
         found[inputs.WRENCH] = _topic(recording, inputs.WRENCH, options)
     if options.measured:
@@ -48,26 +48,26 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     names = list(found.values())
     for name in names:
         if names.count(name) > 1:
-            raise BagError(f'{recording.path}: {name}: stands for '
+            raise BagError(f'{recording.path}: {name}: selected as '
                            f'{" and ".join(key for key in found if found[key] == name)}')
     return found
 
 
 def notices_of(recording: Recording, topics: Mapping[str, str], options: Options) -> list[str]:
-    """Return what a user should know of the choice of topics."""
-    notices = [f'{key} is taken from {name}, the only topic that it can be'
+    """Return notices about the choice of topics."""
+    notices = [f'{key} is read from {name}, the only topic that matches'
                for key, name in topics.items()
                if key in inputs.INPUT_TYPES and name != f'{options.node}/{key}'
                and name not in options.topics.values()]
     loads = sorted(name for name, kind in recording.topics.items()
                    if kind == inputs.INPUT_TYPES[inputs.WRENCH] and name not in topics.values())
     if loads and inputs.WRENCH not in topics:
-        notices.append(f'{", ".join(loads)}: loads that are not used; --wrench names one to use')
+        notices.append(f'{", ".join(loads)}: not used as external wrench; --wrench selects one')
     return notices
 
 
 def _topic(recording: Recording, key: str, options: Options) -> str:
-    """Return a topic's name in the bag: as given, as usual, or the only one it can be."""
+    """Return a topic's name in the bag: as given, the usual one, or the only one that matches."""
     kind = inputs.INPUT_TYPES[key]
     usual = f'{options.node}/{key}'
     given = options.topics.get(key.rpartition('/')[2])
@@ -81,23 +81,23 @@ def _topic(recording: Recording, key: str, options: Options) -> str:
     option = f'--{key.rpartition("/")[2]}'
     if of_type:
         raise BagError(f'{recording.path}: has no topic {usual}, and several of its type, '
-                       f'{kind}: {", ".join(of_type)}: choose one by {option}')
+                       f'{kind}: {", ".join(of_type)}: select one by {option}')
     raise BagError(f'{recording.path}: has no topic {usual}, nor another of its type, {kind}; '
-                   f'it holds {_held(recording)}{_advice(recording, key)}')
+                   f'it contains {_held(recording)}{_advice(recording, key)}')
 
 
 def _advice(recording: Recording, key: str) -> str:
     kinds = set(recording.topics.values())
     if key in (inputs.TWIST, inputs.ACCEL) and inputs.INPUT_TYPES[inputs.POSE] in kinds:
-        return '; --differentiate makes twist and acceleration of the poses'
+        return '; --differentiate computes twist and acceleration from the poses'
     if inputs.INPUT_TYPES[inputs.COMBINED] in kinds:
-        return '; --combined takes setpoints in one message'
+        return '; --combined reads setpoints in one message'
     return ''
 
 
 def _of_type(recording: Recording, name: str, kind: str) -> str:
     if name not in recording.topics:
-        raise BagError(f'{recording.path}: has no topic {name}; it holds {_held(recording)}')
+        raise BagError(f'{recording.path}: has no topic {name}; it contains {_held(recording)}')
     if recording.topics[name] != kind:
         raise BagError(f'{recording.path}: {name}: is a {recording.topics[name]}, must be a '
                        f'{kind}')
@@ -106,13 +106,13 @@ def _of_type(recording: Recording, name: str, kind: str) -> str:
 
 def _held(recording: Recording) -> str:
     held = ', '.join(f'{name} ({kind})' for name, kind in sorted(
-        recording.topics.items())) or 'nothing'
+        recording.topics.items())) or 'no topics'
     damage = listed(recording.damage)
-    return held + (f'; of it could not be read: {"; ".join(damage)}' if damage else '')
+    return held + (f'; could not be read: {"; ".join(damage)}' if damage else '')
 
 
 def listed(what: list[str]) -> list[str]:
-    """Return the first of many, and how many more there are."""
+    """Return the first texts, and the number of the others."""
     if len(what) <= LISTED:
         return list(what)
     return [*what[:LISTED], f'and {len(what) - LISTED} more']

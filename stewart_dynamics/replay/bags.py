@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Where bags are, and where the results of each go."""
+"""Finding bags in folders, and the folders of their results."""
 
 from __future__ import annotations
 
@@ -34,30 +34,30 @@ _NUMBERED = re.compile(r'(.*)_\d+(\.\w+(?:\.zstd)?)')
 
 def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
     """
-    Return the bags that a path names: itself, or all below it.
+    Return the bags at a path: itself, or all below it.
 
-    A file is a bag, and so is a folder that holds metadata.yaml. One without, as a recording
-    that was killed leaves it, is a bag if it holds the files of one recording, no other
-    bag and no bags below it; else each of its files is a bag. Symbolic links, hidden names and
+    A file is a bag, and so is a folder with a metadata.yaml. A folder without one, left by a
+    killed recorder, is a bag if it contains the files of one recording, no other bag and no
+    bags below it; otherwise each of its files is a bag. Symbolic links, hidden names and
     results of replays are skipped.
 
     Parameters
     ----------
     path : Path
-        What is no folder is returned, also where it does not exist.
+        A path that is not a folder is returned as it is, even if it does not exist.
     leave_out : Path, optional
-        A folder that is not searched: that of the results.
+        A folder that is not searched: the folder of the results.
 
-    Raises BagError: there is none.
+    Raises BagError if there is no bag.
 
     """
     if not path.is_dir():
         return [path]
     bags = sorted(_below(path, leave_out.resolve() if leave_out else None))
     if not bags:
-        raise BagError(f'{path}: holds no bag: neither {METADATA} nor files '
-                       f'{" or ".join("*" + suffix for suffix in STORAGES)}, in no folder below '
-                       'it either (links and hidden folders are not followed)')
+        raise BagError(f'{path}: contains no bag: no {METADATA} and no files '
+                       f'{" or ".join("*" + suffix for suffix in STORAGES)}, nor do the folders '
+                       'below it (links and hidden folders are not followed)')
     return bags
 
 
@@ -67,7 +67,7 @@ def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
             seen = [entry for entry in entries
                     if not entry.name.startswith('.') and not entry.is_symlink()]
     except PermissionError:
-        yield folder  # its reader says why it cannot be read
+        yield folder  # the reader reports why it cannot be read
         return
     folders = [folder / entry.name for entry in seen if entry.is_dir()]
     files = [folder / entry.name for entry in seen if entry.is_file()]
@@ -96,13 +96,13 @@ def _holds_results(folder: Path) -> bool:
 
 def folders_of_results(paths: Sequence[Path], output: Path) -> list[tuple[Path, Path]]:
     """
-    Return the bags that paths name, each with the folder of its results.
+    Return the bags at some paths, each with the folder of its results.
 
-    The results of a bag that is named are in ``output``, under its name; those of bags found
-    in a folder are where the bags are in it. Files lose their suffix, unless two that are found
-    in one folder would then have one name.
+    The results of a bag given by its path are in ``output`` under its name; those of bags found
+    in a folder are at the same relative path in ``output``. Suffixes of files are removed,
+    unless two files in one folder would then have the same name.
 
-    Raises BagError: a folder has no bags, or results would have one folder or be inside others.
+    Raises BagError if a folder contains no bags, or if results would share a folder or be nested.
 
     """
     pairs: list[tuple[Path, Path]] = []
@@ -112,7 +112,7 @@ def folders_of_results(paths: Sequence[Path], output: Path) -> list[tuple[Path, 
         except BagError:
             if len(paths) == 1:
                 raise
-            bags = [path]  # to be told of among the others
+            bags = [path]  # reported together with the others
         if bags == [path]:
             whole = Path(os.path.abspath(path))  # '.' has no name
             pairs.append((path, output / (whole.name if path.is_dir() else whole.stem)))
@@ -140,7 +140,7 @@ def _check_apart(pairs: Sequence[tuple[Path, Path]], output: Path) -> None:
                            'replay one of them into another --output')
         if folder in (output / FLEET_TABLE, output / FLEET_PAGE):
             raise BagError(f'{bag}: its results would be {folder}, where the table of all bags '
-                           'goes: replay it into another --output')
+                           'is written: replay it into another --output')
         taken[folder] = bag
     for bag, folder in pairs:
         for parent in folder.parents:
@@ -151,9 +151,9 @@ def _check_apart(pairs: Sequence[tuple[Path, Path]], output: Path) -> None:
 
 
 def bytes_of(bag: Path) -> int:
-    """Return how many bytes a bag has; never none, so that each counts for something."""
+    """Return the size of a bag [bytes], at least 1, so that each bag counts."""
     try:
         files = [file for file in bag.iterdir() if file.is_file()] if bag.is_dir() else [bag]
         return sum(file.stat().st_size for file in files) or 1
-    except OSError:  # whatever it is, it is said when the bag is replayed
+    except OSError:  # reported when the bag is replayed
         return 1

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _INTERRUPTED = 130
 _CUTOFF = 10.0
-# Of so many bags each one's summary is printed; of more how many ended how.
+# Up to this number of bags the summary of each is printed; of more only the totals.
 _FEW = 10
 
 
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.cutoff and not given.differentiate:
         parser.error('--cutoff: needs --differentiate')
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a name may be none in the terminal's encoding
+        if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
             stream.reconfigure(errors='backslashreplace')
     before = {each: signal.signal(each, _interrupted) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _interrupted(number: int, frame: object) -> None:
-    """End once; what is half written is taken away meanwhile, whatever else comes."""
+    """Stop; further signals are ignored while partial results are removed."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
     raise KeyboardInterrupt
@@ -94,16 +94,16 @@ def _arguments() -> argparse.ArgumentParser:
     for name, what in (
             ('pose', 'poses'), ('twist', 'twists'), ('accel', 'accelerations'),
             ('combined', 'setpoints in one message; sets setpoint.source'),
-            ('wrench', 'loads on the platform; never found by its type')):
+            ('wrench', 'external wrench on the platform; never found by its type')):
         topics.add_argument(f'--{name}', metavar='TOPIC', help=f'topic of the {what}')
     topics.add_argument('--measured', metavar='TOPIC',
                         help='JointState whose efforts are compared with the computed forces')
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',
-                       help='make twist and acceleration of the poses, by smoothing splines')
+                       help='compute twist and acceleration from the poses by smoothing splines')
     poses.add_argument('--cutoff', type=_frequency, metavar='HZ',
                        help=f'cut-off frequency of the splines (default: {_CUTOFF:g}); as low as '
-                            'the motion allows, noise grows with its power of 2.5')
+                            'the motion allows: noise grows with its power of 2.5')
     output = parser.add_argument_group('what is written')
     output.add_argument('--no-report', action='store_true', help='write no report.html')
     output.add_argument('--parquet', action='store_true',
@@ -112,8 +112,8 @@ def _arguments() -> argparse.ArgumentParser:
     many.add_argument('--jobs', type=_number, default=1, metavar='N',
                       help='bags that are replayed at the same time (default: 1)')
     many.add_argument('--scheduler', metavar='ADDRESS',
-                      help='let the workers of this Dask scheduler do it; they see the same '
-                           'folders')
+                      help='replay on the workers of this Dask scheduler; they must see '
+                           'the same folders')
     return parser
 
 
@@ -128,7 +128,7 @@ def _options(given: argparse.Namespace) -> Options:
 
 
 def _run(given: argparse.Namespace, options: Options) -> int:
-    # Not before: --help is to be answered at once.
+    # Imported here, so that --help is fast.
     from stewart_dynamics.mechanics import jit as compiled
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters import Parameters
@@ -195,7 +195,7 @@ def _printable(text: str) -> str:
 def _node(text: str) -> str:
     name = '/' + text.strip('/')
     if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
-        raise argparse.ArgumentTypeError(f'{text!r}: not a name of a node')
+        raise argparse.ArgumentTypeError(f'{text!r}: not a valid node name')
     return name
 
 

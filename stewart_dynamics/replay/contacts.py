@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""When an external load acted on the platform: intervals that stand out of a long recording."""
+"""Intervals in which an external load acted on the platform, in a recording of any length."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from stewart_dynamics.arrays import Array
 
 
 class Contact(NamedTuple):
-    """A time in which an external load acted on the platform."""
+    """An interval in which an external load acted on the platform."""
 
     begin: float
     end: float
     axis: int
     excess: float
-    """How many thresholds it is from the median, at the most."""
+    """Largest distance from the median, as a multiple of the threshold."""
     load: tuple[float, ...]
 
 
 class WrenchBins:
     """
-    Extremes and one value of the six parts of a wrench in bins of time, a fixed number of them.
+    Extremes and one value of the six components of a wrench in a fixed number of time bins.
 
-    Bins twice as wide replace pairs of them when time passes the last.
+    When the time exceeds the last bin, pairs of bins are merged.
     """
 
     _NUMBER = 16384
@@ -53,7 +53,7 @@ class WrenchBins:
         self._last = np.full(self._NUMBER, -np.inf)
 
     def add(self, seconds: Array, values: Array) -> None:
-        """Take wrenches (N, 6) at times (N,), never decreasing."""
+        """Add wrenches (N, 6) at times (N,), never decreasing [s]."""
         while seconds[-1] >= self.width * self._NUMBER:
             self._widen()
         bins = (seconds / self.width).astype(np.int64)
@@ -87,7 +87,7 @@ class WrenchBins:
         return median, 1.4826 * np.median(np.abs(one - median), axis=0)
 
     def contacts(self, median: Array, threshold: Array, gap: float) -> list[Contact]:
-        """Return where values exceed the threshold, interrupted for no longer than the gap."""
+        """Return the intervals with values above the threshold; shorter gaps are bridged."""
         filled = np.flatnonzero(np.isfinite(self._first))
         low, high = self._low[filled] - median, self._high[filled] - median
         far = np.where(-low > high, low, high)

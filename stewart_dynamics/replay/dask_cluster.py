@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Many bags on a Dask cluster; a bag whose worker died is begun again."""
+"""Many bags on a Dask cluster; a bag whose worker died is started again."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from typing import Any
 
 from stewart_dynamics.errors import one_line, StewartError
 from stewart_dynamics.replay.bag_task import (
-    Cancelled, counted, Ended, failed, finished, NOW_AND_THEN, replay_task, Results, Task)
+    Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Results, Task)
 from stewart_dynamics.replay.progress_bar import ProgressBar
 
 _TRIES = 2
-# How long a cluster's workers may take to clear away what was cancelled [s]
+# How long workers may take to remove partial results of a cancelled run [s].
 _PATIENCE = 20.0
 
-# Of a process of the cluster: the runs that were ended, and the bags that it has in hand.
+# In a worker: the cancelled runs, and the bags being replayed.
 _cancelled: set[str] = set()
-_in_hand: set[tuple[str, int]] = set()
+_in_work: set[tuple[str, int]] = set()
 
 
 def replay_on_cluster(
         tasks: Sequence[Task], address: str, bar: ProgressBar) -> Results:
-    """Replay on a cluster; it begins a bag again whose worker died."""
+    """Replay on a cluster; Dask starts a bag again whose worker died."""
     run = tasks[0].options.run if tasks else ''
     dask = _dask()
     with _silent('distributed', 'distributed.client'), _connected(dask, address) as client:
@@ -50,7 +50,7 @@ def replay_on_cluster(
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (TimeoutError, asyncio.TimeoutError) as exc:
             raise StewartError(
-                f'{address}: no worker has come to this scheduler in {_PATIENCE:g} s') from exc
+                f'{address}: this scheduler had no worker within {_PATIENCE:g} s') from exc
         futures: dict[Any, Task] = {}
         suspects: list[Task] = []
 
@@ -64,15 +64,15 @@ def replay_on_cluster(
         try:
             for future in dask.as_completed(
                     [submit(task, f'{task.number}') for task in tasks], loop=client.loop):
-                # Let go of it here, or it would be done again when the worker that holds
-                # its result dies.
+                # Release it, or it would be replayed again if the worker that holds its
+                # result died.
                 task = futures.pop(future)
                 try:
                     yield task.number, _result(dask, future, task)
                 except dask.KilledWorker:
                     suspects.append(task)
-            # Bags that only waited for a worker that died count as if they had killed it: now
-            # each shows alone what it does.
+            # Dask blames bags that only waited for a dead worker as well: each is replayed
+            # alone now.
             for task in suspects:
                 future = submit(task, f'{task.number}-alone')
                 try:
@@ -80,19 +80,19 @@ def replay_on_cluster(
                 except dask.KilledWorker as exc:
                     ended = failed(
                         task, 'the worker that replayed it died '
-                        f'{_TRIES * (exc.allowed_failures + 1)} times; the last one was at '
-                        f'{exc.last_worker.address} (was there too little memory?)')
+                        f'{_TRIES * (exc.allowed_failures + 1)} times, the last one at '
+                        f'{exc.last_worker.address} (out of memory?)')
                 del futures[future]
                 yield task.number, ended
         except BaseException:
             client.cancel(list(futures))
-            with suppress(Exception):  # a worker that is gone has nothing to clear away
+            with suppress(Exception):  # a worker that died has nothing to remove
                 client.run(_stop, run)
             raise
 
 
 def _result(dask: Any, future: Any, task: Task) -> Ended:
-    """Return what became of a bag; raises KilledWorker."""
+    """Return the outcome of a bag; raises KilledWorker."""
     try:
         ended: Ended = future.result()
     except Exception as exc:
@@ -114,7 +114,7 @@ def _dask() -> Any:
 
 @contextmanager
 def _silent(*names: str) -> Iterator[None]:
-    """Keep loggers from saying, with a traceback, what is said of each bag in words."""
+    """Silence loggers: errors are reported for each bag, without tracebacks."""
     loggers = [logging.getLogger(name) for name in names]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
@@ -129,7 +129,7 @@ def _silent(*names: str) -> Iterator[None]:
 @contextmanager
 def _connected(dask: Any, address: str) -> Iterator[Any]:
     try:
-        # Asked first if it is there: a client that does not find it prints what it thinks of that.
+        # Tried first: a client that does not find the scheduler prints a traceback.
         asyncio.run(_answer(dask, address))
         client = dask.Client(address, timeout=_PATIENCE, set_as_default=False)
     except Exception as exc:
@@ -151,23 +151,23 @@ def _on_worker(task: Task) -> Ended:
     worker, run = _dask().get_worker(), task.options.run
 
     tell = counted(
-        task.number, lambda *how_far: worker.log_event(run, how_far), NOW_AND_THEN)
+        task.number, lambda *how_far: worker.log_event(run, how_far), CLUSTER_INTERVAL)
 
     def progress(read: int, setpoints: int) -> None:
         if run in _cancelled:
             raise Cancelled
         tell(read, setpoints)
 
-    _in_hand.add((run, task.number))
+    _in_work.add((run, task.number))
     try:
         return replay_task(task, progress)
     finally:
-        _in_hand.discard((run, task.number))
+        _in_work.discard((run, task.number))
 
 
 async def _stop(run: str) -> None:
-    """End a run in a worker; return when it has let go of its bags."""
+    """Cancel a run in a worker; return when none of its bags is being replayed."""
     _cancelled.add(run)
     until = time.monotonic() + _PATIENCE
-    while any(of == run for of, _ in tuple(_in_hand)) and time.monotonic() < until:
+    while any(of == run for of, _ in tuple(_in_work)) and time.monotonic() < until:
         await asyncio.sleep(0.05)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Twist and acceleration of recorded poses, by the splines of ``smoothing_spline``."""
+"""Twist and acceleration of recorded poses, from the splines of ``smoothing_spline``."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from stewart_dynamics.mechanics.rows import MOTION, WRENCH
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
 from stewart_dynamics.runtime.step import Batch
 
-# Poses that are worked off at once.
+# Poses in a window.
 WINDOW = 4096
 
-TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration follows from them'
+TOO_FEW = f'fewer than {FEWEST} poses between gaps: no acceleration can be computed'
 TOO_FAST = 'turns faster than the cut-off frequency can follow'
 
-# Poses nearer to each other than this begin another stretch: nothing can be solved there [ns].
+# Poses closer in time than this begin another segment: the system is singular there [ns].
 _NEAREST = 100
 
-# Of the reach of the spline, in times of 1 / cut-off and in poses, where these are sparse: an
-# interpolating spline forgets by a factor of 0.27 a pose.
+# Range in which poses affect the spline, in multiples of 1 / cut-off and, for sparse poses, in
+# poses: the effect in an interpolating spline decays by a factor of 0.27 per pose.
 _REACH = 5.0
 _REACH_IN_POSES = 32
-# The system's condition grows with the fourth power of it: 4e-6 of the acceleration is lost here.
+# The condition of the system grows with its fourth power: the relative error is 4e-6 here.
 _MOST_POSES_IN_A_CUTOFF = 2000
-# A smoothed quaternion is shorter than one by what is smoothed away of it.
+# Smoothing makes a quaternion shorter than one.
 _SHORTEST_QUATERNION = 0.5
 
 _POSITION, _ROTATION, _POSE = slice(0, 3), slice(3, 12), slice(0, 12)
@@ -54,9 +54,9 @@ _VELOCITY, _OMEGA, _ACCELERATION, _ALPHA = (
 
 class Deviation(NamedTuple):
     """
-    How far the smoothed poses are from the recorded ones: noise, and what is cut off.
+    Deviation of the smoothed poses from the recorded ones: noise, and motion above the cut-off.
 
-    Of poses farther than 1 / cutoff from the ends of their stretch.
+    Of poses farther than 1 / cutoff from the ends of their segment.
     """
 
     position_rms: float
@@ -69,26 +69,26 @@ class Deviation(NamedTuple):
 
 class Differentiator:
     """
-    Gives poses their twist and acceleration, batch by batch, in bounded memory.
+    Computes twist and acceleration of poses, batch by batch, in bounded memory.
 
-    The poses themselves stay as they were recorded, bit for bit: leg lengths, det(J) and limits
-    are those of the recording, and a cut-off that is too low cannot hide a limit that the
-    recording breaks. Twist and acceleration are those of the smoothed pose at the same time,
-    derived exactly, without a phase between them; ``deviation`` says how far the two are apart.
+    The poses themselves are unchanged, bit for bit: leg lengths, det(J) and limits are those of
+    the recording, and a cut-off that is too low cannot hide an exceeded limit. Twist and
+    acceleration are those of the smoothed pose at the same time, derived exactly and without
+    phase shift; ``deviation`` is the difference between the two poses.
 
-    A jump back in time or a gap ends a stretch, and no spline passes over it. The results are
-    the same, bit for bit, however the poses are cut into batches.
+    A jump back in time or a gap ends a segment; no spline continues across it. The results do
+    not depend, bit for bit, on how the poses are split into batches.
 
     Parameters
     ----------
     cutoff : float
-        Frequency that passes with 1/sqrt(2) of its amplitude [Hz].
+        Frequency whose amplitude is reduced to 1/sqrt(2) [Hz].
     gap : float
-        Longest time between two poses of a stretch [s].
+        Longest time between two poses of a segment [s].
     window : int
-        Poses that are worked off at once.
+        Poses in a window.
 
-    Raises StewartError where the cut-off is no positive number, or scipy is not installed.
+    Raises StewartError if the cut-off is not a positive number, or scipy is not installed.
 
     """
 
@@ -98,16 +98,16 @@ class Differentiator:
         banded_solver()
         self.cutoff = cutoff
         self.left_out: Counter[str] = Counter()
-        """Setpoints that got no twist and acceleration and are not given back, by reason."""
+        """Number of setpoints left out, without twist and acceleration, by reason."""
         self.near_ends = 0
-        """Setpoints within 1 / cutoff of an end of their stretch."""
+        """Setpoints within 1 / cutoff of an end of their segment."""
         self._gap = round(gap * 1e9)
         self._reach = round(_REACH / cutoff * 1e9)
         self._window = window
         self._pending: list[Batch] = []
         self._held = 0
         self._due = window
-        # of the stretch that the pending setpoints begin in: how many of them were given
+        # of the segment of the first pending setpoint: how many were returned
         # already and stay for the next window's sake, and its first stamp
         self._given = 0
         self._begun = 0  # [ns]
@@ -118,50 +118,50 @@ class Differentiator:
 
     @property
     def deviation(self) -> Deviation:
-        """How far the smoothed poses are from the recorded ones so far."""
+        """Deviation of the smoothed poses from the recorded ones so far."""
         position, angle = np.sqrt(self._squares / max(self._gathered, 1)).tolist()
         return Deviation(position, float(self._largest[0]), angle, float(self._largest[1]))
 
     def add(self, batch: Batch) -> Batch:
         """
-        Take setpoints that have poses only; return those that are done, with their motion.
+        Add setpoints that have only poses; return those that are done, with their motion.
 
         Parameters
         ----------
         batch : Batch
-            Stamps increase but where time has jumped back.
+            Stamps increase, except at jumps back in time.
 
         """
         wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
         self._pending.append(Batch(
             batch.stamps, batch.motions, wrenches, batch.restarts, batch.times))
         self._held += len(batch.stamps)
-        # not at every batch: joining what is pending takes time
+        # not at every batch: joining the pending ones takes time
         return self._done() if self._held >= self._due else _joined([])
 
     def finish(self) -> Batch:
-        """Return the setpoints that are left, with their motion; no more are to come."""
+        """Return the remaining setpoints, with their motion, after the last batch."""
         done = self._done(ended=True)
         self._pending, self._held = [], 0
         return done
 
     def notices(self) -> list[str]:
-        """Return what a reader of the results has to know, in words."""
+        """Return notices to the user about the results."""
         off = self.deviation
         lines = [
             f'twist and acceleration are those of smoothing splines through the poses, cut-off '
-            f'frequency {self.cutoff:g} Hz; the splines pass the poses at '
+            f'frequency {self.cutoff:g} Hz; the splines deviate from the poses by '
             f'{off.position_rms * 1e3:.3g} mm and {math.degrees(off.angle_rms):.3g} degrees '
             f'RMS, {off.position_max * 1e3:.3g} mm and {math.degrees(off.angle_max):.3g} '
             'degrees at most']
         if self.near_ends:
             lines.append(
-                f'{self.near_ends} setpoints are within {1.0 / self.cutoff:.3g} s of the begin '
-                'or end of the poses or of a gap in them: their accelerations are too small')
+                f'{self.near_ends} setpoints are within {1.0 / self.cutoff:.3g} s of the first '
+                'or last pose or of a gap: their accelerations are too small')
         return lines
 
     def _done(self, ended: bool = False) -> Batch:
-        """Work off every window that has all that it needs."""
+        """Process every window for which all poses are there."""
         held = _joined(self._pending)
         stamps = held.stamps
         steps = np.diff(stamps)
@@ -170,22 +170,22 @@ class Differentiator:
         ends = [*begins[1:], len(stamps)]
         done: list[Batch] = []
         for begin, end in zip(begins, ends, strict=True):
-            stretch = _part(held, slice(begin, end))
+            segment = _part(held, slice(begin, end))
             closed = ended or end < len(stamps)
-            done += self._windows(stretch, closed)
+            done += self._windows(segment, closed)
             if closed:
                 self._given = 0
             else:
-                self._keep(stretch)
+                self._keep(segment)
         return _joined(done)
 
-    def _windows(self, stretch: Batch, closed: bool) -> list[Batch]:
-        """Work off a stretch as far as can be; a closed one to its end."""
-        stamps = stretch.stamps
+    def _windows(self, segment: Batch, closed: bool) -> list[Batch]:
+        """Process a segment as far as possible; a closed one to its end."""
+        stamps = segment.stamps
         if closed and not self._given and len(stamps) < FEWEST:
             if len(stamps):
                 self.left_out[TOO_FEW] += len(stamps)
-                self._restart = self._restart or bool(stretch.restarts.any())
+                self._restart = self._restart or bool(segment.restarts.any())
             return []
         if not self._given:
             self._begun = int(stamps[0])
@@ -197,33 +197,33 @@ class Differentiator:
             if not closed and (end < self._given + self._window or after > len(stamps)):
                 break
             part = slice(self._begin_of_reach(stamps, self._given), min(after, len(stamps)))
-            # numbers that overflow are left to the step, which rejects them
+            # the step rejects numbers that overflow
             with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
-                done.append(self._differentiate(stretch, part, slice(self._given, end)))
+                done.append(self._differentiate(segment, part, slice(self._given, end)))
             self._given = end
         return done
 
-    def _keep(self, stretch: Batch) -> None:
-        """Keep of a stretch that goes on what the next window needs."""
-        begin = self._begin_of_reach(stretch.stamps, self._given)
-        self._pending = [_part(stretch, slice(begin, None))]
+    def _keep(self, segment: Batch) -> None:
+        """Keep the poses that the next window of an open segment needs."""
+        begin = self._begin_of_reach(segment.stamps, self._given)
+        self._pending = [_part(segment, slice(begin, None))]
         self._given -= begin
-        self._held = len(stretch.stamps) - begin
+        self._held = len(segment.stamps) - begin
         self._due = self._held + self._window // 2
 
     def _begin_of_reach(self, stamps: Stamps, at: int) -> int:
-        """Return the first pose that counts for this one."""
+        """Return the first pose that affects this one."""
         before = int(np.searchsorted(stamps, int(stamps[at]) - self._reach))
         return max(0, min(before - 1, at - _REACH_IN_POSES))
 
     def _end_of_reach(self, stamps: Stamps, at: int) -> int:
-        """Return the end of the poses that count for this one; beyond them if some are to come."""
+        """Return the end of the poses that affect this one; may exceed those that are there."""
         after = int(np.searchsorted(stamps, int(stamps[at]) + self._reach, side='right'))
         return max(after + 1, at + _REACH_IN_POSES)
 
-    def _differentiate(self, stretch: Batch, part: slice, core: slice) -> Batch:
-        """Return a core of setpoints with the motion of the spline through a part around it."""
-        stamps, motions = stretch.stamps[part], stretch.motions[part]
+    def _differentiate(self, segment: Batch, part: slice, core: slice) -> Batch:
+        """Return the setpoints of a core with the motion of the spline through a larger part."""
+        stamps, motions = segment.stamps[part], segment.motions[part]
         times = (stamps - stamps[0]) * 1e-9
         self._check_rate(times)
         quaternions = rotations.to_quaternion(motions[:, _ROTATION].reshape(-1, 3, 3))
@@ -243,14 +243,14 @@ class Differentiator:
         omega = 2.0 * _vector_of_quotient(turn_rate, turn) / square
         alpha = (2.0 * _vector_of_quotient(turn_acceleration, turn) / square
                  - 2.0 * np.sum(turn * turn_rate, axis=-1, keepdims=True) / square * omega)
-        given = _part(stretch, core)
+        given = _part(segment, core)
         out = np.empty_like(given.motions)
         out[:, _POSE] = given.motions[:, _POSE]
         out[:, _VELOCITY], out[:, _ACCELERATION] = rates[:, :3], accelerations[:, :3]
         out[:, _OMEGA], out[:, _ALPHA] = omega, alpha
 
         time = 1e9 / self.cutoff
-        near = (given.stamps - self._begun < time) | (stretch.stamps[-1] - given.stamps < time)
+        near = (given.stamps - self._begun < time) | (segment.stamps[-1] - given.stamps < time)
         self.near_ends += int(np.count_nonzero(followed & near))
         known = followed & ~near & np.isfinite(out).all(axis=1)
         self._gather(values[known, :3] - out[known, _POSITION], turn[known],
@@ -268,7 +268,7 @@ class Differentiator:
                 f'a {_MOST_POSES_IN_A_CUTOFF}th of it')
 
     def _gather(self, off: Array, turn: Array, recorded: Array) -> None:
-        """Gather how far positions, and quaternions of any length, are from those recorded."""
+        """Add deviations of positions, and of quaternions of any length, from recorded ones."""
         angle = 2.0 * np.arctan2(np.linalg.norm(_vector_of_quotient(turn, recorded), axis=-1),
                                  np.sum(turn * recorded, axis=-1))
         distances = np.stack([np.linalg.norm(off, axis=-1), angle])
@@ -277,7 +277,7 @@ class Differentiator:
         self._largest = np.maximum(self._largest, np.max(distances, axis=1, initial=0.0))
 
     def _followed(self, given: Batch, motions: Array, followed: Flags) -> Batch:
-        """Leave out what the spline could not follow; a restart among it stays one."""
+        """Leave out setpoints that the spline could not follow; keep a restart among them."""
         self.left_out.update({TOO_FAST: n} if (n := int(np.count_nonzero(~followed))) else {})
         jumps = np.cumsum(given.restarts) + self._restart
         kept = jumps[followed]

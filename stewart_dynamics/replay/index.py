@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The table of many bags, a row for each: fleet.csv, and index.html, which sorts."""
+"""The table of many bags, one row each: fleet.csv, and index.html, which can be sorted."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from typing import Any, NamedTuple, TextIO
 from urllib.parse import quote
 
 from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
-from stewart_dynamics.replay.pages import page
+from stewart_dynamics.replay.html_pages import page
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]
-"""Of one bag: a cell for each column."""
+"""The cells of one bag, by column."""
 
 RESULTS = ('done', 'limit met', 'failed', 'partly read')
 """The exit codes in words."""
@@ -42,10 +42,10 @@ NOTHING_ANSWERED = 'nothing answered'
 
 class Column(NamedTuple):
     """
-    What fleet.csv calls a column, and its head on the page with its unit.
+    A column: its key in fleet.csv, its title on the page, and its unit.
 
-    ``of`` gives the cell from the dict that summary.json holds; None: not from there.
-    ``size``: the page sorts these numbers by size, whatever their sign.
+    ``of`` returns the cell from the content of summary.json; None: not from there.
+    ``size``: the page sorts these numbers by magnitude.
     """
 
     key: str
@@ -69,7 +69,7 @@ def _largest(values: Sequence[float]) -> float:
 
 
 def _worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
-    """Return what gives of the largest force: 0 itself, 1 its leg, 2 its time."""
+    """Return a function for the largest force: 0 its value, 1 its leg, 2 its time."""
     def of(summary: dict[str, Any]) -> Cell:
         peaks = [(leg['force_peak_n'], name, leg['force_peak_at_s'])
                  for name, leg in summary['legs'].items() if leg['force_peak_n'] is not None]
@@ -124,16 +124,16 @@ COLUMNS = (
 
 def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, Cell]:
     """
-    Return a bag's cells, all but its name and the folder of its results.
+    Return a bag's cells except its path and the folder of its results.
 
     Parameters
     ----------
     code : int
-        With which its replay ended.
+        Exit code of its replay.
     summary : dict, optional
-        What summary.json holds; None where the bag failed.
+        The content of summary.json; None if the bag failed.
     error : str
-        What is wrong with the bag, in words.
+        What is wrong with the bag.
 
     """
     cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'error': error}
@@ -146,10 +146,9 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
 
 
 def write_fleet(output: Path, rows: Sequence[Row]) -> None:
-    """Write fleet.csv and index.html into a folder, each whole or not at all."""
+    """Write fleet.csv and index.html into a folder, each complete or not at all."""
     with _whole_file(output / FLEET_TABLE) as file:
-        # All text in quotes: then no bag's name falls apart into cells at a semicolon either,
-        # where a spreadsheet separates by that.
+        # All text in quotes: spreadsheets that separate by semicolon do not split names.
         table = csv.writer(file, quoting=csv.QUOTE_NONNUMERIC)
         table.writerow([column.key for column in COLUMNS])
         table.writerows([_harmless(column.key, row.get(column.key)) for column in COLUMNS]
@@ -188,14 +187,14 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
 
 
 def _shown(cell: Cell) -> Cell:
-    """Return a number in the digits that a person reads."""
+    """Return a number rounded to nine digits, None if it is not finite."""
     if isinstance(cell, float):
         return float(f'{cell:.9g}') if math.isfinite(cell) else None
     return cell
 
 
 def _link(output: Path, row: Row) -> str | None:
-    """Return where a bag's report is, or its folder if there is none."""
+    """Return the link to the report of a bag, or to its folder if there is no report."""
     if row['results'] is None:
         return None
     report = Path(str(row['results'])) / 'report.html'
@@ -205,11 +204,11 @@ def _link(output: Path, row: Row) -> str | None:
 
 @contextmanager
 def _whole_file(final: Path) -> Iterator[TextIO]:
-    """Give a file that takes its final name only when all of it is written."""
+    """Yield a file that gets its final name only when it is complete."""
     descriptor, name = tempfile.mkstemp(prefix=f'.{final.name}.', dir=final.parent)
     partial = Path(name)
     try:
-        # Names that are no UTF-8 are shown with escapes.
+        # Names that are not UTF-8 are written with escapes.
         with open(descriptor, 'w', newline='', encoding='utf-8',
                   errors='backslashreplace') as file:
             yield file

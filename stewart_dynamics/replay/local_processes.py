@@ -16,9 +16,9 @@
 """
 Many bags in processes of this computer, by concurrent.futures.
 
-A process that dies breaks its pool, and all bags that were in work are begun again: each of them
-alone, in a pool of its own, so that one that kills its process shows what it does and takes no
-other along; those that waited in another pool.
+A process that dies breaks its pool. The bags that were being replayed are then replayed alone,
+each in a pool of its own, so that a bag that kills its process is found and affects no other; the
+bags that waited are replayed in another pool.
 """
 
 from __future__ import annotations
@@ -36,27 +36,27 @@ import threading
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.replay.bag_task import (
-    Cancelled, counted, Ended, failed, finished, replay_task, Results, SOON, Task)
+    Cancelled, counted, Ended, failed, finished, LOCAL_INTERVAL, replay_task, Results, Task)
 from stewart_dynamics.replay.progress_bar import ProgressBar
 
-# A process of its own from the start: what a fork takes along of threads is not safe.
+# Not forked: a fork of a process with threads is not safe.
 _CONTEXT = multiprocessing.get_context('spawn')
 
 
 def replay_in_processes(tasks: Sequence[Task], jobs: int, bar: ProgressBar) -> Results:
     """
-    Yield what became of each bag, as they end.
+    Yield the outcome of each bag, as they end.
 
     Parameters
     ----------
     tasks : sequence of Task
-        In the order in which they are begun.
+        In the order in which they are started.
     jobs : int
-        How many processes there are.
+        Number of processes.
     bar : ProgressBar
-        Shown the progress.
+        Shows the progress.
 
-    Raises StewartError where processes cannot start.
+    Raises StewartError if processes cannot start.
 
     """
     waiting, suspects = list(tasks), list[Task]()
@@ -71,39 +71,38 @@ def replay_in_processes(tasks: Sequence[Task], jobs: int, bar: ProgressBar) -> R
         yield from pool.results()
         if task.number not in pool.ended:
             yield task.number, finished(task) or failed(
-                task, 'the process that replayed it was killed, twice (was there too little '
-                'memory?)')
+                task, 'the process that replayed it was killed twice (out of memory?)')
 
 
 class _Pool:
     """
-    Processes that replay bags until all are done or one of the processes dies.
+    Processes that replay bags until all bags are done or a process dies.
 
     Attributes
     ----------
     ended : set of int
-        The bags that were done.
+        Numbers of the bags that are done.
     in_work : list of Task
-        Those that had been begun and were not done when a process died.
+        Bags that had been started and were not done when a process died.
 
     """
 
     def __init__(self, tasks: Sequence[Task], jobs: int, bar: ProgressBar) -> None:
         self._tasks, self._bar = {task.number: task for task in tasks}, bar
         self._jobs = min(jobs, len(tasks))
-        self._begun: set[int] = set()
+        self._started: set[int] = set()
         self.ended: set[int] = set()
 
     @property
     def in_work(self) -> list[Task]:
-        """Return what was begun and not done."""
-        return [self._tasks[number] for number in sorted(self._begun - self.ended)]
+        """Return the bags that were started and are not done."""
+        return [self._tasks[number] for number in sorted(self._started - self.ended)]
 
     def results(self) -> Results:
-        """Yield what became of bags; return when all are done or a process has died."""
-        # Words of progress are short: the pipe takes each as a whole, whoever writes.
+        """Yield the outcome of bags; return when all are done or a process has died."""
+        # Progress reports are short: each is written atomically, though processes share the pipe.
         progress, of_workers = _CONTEXT.Pipe(duplex=False)
-        # Closed, by this process or by its death, it tells the others to stop.
+        # When this end is closed, also by the death of this process, the others stop.
         until, kept_open = _CONTEXT.Pipe(duplex=False)
         pool = ProcessPoolExecutor(
             self._jobs, _CONTEXT, initializer=_set_up, initargs=(of_workers, until))
@@ -113,7 +112,7 @@ class _Pool:
                 for number, task in self._tasks.items():
                     pending[pool.submit(_work, task)] = number
             while pending:
-                done, _ = wait(pending, SOON, FIRST_COMPLETED)
+                done, _ = wait(pending, LOCAL_INTERVAL, FIRST_COMPLETED)
                 self._read(progress)
                 for future in done:
                     number = pending.pop(future)
@@ -122,8 +121,8 @@ class _Pool:
                     yield number, ended
         except BrokenProcessPool:
             self._read(progress)
-            if not self._begun:
-                raise StewartError('the processes that were to replay bags could not start') from (
+            if not self._started:
+                raise StewartError('the processes to replay bags could not start') from (
                     None)
             for task in self.in_work:
                 self._bar.at(task.number, 0, 0)
@@ -137,14 +136,14 @@ class _Pool:
     def _read(self, progress: Connection) -> None:
         while progress.poll():
             number, read, setpoints = progress.recv()
-            self._begun.add(number)
+            self._started.add(number)
             self._bar.at(number, read, setpoints)
 
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Keep Ctrl-C, which goes to all, from processes that are started: they are stopped by us."""
-    # To start this one, which comes along with the first, would lift the block.
+    """Block Ctrl-C in processes that are started: this process stops them."""
+    # Starting the resource tracker later would lift the block.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -167,7 +166,7 @@ def _set_up(progress: Connection, until: Connection) -> None:
 
 
 def _watch(until: Connection) -> None:
-    """Wait for the end of the run; then stop, once a bag in work has been cleared away."""
+    """Wait for the end of the run; then exit, once the partial results are removed."""
     until.poll(None)
     _stopped.set()
     with _busy:
@@ -178,10 +177,10 @@ def _work(task: Task) -> Ended:
     assert _progress is not None
     connection = _progress
 
-    def tell(*how_far: int) -> None:
+    def send(*how_far: int) -> None:
         connection.send(how_far)
 
-    report = counted(task.number, tell, SOON)
+    report = counted(task.number, send, LOCAL_INTERVAL)
 
     def progress(read: int, setpoints: int) -> None:
         if _stopped.is_set():
@@ -189,5 +188,5 @@ def _work(task: Task) -> Ended:
         report(read, setpoints)
 
     with _busy:
-        tell(task.number, 0, 0)
+        send(task.number, 0, 0)
         return replay_task(task, progress)

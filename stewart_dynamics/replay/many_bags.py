@@ -14,11 +14,11 @@
 
 
 """
-Many bags, each replayed on its own: in processes of this computer or on a Dask cluster.
+Many bags, replayed independently: in this process, in several processes, or on a Dask cluster.
 
-What happens to one bag does not concern the others. A bag whose process dies is begun again; a run
-has a name, kept in all its results, so that one that was finished just before is not taken for
-somebody else's.
+An error in one bag does not stop the others. A bag whose process dies is started again. Each run
+has an identifier that is written to all its results: a bag that the process had finished
+before it died is recognized by it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ import uuid
 
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.bag_task import counted, Ended, replay_task, Results, SOON, Task
+from stewart_dynamics.replay.bag_task import (
+    counted, Ended, LOCAL_INTERVAL, replay_task, Results, Task)
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.index import Cell, RESULTS, write_fleet
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, Options, PARTLY_READ
@@ -45,18 +46,18 @@ _SEVERITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
 
 
 class Fleet(NamedTuple):
-    """What became of all bags, in the order in which they were given."""
+    """The outcome of all bags, in the order in which they were given."""
 
     ended: tuple[Ended, ...]
 
     def code(self, strict: bool) -> int:
-        """Return the exit code, the most severe; a limit counts if it is strict."""
+        """Return the most severe exit code; exceeded limits count only if strict."""
         codes = (each.code for each in self.ended)
         return max((code for code in codes if strict or code != LIMIT_MET), key=_SEVERITY,
                    default=DONE)
 
     def text(self) -> str:
-        """Return how many bags ended how, and a line for every bag that is not whole."""
+        """Return the number of bags by result, and a line for every bag with an error."""
         number = Counter(each.code for each in self.ended)
         counts = ', '.join(f'{number[code]} {RESULTS[code]}'
                            for code in sorted(number, key=_SEVERITY))
@@ -74,24 +75,24 @@ def replay_fleet(
     Parameters
     ----------
     bags : sequence of (Path, Path)
-        Each with the folder of its results, as bags.folders_of_results gives them.
+        Each with the folder of its results, from bags.folders_of_results.
     parameters : Parameters
         Of the hexapod.
     output : Path
-        Where fleet.csv and index.html go.
+        Folder of fleet.csv and index.html.
     options : Options
-        For every bag. ``run`` is set if it is empty.
+        Of every bag. ``run`` is set if it is empty.
     jobs : int
         How many processes; 1: this one.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers do it. They must have this package and find
-        the bags and ``output`` under the same paths as this process.
+        Address of a Dask scheduler whose workers replay the bags. They must have this package
+        and see the bags and ``output`` at the same paths as this process.
     show_progress : bool, optional
-        On stderr; by default where that is a terminal.
+        On stderr; by default if that is a terminal.
 
-    Raises StewartError: fleet.csv or index.html exists already, or there is no such cluster.
-    Whatever is wrong with a bag is in its row. KeyboardInterrupt ends all; bags that
-    were finished by then keep their results.
+    Raises StewartError if fleet.csv or index.html exists already, or if the cluster cannot be
+    reached. Errors in a bag are written to its row. KeyboardInterrupt stops the run; finished
+    bags keep their results.
 
     """
     for path in (output / FLEET_TABLE, output / FLEET_PAGE):
@@ -103,7 +104,7 @@ def replay_fleet(
     tasks = [Task(number, bag, folder, parameters, options)
              for number, (bag, folder) in enumerate(bags)]
     sizes = [bytes_of(task.bag) for task in tasks]
-    # The largest first: else it may be the last, and all others wait for it alone.
+    # The largest first: started last, it would run alone at the end.
     order = sorted(tasks, key=lambda task: -sizes[task.number])
     ended: dict[int, Ended] = {}
     try:
@@ -114,7 +115,7 @@ def replay_fleet(
                 ended[number] = result._replace(bag=bag, folder=folder)
                 bar.end(number, result)
     finally:
-        _clear_away(tasks, options.run)
+        _remove_partial(tasks, options.run)
     fleet = Fleet(tuple(ended[number] for number in range(len(tasks))))
     write_fleet(output, [_row(each, output) for each in fleet.ended])
     return fleet
@@ -129,7 +130,7 @@ def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, bar: Progr
         yield from replay_in_processes(tasks, min(jobs, len(tasks)), bar)
     else:
         for task in tasks:
-            yield task.number, replay_task(task, counted(task.number, bar.at, SOON))
+            yield task.number, replay_task(task, counted(task.number, bar.at, LOCAL_INTERVAL))
 
 
 def _row(ended: Ended, output: Path) -> dict[str, Cell]:
@@ -138,15 +139,15 @@ def _row(ended: Ended, output: Path) -> dict[str, Cell]:
     return {**ended.row, 'bag': str(ended.bag), 'results': results}
 
 
-def _clear_away(tasks: Sequence[Task], run: str) -> None:
-    """Remove what processes that died, or were ended, have left behind."""
+def _remove_partial(tasks: Sequence[Task], run: str) -> None:
+    """Remove partial results of processes that died or were stopped."""
     begun: dict[Path, dict[str, Path]] = {}
     for task in tasks:
         begun.setdefault(task.folder.parent, {})[partial_name(task.folder, run)] = task.folder
     for parent, beginnings in begun.items():
         try:
             left = [path for path in parent.iterdir() if f'.{run}.' in path.name]
-        except OSError:  # was never made
+        except OSError:  # was not created
             continue
         for path in left:
             folder = next((folder for beginning, folder in beginnings.items()
@@ -154,6 +155,6 @@ def _clear_away(tasks: Sequence[Task], run: str) -> None:
             if folder is None:
                 continue
             if path.name.endswith('.replaced') and not folder.exists():
-                path.rename(folder)  # what was to replace it was never whole
+                path.rename(folder)  # its replacement was not completed
             else:
                 shutil.rmtree(path, ignore_errors=True)

@@ -14,11 +14,11 @@
 
 
 """
-Where the messages are in an MCAP file, by its index or by following the chain of its records.
+Where the messages are in an MCAP file, by its index or by following its records one by one.
 
-A sound index is trusted: it has a checksum. Else the chain is followed from the beginning to where
-it breaks; nothing behind that is read. No checksum covers the records of the chain that are
-outside of chunks, so each must have the length that the lengths in it add up to.
+An index with a correct checksum is used. Otherwise the records are followed from the beginning to
+the first damaged one; nothing after it is read. Records outside of chunks have no checksum, so the
+length of each must agree with the lengths of its fields.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from stewart_dynamics.replay.mcap_scan import scanned, TIME
 
 MAGIC = b'\x89MCAP0\r\n'
 HEAD = 9  # of every record: opcode, and its length
-# No recorder writes larger chunks; nor is more decompressed.
+# No recorder writes larger chunks; larger ones are not decompressed.
 LARGEST_CHUNK = 1 << 27
-UNFIT = 'lengths in a record that do not fit each other'
+INCONSISTENT = 'inconsistent lengths in a record'
 
 _MESSAGE_HEAD = 22
 _FOOTER = HEAD + 20 + len(MAGIC)
 _DATA_END = HEAD + 4
 _LARGEST_INDEX = 1 << 28
-# So many bytes are read at once where there are no chunks.
+# Bytes read at once if there are no chunks.
 _RUN = 1 << 20
 _INDEX = 'the index at the end of the file'
-# In place of what two records say differently.
+# In place of something that two records declare differently.
 _CONTRADICTORY: Any = None
 
 
@@ -60,7 +60,7 @@ class _Channel(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A chunk, or messages outside of chunks that stand one behind the other."""
+    """A chunk, or successive messages outside of chunks."""
 
     start_time: int
     offset: int
@@ -70,7 +70,7 @@ class Piece(NamedTuple):
 
 class McapLayout:
     """
-    Where the messages are, and what they are.
+    Position and type of the messages.
 
     Parameters
     ----------
@@ -82,16 +82,16 @@ class McapLayout:
     size : int
         Of the file.
     missing : list of str
-        What could not be read, in words.
+        What could not be read.
     schemas, channels : dict
         By their numbers; None where two records differ.
     pieces : list of Piece
         In the order of their first messages.
     messages : int or None
-        How many there are, if a sound index says so; else the chain was followed, and channels
-        may be declared in chunks alone.
+        Their number, if there is a valid index; None: the records were followed, and channels
+        may be declared only in chunks.
     has_loose : bool
-        There are messages outside of chunks that no checksum covers.
+        There are messages outside of chunks without a checksum.
 
     """
 
@@ -104,10 +104,10 @@ class McapLayout:
         self.pieces: list[Piece] = []
         self.messages: int | None = None
         self.has_loose = False
-        # Where the data end, where a footer tells.
+        # End of the data section, if there is a footer.
         self._data_end: int | None = None
         if not self._read_index():
-            self._follow_chain()
+            self._follow_records()
         self.pieces.sort()
 
     def read_at(self, offset: int, size: int) -> bytes:
@@ -118,7 +118,7 @@ class McapLayout:
     # The index
 
     def _read_index(self) -> bool:
-        """Read the index at the file's end; return whether it is sound and tells of all."""
+        """Read the index at the end of the file; return whether it is valid and complete."""
         try:
             footer_at = self.size - _FOOTER
             tail = self.read_at(max(footer_at, 0), _FOOTER)
@@ -136,14 +136,14 @@ class McapLayout:
                     summary[:-len(MAGIC) - 4]) != footer.summary_crc:
                 raise ValueError
             return self._took(summary, sure=bool(footer.summary_crc))
-        except Exception:  # whatever stands there in place of an index
+        except Exception:  # any bytes can be there
             self.missing.append(_INDEX)
             self._data_end = None
             self._forget()
             return False
 
     def _took(self, summary: bytes, sure: bool) -> bool:
-        """Take an index in; forget it and return False where the chain must be followed."""
+        """Use an index; discard it and return False if the records must be followed."""
         statistics: Statistics | None = None
         for record in StreamReader(BytesIO(summary), skip_magic=True).records:
             if isinstance(record, Schema | Channel):
@@ -167,10 +167,10 @@ class McapLayout:
         self.channels.clear()
         self.pieces.clear()
 
-    # The chain
+    # The records
 
-    def _follow_chain(self) -> None:
-        """Follow the chain of records to the end of the data, and note where messages are."""
+    def _follow_records(self) -> None:
+        """Follow the records to the end of the data, and note where messages are."""
         at = len(MAGIC)
         while True:
             head = self.read_at(at, HEAD).ljust(HEAD, b'\0')
@@ -194,7 +194,7 @@ class McapLayout:
             self._check_loose(at)
 
     def _fault(self, at: int, opcode: int, length: int) -> str:
-        """Note a chunk, or what a record declares; return what is wrong with it."""
+        """Note a chunk or a declaration; return what is wrong with the record."""
         self._file.seek(at + HEAD)
         stream = ReadDataStream(self._file)
         try:
@@ -207,7 +207,7 @@ class McapLayout:
                     self.pieces.append(Piece(start_time, at, length, is_chunk=True))
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL) and length <= LARGEST_CHUNK:
                 return self.declared(opcode, stream.read(length))
-            # Nothing of the others is used, but their lengths tell that they are what they say.
+            # The others are not used, but their lengths must be consistent.
             elif opcode == Opcode.MESSAGE_INDEX:
                 stream.read2()
                 whole = stream.count + 4 + stream.read4()
@@ -220,11 +220,11 @@ class McapLayout:
             else:
                 return 'no record begins there'
         except (McapError, struct.error):
-            return UNFIT
-        return '' if whole == length else UNFIT
+            return INCONSISTENT
+        return '' if whole == length else INCONSISTENT
 
     def declared(self, opcode: int, content: bytes) -> str:
-        """Note what a record of a schema or channel says; return what is wrong with it."""
+        """Note a schema or channel; return what is wrong with its record."""
         stream = ReadDataStream(BytesIO(content))
         try:
             record = (Schema if opcode == Opcode.SCHEMA else Channel).read(stream)
@@ -239,27 +239,27 @@ class McapLayout:
         """Note a schema or a channel; of two that differ neither is used."""
         table: dict[int, Any] = self.schemas
         name = record.name if isinstance(record, Schema) else record.topic
-        said: Any = name
+        declared: Any = name
         if isinstance(record, Channel):
             table = self.channels
-            said = _Channel(record.schema_id, record.topic, record.message_encoding)
-        if table.setdefault(record.id, said) != said:
+            declared = _Channel(record.schema_id, record.topic, record.message_encoding)
+        if table.setdefault(record.id, declared) != declared:
             table[record.id] = _CONTRADICTORY
-            self.say(f'{name}: declared differently by two records')
+            self.note(f'{name}: declared differently by two records')
 
     def _note_run(self, at: int, until: int) -> int:
-        """Note messages that stand outside of chunks, and return where they end."""
+        """Note messages outside of chunks, and return where they end."""
         found, consumed, _ = scanned(self.read_at(at, until - at), only_messages=True)
         self.pieces.append(Piece(int(found[:, TIME].min()), at, consumed, is_chunk=False))
         return at + consumed
 
     def _check_loose(self, data_end: int) -> None:
         """
-        Drop what is outside of chunks unless it can be trusted.
+        Drop messages outside of chunks unless they are valid.
 
-        A checksum of the whole file covers it, where there is one. Where there is none nor
-        are there chunks, it is the user who must know. A message among chunks is mostly another
-        record, damaged.
+        They are covered by the checksum of the data section, if there is one. In a file
+        without it and without chunks they are read, with a notice. A message between chunks is
+        most likely another record, damaged.
         """
         chunks = [piece for piece in self.pieces if piece.is_chunk]
         expected = data_end and DataEnd.read(ReadDataStream(BytesIO(
@@ -278,14 +278,14 @@ class McapLayout:
             self.pieces = chunks
             self.missing.append(f'messages outside of chunks: {fault}')
 
-    def say(self, what: str) -> None:
+    def note(self, what: str) -> None:
         """Note once what could not be read."""
         if what not in self.missing:
             self.missing.append(what)
 
 
 def _skip_fields(stream: ReadDataStream, number: int) -> int:
-    """Read over fields that have their length before them; return how much was read in all."""
+    """Skip fields that begin with their length; return the number of bytes read in all."""
     for _ in range(number):
         length = stream.read4()
         if len(stream.read(min(length, _RUN))) < length:

@@ -14,52 +14,45 @@
 
 
 """
-One MCAP file, whole, cut short or damaged: what of it can be trusted, in the order of time.
+One MCAP file, whole, cut short or damaged: its valid messages in the order of time.
 
-Files are read through the package ``mcap`` (https://mcap.dev/spec). Its own decompression does not
-bound what a chunk may become, and its reader makes an object of every message; here a chunk is
-decompressed to no more than it declares, and the messages in it are found by a compiled scan.
+Files are read by the package ``mcap`` (https://mcap.dev/spec). Its reader creates an object per
+message; here the messages in a chunk are found by a compiled scan.
 """
 
 from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Iterator, Mapping
-from io import BytesIO
 import math
 from pathlib import Path
-import zlib
 
-import lz4.frame
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Chunk
 import numpy as np
-import zstandard
 
 from stewart_dynamics.errors import BagError, one_line
-from stewart_dynamics.replay.mcap_layout import (
-    HEAD, LARGEST_CHUNK, MAGIC, McapLayout, Piece, UNFIT)
+from stewart_dynamics.replay.mcap_chunk import decompressed
+from stewart_dynamics.replay.mcap_layout import HEAD, LARGEST_CHUNK, MAGIC, McapLayout, Piece
 from stewart_dynamics.replay.mcap_scan import CHANNEL, scanned, SIZE, START, TIME
 from stewart_dynamics.replay.message_blocks import Block, lean, merged, split
 
-# What waits for its turn, in bytes and as a multiple of the file: more than chunks can hold that
-# overlap in time, unless they are made to fill the memory.
+# The most that is held back to sort chunks that overlap in time, in bytes and as a multiple of
+# the file: more is needed only by files made to fill the memory.
 _MOST_WAITING, _TIMES_THE_FILE = 1 << 30, 4
 
 
 class McapRecording:
     """
-    What can be trusted in an MCAP file.
+    The valid messages of an MCAP file.
 
-    Raises BagError for what is none, OSError where it cannot be read.
+    Raises BagError if it is not an MCAP file, OSError if it cannot be read.
 
     Attributes
     ----------
     missing : list of str
-        What could not be read, in words.
+        What could not be read.
     unchecked : bool
-        Messages were read that no checksum covers.
+        Messages without a checksum were read.
 
     """
 
@@ -67,22 +60,22 @@ class McapRecording:
         self._file = path.open('rb')
         try:
             if self._file.read(len(MAGIC)) != MAGIC:
-                raise BagError(f'{path}: not a bag that can be read: does not begin as an MCAP '
-                               'file does')
+                raise BagError(f'{path}: not a bag that can be read: does not begin like an MCAP '
+                               'file')
             self._layout = McapLayout(self._file)
             self.missing = self._layout.missing
             self.unchecked = self._layout.has_loose
             if self._layout.messages is None:
                 for piece in self._layout.pieces:
                     if piece.is_chunk:
-                        self._content(piece, say=False)
+                        self._content(piece, note=False)
         except BaseException:
             self._file.close()
             raise
 
     @property
     def topics(self) -> dict[str, str]:
-        """The type of each topic; that of one whose messages are not CDR says so."""
+        """The type of each topic, and its encoding if that is not CDR."""
         kinds: dict[str, set[str]] = {}
         for channel in filter(None, self._layout.channels.values()):
             kind = self._layout.schemas.get(channel.schema) or 'message without a type'
@@ -92,7 +85,7 @@ class McapRecording:
         return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
 
     def blocks(self, topics: Mapping[str, int]) -> Iterator[tuple[Block, int]]:
-        """Yield these topics' messages as Source says; of one time as they are in the file."""
+        """Yield the messages of these topics, see Source; those of one time in file order."""
         numbers = np.full(1 << 16, -1, dtype=np.int64)
         for number, channel in self._layout.channels.items():
             if channel:
@@ -107,12 +100,12 @@ class McapRecording:
                 block = block._replace(channels=numbers[block.channels])
                 block = block.chosen(block.channels >= 0)
                 if len(block.times) and block.times[0] < reached:
-                    self.missing.append(f'the chunk at byte {piece.offset}: part of it was '
-                                        'recorded earlier than it says')
+                    self.missing.append(f'the chunk at byte {piece.offset}: part of it is '
+                                        'earlier than its declared start')
                     block = block.chosen(block.times >= reached)
                 if len(block.times):
                     insort(waiting, (piece.offset, lean(block)), key=lambda each: each[0])
-            # What later pieces have is no earlier than their first message.
+            # Later pieces contain nothing earlier than their first message.
             until = pieces[n + 1].start_time if n + 1 < len(pieces) else math.inf
             if sum(len(block.data) for _, block in waiting) > max(
                     _MOST_WAITING, _TIMES_THE_FILE * self._layout.size):
@@ -137,8 +130,8 @@ class McapRecording:
         """Close the file."""
         self._file.close()
 
-    def _content(self, piece: Piece, say: bool = True) -> Block | None:
-        """Return what a piece holds, in the order of time; None, and say so, if damaged."""
+    def _content(self, piece: Piece, note: bool = True) -> Block | None:
+        """Return the messages of a piece in the order of time; None, and a note, if damaged."""
         try:
             if piece.length > LARGEST_CHUNK:
                 raise ValueError(f'{piece.length} bytes, at most {LARGEST_CHUNK} are read')
@@ -146,18 +139,18 @@ class McapRecording:
                     else self._layout.read_at(piece.offset, piece.length))
             found, consumed, array = scanned(data, only_messages=not piece.is_chunk)
             if consumed != len(data):
-                raise ValueError('its records do not fit each other')
+                raise ValueError('its records are inconsistent')
             for opcode, _, start, size in found[found[:, CHANNEL] < 0].tolist():
                 fault = self._layout.declared(-opcode, bytes(data[start:start + size]))
                 if fault:
                     raise ValueError(fault)
-        except Exception as exc:  # damaged bytes: whatever the decompressors make of them
-            if say:
+        except Exception as exc:  # damaged bytes: the decompressors raise any exception
+            if note:
                 self.missing.append(f'the chunk at byte {piece.offset}: {one_line(exc)}')
             return None
         found = found[found[:, CHANNEL] >= 0]
-        if say and not np.isin(found[:, CHANNEL], list(self._layout.channels)).all():
-            self._layout.say('messages of a topic that no whole record declares')
+        if note and not np.isin(found[:, CHANNEL], list(self._layout.channels)).all():
+            self._layout.note('messages on a channel that no valid record declares')
         times = found[:, TIME]
         if np.any(times[1:] < times[:-1]):
             found = found[np.argsort(times, kind='stable')]
@@ -165,30 +158,10 @@ class McapRecording:
                      array)
 
     def _unpacked(self, piece: Piece) -> bytes:
-        """Return what is in a chunk; ValueError where its checksum or a size is wrong."""
+        """Return the content of a chunk; ValueError if its checksum or a size is wrong."""
         head = self._layout.read_at(piece.offset, HEAD)
         if head != bytes([Opcode.CHUNK]) + piece.length.to_bytes(8, 'little'):
-            raise ValueError('there is none')
-        stream = ReadDataStream(BytesIO(self._file.read(piece.length)))
-        chunk = Chunk.read(stream)
-        size, data = chunk.uncompressed_size, bytes(chunk.data)
-        if stream.count != piece.length:
-            raise ValueError(UNFIT)
-        if size > LARGEST_CHUNK:
-            raise ValueError(f'{size} bytes, at most {LARGEST_CHUNK} are read')
-        if chunk.compression == 'zstd':
-            # What is declared in the chunk is all that may be allocated.
-            if zstandard.frame_content_size(data) not in (-1, size):
-                raise ValueError('its sizes do not fit each other')
-            data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-        elif chunk.compression == 'lz4':
-            data = bytes(lz4.frame.LZ4FrameDecompressor().decompress(
-                data, max_length=size + 1))
-        elif chunk.compression:
-            raise ValueError(f'compressed as {chunk.compression!r}, must be zstd or lz4')
-        if len(data) != size:
-            raise ValueError(f'{len(data)} bytes, must be {size}')
-        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-            raise ValueError('its checksum is wrong')
-        self.unchecked = self.unchecked or not (chunk.uncompressed_crc or size == 0)
-        return data
+            raise ValueError('no chunk begins there')
+        content, checked = decompressed(self._file.read(piece.length))
+        self.unchecked = self.unchecked or not checked
+        return content

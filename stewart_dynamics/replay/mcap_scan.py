@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The messages in a chain of MCAP records, found by compiled code."""
+"""A compiled scan for the messages in a sequence of MCAP records."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.mechanics.jit import entry_point
 
-# Columns of what is found; schemas and channels have minus the opcode in place of the channel.
+# Columns of the result; of schemas and channels the first is minus the opcode.
 CHANNEL, TIME, START, SIZE, _FOUND = range(5)
 
 
 @entry_point
 def scan(data: Bytes, only_messages: bool, found: Integers) -> tuple[int, int]:
     """
-    Find the messages in a chain of records.
+    Find the messages in a sequence of records.
 
     Parameters
     ----------
     data : (M,)
-        The chain's bytes.
+        The bytes of the records.
     only_messages : bool
-        End at the first record that is something else.
+        End at the first record that is not a message.
     found : (K, 4)
-        Written: channel, time, where it begins, size; of schemas and channels minus the opcode
-        in place of the channel. Of what exceeds K only the number is counted.
+        Output: channel, time, start, size; of schemas and channels minus the opcode in place
+        of the channel. Messages beyond K rows are only counted.
 
-    Returns how many there are, and how many bytes the whole records have.
+    Returns the number of messages, and the number of bytes of the whole records.
 
     """
     count, at = 0, 0
@@ -76,8 +76,8 @@ def scan(data: Bytes, only_messages: bool, found: Integers) -> tuple[int, int]:
 
 
 def scanned(data: bytes, only_messages: bool) -> tuple[Integers, int, Bytes]:
-    """Return what is found (K, 4), how many bytes the whole records have, and all bytes."""
-    array = np.frombuffer(bytearray(data), np.uint8)  # numba compiles anew for read-only ones
+    """Return the messages (K, 4), the number of bytes of whole records, and all bytes."""
+    array = np.frombuffer(bytearray(data), np.uint8)  # numba compiles again for read-only arrays
     count, _ = scan(array, only_messages, np.empty((0, _FOUND), np.int64))
     found = np.empty((count, _FOUND), np.int64)
     _, consumed = scan(array, only_messages, found)

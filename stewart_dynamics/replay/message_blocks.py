@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Recorded messages, many at a time, and how blocks of them are merged, cut and kept small."""
+"""Recorded messages in blocks; merging, splitting and compacting of blocks."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ import zstandard
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.mechanics.jit import entry_point
 
-# So many messages are handed over at once, where there are as many: enough that numpy's own cost
-# for each call is small, few enough that they stay in the processor's cache.
+# Messages in a block: enough that the overhead of a numpy call is small, few enough that they fit
+# into the processor's cache.
 _FEWEST, _MOST = 4096, 16384
-# Blocks of fewer messages are handed over when they have so many bytes.
+# Bytes from which a block may have fewer messages.
 _MOST_BYTES = 1 << 23
-# No setpoint and no state of the legs is as large; larger messages are not decompressed.
+# Larger than any setpoint or leg state; larger messages are not decompressed.
 LARGEST_MESSAGE = 1 << 20
 _ZSTD = b'\x28\xb5\x2f\xfd'
 _LATEST = np.iinfo(np.int64).max
 
 
 class Block(NamedTuple):
-    """Messages in the order of time, M of them, and the bytes that they are in."""
+    """M messages in the order of time, and the bytes that contain them."""
 
     channels: Integers
     """(M,)"""
     times: Integers
     """When each was recorded (M,) [ns]."""
     starts: Integers
-    """Where each begins in the bytes (M,)."""
+    """Start of each in the bytes (M,)."""
     sizes: Integers
-    """How long each is (M,)."""
+    """Length of each (M,) [bytes]."""
     data: Bytes
 
     def chosen(self, which: Any) -> Block:
@@ -63,11 +63,11 @@ class Source(Protocol):
     Attributes
     ----------
     missing : list of str
-        What could not be read so far, in words.
+        What could not be read so far.
     unchecked : bool
-        Messages were read that no checksum covers.
+        Messages without a checksum were read.
     topics : dict
-        The type of each topic; that of one whose messages are not CDR says so.
+        The type of each topic, and its encoding if that is not CDR.
 
     """
 
@@ -80,12 +80,12 @@ class Source(Protocol):
 
     def blocks(self, topics: Mapping[str, int]) -> Iterator[tuple[Block, int]]:
         """
-        Yield messages in the order of time, and how many bytes of the file were read for them.
+        Yield messages in the order of time, and the number of bytes read for them.
 
         Parameters
         ----------
         topics : mapping
-            The number of each topic that is wanted, put in place of the messages' channels.
+            The number of each topic to be read, which replaces the channel of its messages.
 
         """
 
@@ -99,7 +99,7 @@ EMPTY = Block(_NONE, _NONE, _NONE, _NONE, np.empty(0, np.uint8))
 
 def block_of(channels: Sequence[int] | Integers, times: Sequence[int] | Integers,
              messages: Sequence[bytes]) -> Block:
-    """Return messages that are given one by one."""
+    """Return a block of single messages."""
     sizes = np.array([len(message) for message in messages], dtype=np.int64)
     return Block(np.array(channels, dtype=np.int64), np.array(times, dtype=np.int64),
                  np.cumsum(sizes) - sizes, sizes,
@@ -107,7 +107,7 @@ def block_of(channels: Sequence[int] | Integers, times: Sequence[int] | Integers
 
 
 def joined(blocks: Sequence[Block]) -> Block:
-    """Return blocks as one, their messages one after the other."""
+    """Return the concatenation of blocks."""
     if len(blocks) == 1:
         return blocks[0]
     if not blocks:
@@ -120,7 +120,7 @@ def joined(blocks: Sequence[Block]) -> Block:
 
 
 def merged(blocks: Sequence[Block]) -> Block:
-    """Return blocks as one in the order of time; of one time the earlier blocks come first."""
+    """Return blocks merged in the order of time; at equal times earlier blocks come first."""
     block = joined([lean(each) for each in blocks] if len(blocks) > 1 else blocks)
     if np.any(block.times[1:] < block.times[:-1]):
         block = block.chosen(np.argsort(block.times, kind='stable'))
@@ -128,14 +128,14 @@ def merged(blocks: Sequence[Block]) -> Block:
 
 
 def split(block: Block, time: float) -> tuple[Block, Block]:
-    """Return what is earlier than a time, and what is not."""
+    """Return the messages before a time, and the others."""
     at = len(block.times) if time > _LATEST else int(np.searchsorted(block.times, int(time)))
     return block.chosen(slice(at)), lean(block.chosen(slice(at, None)))
 
 
 @entry_point
 def _gather(data: Bytes, starts: Integers, sizes: Integers, out: Bytes) -> None:
-    """Write messages one behind the other."""
+    """Copy messages, one after the other."""
     at = 0
     for n in range(len(starts)):
         out[at:at + sizes[n]] = data[starts[n]:starts[n] + sizes[n]]
@@ -143,7 +143,7 @@ def _gather(data: Bytes, starts: Integers, sizes: Integers, out: Bytes) -> None:
 
 
 def lean(block: Block) -> Block:
-    """Return a block that does not keep many bytes that are no messages of it."""
+    """Return a block without the bytes that belong to no message of it, if these are many."""
     total = int(block.sizes.sum())
     if 2 * total >= len(block.data):
         return block
@@ -153,7 +153,7 @@ def lean(block: Block) -> Block:
 
 
 def of_good_length(blocks: Iterator[tuple[Block, int]]) -> Iterator[tuple[Block, int]]:
-    """Join short blocks, cut long ones, and decompress messages that are compressed each."""
+    """Join short blocks, split long ones, and decompress compressed messages."""
     short: list[Block] = []
     many = size = read = 0
     for whole, its_read in blocks:
@@ -177,12 +177,12 @@ def _cut(block: Block, read: int) -> Iterator[tuple[Block, int]]:
 
 def _decompressed(block: Block) -> Iterator[Block]:
     """
-    Yield messages as they were before rosbag2 compressed each of them, if it did.
+    Yield messages after decompression, if rosbag2 has compressed each of them.
 
-    In parts that are bounded in bytes; a message that would be too large stays compressed, and
-    is rejected as malformed.
+    They are given in parts of limited size; a message that would be too large stays compressed,
+    and is rejected as malformed.
     """
-    # CDR never begins so.
+    # CDR never begins with this byte.
     if not np.any(block.data[block.starts[block.sizes > 0]] == _ZSTD[0]):
         yield block
         return

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-One recorded bag in; the node's outputs, a summary and a report out; needs no ROS.
+The replay of one bag: the node's outputs, a summary and a report; needs no ROS.
 
-Setpoints go through the joining and the step that the node has, in the order of the bag, so the
-outputs are the node's, bit for bit. They go through in blocks of some thousand, and nothing that
-grows with the bag is kept.
+Setpoints pass through the same joining and the same step as in the node, in the order of the bag,
+so the outputs are those of the node, bit for bit. They are processed in blocks of some thousand;
+the memory used does not grow with the bag.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
-from stewart_dynamics.replay.efforts import Efforts
 from stewart_dynamics.replay.options import code_of, Options
 from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Table
+from stewart_dynamics.replay.recorded_efforts import Efforts
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.residuals import Comparison
@@ -52,7 +52,7 @@ from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
 
-# Of summary.json; a change of what a key means is another version.
+# Of summary.json; increased when the meaning of a key changes.
 VERSION = 1
 
 _SECOND = 1_000_000_000
@@ -61,39 +61,39 @@ Progress = Callable[[int, int], None]
 
 
 class Replayed(NamedTuple):
-    """What became of a bag."""
+    """The result of a replay."""
 
     bag: Path
     folder: Path
     summary: dict[str, Any]
-    """What summary.json holds; docs/summary.md explains it."""
+    """The content of summary.json; see docs/summary.md."""
     text: str
-    """For a person to read."""
+    """The summary for the terminal."""
     code: int
-    """DONE, LIMIT_MET or PARTLY_READ, the gravest of them."""
+    """DONE, LIMIT_MET or PARTLY_READ, the most severe."""
 
 
 def replay(
         bag: Path, parameters: Parameters, folder: Path, options: Options | None = None,
         progress: Progress | None = None) -> Replayed:
     """
-    Compute a bag's outputs into a folder: a bag, a table, a summary and a report.
+    Replay a bag into a folder: a bag, a table, a summary and a report.
 
     Parameters
     ----------
     bag : Path
-        A rosbag2 folder, or one of its files.
+        A bag: a folder or a file.
     parameters : Parameters
         Of the hexapod.
     folder : Path
-        It appears when all is written; it must not exist, unless ``options.force``.
+        It gets its name when it is complete; it must not exist, unless ``options.force``.
     options : Options, optional
-        Topics and what is written.
+        Topics, and what is written.
     progress : callable, optional
         Called with the bytes read and the setpoints answered since the last call.
 
-    Raises BagError: nothing of the bag can be read, it lacks a topic, or the folder exists.
-    Raises StewartError: a library that is needed for an option is missing.
+    Raises BagError if the bag cannot be read or lacks a topic, or if the folder exists.
+    Raises StewartError if a library needed for an option is missing.
 
     """
     options = options or Options()
@@ -121,7 +121,7 @@ def replay(
 
 
 class _Run:
-    """The way from messages to what is written, and what is gathered on it."""
+    """One replay: from messages to the files, the summary and the report."""
 
     def __init__(self, recording: Recording, topics: dict[str, str], parameters: Parameters,
                  options: Options, folder: Path, stack: ExitStack) -> None:
@@ -141,7 +141,7 @@ class _Run:
         self._stamp: int | None = None
         self._elapsed = 0, 0  # [s], [ns]
         self._summary = Summary(parameters, self._quasi_static)
-        # Poses farther apart than a period of the cut-off frequency say nothing of it.
+        # A period of the cut-off frequency is the longest step that splines can bridge.
         self._differentiator = None if options.cutoff is None else Differentiator(
             options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
         self._comparison = None if options.measured is None else Comparison(parameters)
@@ -158,7 +158,7 @@ class _Run:
         stack.callback(self._table.close)
 
     def take(self, messages: Messages) -> int:
-        """Take messages in, and return how many setpoints they gave."""
+        """Process messages; return the number of setpoints answered."""
         if self._comparison is not None:
             measured = messages.of_topic == messages.topics.index(MEASURED)
             if measured.any():
@@ -170,7 +170,7 @@ class _Run:
         return self._answer(setpoints)
 
     def end(self) -> None:
-        """Take the end of the bag in, and finish what is written."""
+        """Process the end of the bag, and complete the files."""
         self._setpoints.end('the bag ends')
         if self._differentiator is not None:
             self._answer(self._differentiator.finish())
@@ -185,7 +185,7 @@ class _Run:
         self._bag.close()
 
     def summary(self) -> dict[str, Any]:
-        """Return what summary.json holds."""
+        """Return the content of summary.json."""
         missing = list(self._recording.missing)
         values = self._summary.values()
         if not values['setpoints']['answered']:
@@ -193,7 +193,7 @@ class _Run:
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
-                           f'setpoint has sound samples around its stamp')
+                           f'setpoint has valid samples on both sides of its stamp')
         notices = [*self._recording.notices, *self.notices]
         if self._more:
             notices.append(f'and {self._more} more like these')
@@ -219,7 +219,7 @@ class _Run:
         }
 
     def text(self, summary: Mapping[str, Any]) -> str:
-        """Return what a person reads in the terminal."""
+        """Return the summary for the terminal."""
         lines = [f'{self._recording.path}:']
         if summary['measured']:
             lines += measured_lines(summary['measured'])
@@ -241,7 +241,7 @@ class _Run:
             self._more += 1
 
     def _answer(self, setpoints: Batch) -> int:
-        """Take the step for setpoints, and write and gather what they give."""
+        """Take the step for setpoints; write its outputs and add them to summary and report."""
         if not len(setpoints.stamps):
             return 0
         if self._restarting:
@@ -252,7 +252,7 @@ class _Run:
         rejected = len(setpoints.stamps) - len(outputs.stamps)
         if rejected:
             self._setpoints.reject('setpoint', OUT_OF_RANGE, '', rejected)
-            # A restart holds for the next that is answered.
+            # A restart applies to the next setpoint that is answered.
             setpoints = setpoints.chosen(outputs.answered)._replace(
                 restarts=np.diff(restarts_answered, prepend=0) > 0)
         self._restarting = bool(restarts[-1] > restarts_answered.max(initial=0))
@@ -272,9 +272,9 @@ class _Run:
         return len(setpoints.stamps)
 
     def _seconds(self, stamps: Stamps) -> Array:
-        """Return the time of the motion since the first setpoint; it never goes back."""
+        """Return the time since the first setpoint, never decreasing [s]."""
         steps = np.diff(stamps, prepend=stamps[0] if self._stamp is None else self._stamp)
-        # Seconds apart from nanoseconds: clocks that differ by years sum up to more than 2^63 ns.
+        # Seconds and nanoseconds separately: clocks that differ by years exceed 2^63 ns in sum.
         whole, rest = np.divmod(np.maximum(steps, 0), _SECOND)
         whole, rest = self._elapsed[0] + np.cumsum(whole), self._elapsed[1] + np.cumsum(rest)
         self._stamp = int(stamps[-1])

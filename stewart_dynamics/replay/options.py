@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""How bags are replayed, and the exit codes."""
+"""Options of a replay, and the exit codes."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ NODE = '/stewart_dynamics'
 
 
 class Options(NamedTuple):
-    """How a bag is replayed."""
+    """Options of a replay."""
 
     node: str = NODE
-    """Name before the topics of the outputs, and of the setpoints where they have the usual."""
+    """Node name: the prefix of the output topics, and of setpoint topics with usual names."""
     topics: Mapping[str, str] = MappingProxyType({})
-    """Names in the bag of some of the topics pose, twist, accel, combined and wrench."""
+    """Topics in the bag to be read as pose, twist, accel, combined or wrench."""
     cutoff: float | None = None
-    """[Hz]: take only poses, and differentiate them by smoothing splines."""
+    """Cut-off frequency [Hz]: read only poses, and differentiate them by smoothing splines."""
     measured: str | None = None
-    """Topic of a sensor_msgs/JointState with the efforts that were measured."""
+    """Topic of a sensor_msgs/JointState with the measured efforts."""
     parquet: bool = False
     """Write legs.parquet in place of legs.csv."""
     report: bool = True
     """Write report.html."""
     force: bool = False
-    """Write over results."""
+    """Replace existing results."""
     run: str = ''
-    """In summary.json: the name of a run over many bags."""
+    """Identifier of a run over many bags, written to summary.json."""
 
-    # A mapping proxy cannot be handed to another process.
+    # A mapping proxy cannot be pickled.
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes it anew."""
+        """Return how to unpickle the options."""
         return type(self), (*self._replace(topics=dict(self.topics)),)
 
 
 def code_of(summary: Mapping[str, Any]) -> int:
-    """Return the code of a bag that was replayed."""
+    """Return the exit code of a replayed bag."""
     return (PARTLY_READ if not summary['complete'] else LIMIT_MET if summary['limit_met']
             else DONE)

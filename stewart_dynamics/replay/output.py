@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a replay writes of the legs: a bag with the node's topics, and a table."""
+"""The outputs of a replay: a bag with the topics of the node, and a table of the legs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessage
 from stewart_dynamics.runtime.step import Outputs
 
 _LIBRARY = 'stewart_dynamics'
-# Of a message record: opcode, length, channel, sequence, when it was logged and published.
+# Of a message record: opcode, length, channel, sequence, log time and publish time.
 _HEAD = 31
 # Opcode, length, times of first and last message, size, checksum, no compression, size.
 _CHUNK_HEAD = Struct('<BQQQQIIQ')
@@ -51,16 +51,16 @@ class OutputBag:
     """
     A bag in MCAP with the topics, types and messages of the node.
 
-    Messages are put together thousands at a time; a checksum covers each chunk of them.
+    Messages are assembled in blocks; each block is a chunk with a checksum.
 
     Parameters
     ----------
     folder : Path
-        Made; named as bags are.
+        It is created; the file in it has its name.
     node : str
-        Name before the topics.
+        Node name, the prefix of the topics.
     messages : OutputMessages
-        It writes the messages.
+        Serializes the messages.
 
     """
 
@@ -88,7 +88,7 @@ class OutputBag:
         self._file.write(self._declarations())
 
     def write(self, times: Stamps, outputs: Outputs) -> None:
-        """Write a chunk: what each setpoint gave, recorded at these times (N,) [ns]."""
+        """Write a chunk: the outputs of each setpoint, with these recording times (N,) [ns]."""
         if not len(times):
             return
         groups = [group for group in self._messages.of_outputs(outputs) if len(group[1])]
@@ -116,7 +116,7 @@ class OutputBag:
         self._write_chunk(content, int(times.min()), int(times.max()), indexes)
 
     def close(self) -> None:
-        """Write the index, and the metadata beside it."""
+        """Write the index, and metadata.yaml."""
         with self._file:
             self._file.write(_bytes(DataEnd(data_section_crc=0)))
             start = self._file.tell()
@@ -127,7 +127,7 @@ class OutputBag:
                 chunk_count=len(self._chunks), message_start_time=begin, message_end_time=end,
                 channel_message_counts=dict(self._counts))
             footer = Footer(summary_start=start, summary_offset_start=0, summary_crc=0)
-            # The checksum covers all but itself.
+            # The checksum covers everything but itself.
             index = (self._declarations() + _bytes(statistics)
                      + b''.join(map(_bytes, self._chunks)) + _bytes(footer)[:-4])
             self._file.write(index + zlib.crc32(index).to_bytes(4, 'little') + MAGIC)
@@ -135,7 +135,7 @@ class OutputBag:
             yaml.safe_dump(self._metadata(begin, end), file, sort_keys=False)
 
     def abandon(self) -> None:
-        """Close what is not to be kept."""
+        """Close the file without completing it."""
         self._file.close()
 
     def _declarations(self) -> bytes:
@@ -144,7 +144,7 @@ class OutputBag:
     def _write_chunk(self, content: Bytes, begin: int, end: int,
                      indexes: dict[int, list[tuple[Stamps, Stamps]]]) -> None:
         at = self._file.tell()
-        # As mcap's Chunk writes it, without two copies of the content.
+        # Like mcap's Chunk, without two copies of the content.
         self._file.write(_CHUNK_HEAD.pack(
             Opcode.CHUNK, _CHUNK_HEAD.size - 9 + len(content), begin, end, len(content),
             zlib.crc32(content.data), 0, len(content)))
@@ -168,7 +168,7 @@ class OutputBag:
         self._times = min(first, begin), max(last, end)
 
     def _metadata(self, begin: int, end: int) -> dict[str, Any]:
-        # Made anew for each place: YAML would refer from one to the other.
+        # A new dict for each place: YAML would write an alias.
         def span() -> dict[str, Any]:
             return {'starting_time': {'nanoseconds_since_epoch': begin},
                     'duration': {'nanoseconds': end - begin},
@@ -194,15 +194,15 @@ def _bytes(record: McapRecord) -> bytes:
     return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
-# Of a row in legs.csv: no warning, a warning.
+# End of a row in legs.csv: no warning, warning.
 _ENDS = (b',0\n', b',1\n')
 
 
 class Table(Protocol):
-    """A file with a row for each setpoint."""
+    """A file with one row per setpoint."""
 
     def write(self, outputs: Outputs) -> None:
-        """Write the rows of these."""
+        """Write the rows of these outputs."""
 
     def close(self) -> None:
         """Finish the file."""
@@ -216,7 +216,7 @@ def _columns(legs: Sequence[str]) -> list[str]:
 
 
 def _numbers(outputs: Outputs, quasi_static: bool) -> Any:
-    """Return what stands between stamp and warning (N, 27), nan for what is not known."""
+    """Return the columns between stamp and warning (N, 27); nan: not known."""
     numbers = np.column_stack([
         outputs.lengths, outputs.rates, outputs.forces, outputs.demanded_forces,
         outputs.determinants, outputs.determinant_rates, outputs.conditions])
@@ -226,7 +226,7 @@ def _numbers(outputs: Outputs, quasi_static: bool) -> Any:
 
 
 class CsvTable:
-    """legs.csv: each number in the fewest digits that give it back exactly."""
+    """legs.csv: each number with the fewest digits that represent it exactly."""
 
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
@@ -235,7 +235,7 @@ class CsvTable:
         self._file.write(','.join(map(_quoted, _columns(legs))).encode() + b'\n')
 
     def write(self, outputs: Outputs) -> None:
-        """Write the rows of these."""
+        """Write the rows of these outputs."""
         if not len(outputs.stamps):
             return
         numbers = _numbers(outputs, self._quasi_static)
@@ -262,7 +262,7 @@ def _quoted(text: str) -> str:
 
 
 class ParquetTable:
-    """legs.parquet: the columns of legs.csv; null where there is no force."""
+    """legs.parquet: the columns of legs.csv; null: not known, or no force."""
 
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
@@ -282,7 +282,7 @@ class ParquetTable:
         self._waiting: list[Any] = []
 
     def write(self, outputs: Outputs) -> None:
-        """Write the rows of these."""
+        """Write the rows of these outputs."""
         columns = [outputs.stamps, *_numbers(outputs, self._quasi_static).T, outputs.warnings]
         self._waiting.append(self._arrow.record_batch(
             [self._arrow.array(column, type=field.type, from_pandas=True)
@@ -296,7 +296,7 @@ class ParquetTable:
         self._writer.close()
 
     def _flush(self) -> None:
-        # Parquet reads well in groups of many rows.
+        # Parquet is read faster in large row groups.
         if self._waiting:
             self._writer.write_table(self._arrow.Table.from_batches(self._waiting))
             self._waiting.clear()

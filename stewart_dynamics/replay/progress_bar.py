@@ -31,7 +31,7 @@ class ProgressBar:
     """
     A line on stderr: bags, setpoints, their rate and the time left.
 
-    The time is estimated by bytes, as one bag may be as large as a thousand others.
+    The time left is estimated from bytes, since bags differ in size.
     """
 
     def __init__(self, sizes: Sequence[int], show: bool | None) -> None:
@@ -39,17 +39,17 @@ class ProgressBar:
         self._read = [0] * len(sizes)
         self._setpoints = [0] * len(sizes)
         self._ended = 0
-        self._lock = threading.Lock()  # Dask reports progress in a thread of its own
-        self._begun = time.monotonic()
+        self._lock = threading.Lock()  # Dask reports progress in another thread
+        self._started = time.monotonic()
         self._line = tqdm(
             desc=self._words(), total=sum(sizes), disable=None if show is None else not show,
             file=sys.stderr, dynamic_ncols=True, smoothing=0.1,
             bar_format='{percentage:3.0f}%|{bar}| {desc}, {remaining} left')
 
     def at(self, number: int, read: int, setpoints: int) -> None:
-        """Show that so many bytes and setpoints of a bag are done."""
+        """Show that these bytes and setpoints of a bag are done."""
         with self._lock:
-            # Part of it may be read twice, but not all of it is read before it has ended.
+            # Part of a bag may be read twice.
             read = min(read, self._sizes[number])
             more = read - self._read[number]
             self._read[number], self._setpoints[number] = read, setpoints
@@ -57,13 +57,13 @@ class ProgressBar:
             self._line.update(more)
 
     def end(self, number: int, ended: Ended) -> None:
-        """Show that a bag has ended."""
+        """Show that a bag is done."""
         self._ended += 1
         self.at(number, self._sizes[number], int(ended.row.get('setpoints') or 0))
 
     def _words(self) -> str:
         setpoints = sum(self._setpoints)
-        passed = time.monotonic() - self._begun
+        passed = time.monotonic() - self._started
         rate = _short(setpoints / passed) if setpoints and passed else '?'
         return (f'{self._ended}/{len(self._sizes)} bags, {_short(setpoints)} setpoints, '
                 f'{rate}/s')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A recorded bag: its topics, and the messages of some of them, many at a time."""
+"""A recorded bag: its topics, and the messages of some of them in blocks."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ _ROS_1 = b'#ROSBAG V'
 
 class Recording:
     """
-    A bag of ROS 2, a folder or one of its files, or one of ROS 1, a file or a folder of them.
+    A bag of ROS 2, a folder or one of its files, or a bag of ROS 1, a file or a folder of files.
 
-    Raises BagError where nothing of it can be read, in one line that says why.
+    Raises BagError if nothing of it can be read, with the reason in one line.
 
     Attributes
     ----------
     topics : dict
         The type of each topic in it.
     missing : list of str
-        What could not be read so far, in words.
+        What could not be read so far.
     notices : list of str
-        What a user should know of how it was read.
+        Notices to the user on how it was read.
 
     """
 
@@ -66,7 +66,7 @@ class Recording:
                 raise BagError('; '.join(faults))
         except BaseException as exc:
             self.close()
-            # A name that no file can have, links in a circle, a folder that cannot be listed.
+            # An invalid file name, a loop of links, a folder that cannot be listed.
             if isinstance(exc, (OSError, RuntimeError, ValueError)):
                 raise BagError(f'{path}: not a bag that can be read: {one_line(exc)}') from exc
             raise
@@ -79,12 +79,12 @@ class Recording:
 
     def messages(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
         """
-        Yield the messages of some topics, and how many bytes of the bag were read for them.
+        Yield the messages of some topics, and the number of bytes read for them.
 
         Parameters
         ----------
         keys : mapping
-            Of topics in the bag, under which name each is to be given.
+            From topics in the bag to the names under which their messages are given.
 
         """
         names = tuple(dict.fromkeys(keys.values()))
@@ -96,12 +96,12 @@ class Recording:
             self.missing += [f'{file.name}: {what}' for what in source.missing]
             source.missing.clear()
             if source.unchecked:
-                self.notices.append(f'{file.name}: has no checksums: damaged bytes in it '
-                                    'would not be noticed')
+                self.notices.append(f'{file.name}: has no checksums: damaged bytes '
+                                    'cannot be detected')
 
     @property
     def damage(self) -> list[str]:
-        """What is known by now to be unreadable, in words."""
+        """What could not be read so far, of all files."""
         return self.missing + [f'{file.name}: {what}' for file, source in self._sources
                                for what in source.missing]
 
@@ -124,7 +124,7 @@ class Recording:
             if head.startswith(MAGIC):
                 return McapRecording(unpacked)
             if not head.startswith((_SQLITE, _ROS_1)):
-                raise BagError(f'{file}: not a bag that can be read: neither MCAP nor sqlite3 nor '
+                raise BagError(f'{file}: not a bag that can be read: not MCAP, not sqlite3, not '
                                'a bag of ROS 1')
             return self._opened_by_rosbags(
                 file, unpacked, '.db3' if head == _SQLITE else '.bag')
@@ -135,23 +135,23 @@ class Recording:
 
     def _opened_by_rosbags(self, file: Path, unpacked: Path, suffix: str) -> Source:
         from stewart_dynamics.replay.rosbags_recording import RosbagsRecording
-        # rosbags tells kinds by their suffix, and cannot open names with ?, # or %.
+        # rosbags detects formats by suffix, and cannot open names with ?, # or %.
         link = self._new_file().with_suffix(suffix)
         link.symlink_to(unpacked.absolute())
         try:
             source = RosbagsRecording(link)
-        except Exception as exc:  # damaged bytes: whatever rosbags makes of them
+        except Exception as exc:  # damaged bytes: rosbags raises any exception
             raise BagError(f'{file}: not a bag that can be read: {one_line(exc)}') from exc
-        # Where the recorder was killed, it holds what is not in the file, or what is undone.
+        # After a crash of the recorder it contains messages that are not in the file.
         for ending in ('-wal', '-journal'):
             journal = file.with_name(f'{file.name}{ending}')
             if journal.is_file() and journal.stat().st_size:
-                self.missing.append(f'{journal.name}: the recording was not closed; what only '
-                                    'stands there is not read')
+                self.missing.append(f'{journal.name}: the recording was not closed; messages '
+                                    'that are only in this file are not read')
         return source
 
     def _new_file(self) -> Path:
-        """Return a path in a folder that is removed in the end."""
+        """Return a path in a temporary folder, removed by ``close``."""
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)

@@ -14,10 +14,10 @@
 
 
 """
-The report of one bag: a single HTML file with tables, plots linked in time and a moving platform.
+The report of one bag: an HTML page with tables, plots linked in time and the platform in motion.
 
-It needs no network: plotly.js is inside, from the PyPI package plotly. Numbers go in as base64
-of typed arrays.
+It needs no network: plotly.js is taken from the PyPI package plotly. Numbers are embedded as
+base64 of typed arrays.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay import report_plots as channels
-from stewart_dynamics.replay.curves import Curves, Frames
-from stewart_dynamics.replay.pages import page
+from stewart_dynamics.replay.html_pages import page
+from stewart_dynamics.replay.plot_curves import Curves, Frames
 from stewart_dynamics.replay.report_plots import COLORS, measured_plots, motion_plots
 from stewart_dynamics.replay.report_verdicts import (
     date, exceeded_limits, smallest_margins, units, verdicts)
@@ -46,20 +46,20 @@ from stewart_dynamics.runtime.step import Batch, Outputs
 
 # A frame of the moving platform: position, rotation, lengths, forces.
 _FRAME = 24
-# So many of the times of one kind are told, the first.
+# At most so many times of one kind are listed, the first ones.
 _MOST_TIMES = 20
 
 
 class Report:
     """
-    What is drawn of a bag, gathered block after block, and the file that it goes into.
+    The plots of a bag, collected block by block, and the file that contains them.
 
     Parameters
     ----------
     parameters : Parameters
         Of the hexapod.
     measured : bool
-        The bag holds measured forces: ``add_measured`` will be called.
+        There are measured forces: ``add_measured`` will be called.
 
     """
 
@@ -75,16 +75,16 @@ class Report:
     def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, breakdown: Array,
             ) -> None:
         """
-        Add setpoints and what they gave.
+        Add setpoints and their outputs.
 
         Parameters
         ----------
         seconds : (N,)
             Since the first setpoint of the bag, never decreasing [s].
         setpoints : Batch
-            N of them, at least one.
+            At least one.
         outputs : Outputs
-            Theirs.
+            Of these setpoints.
         breakdown : (N, 6, 6)
             The demanded forces by source: sample, source, leg [N].
 
@@ -121,11 +121,11 @@ class Report:
         measured, computed : (M, 6)
             Leg forces [N].
         wrench : (M, 6)
-            The external wrench that explains their difference [N, N m].
+            The external wrench that accounts for their difference [N, N m].
 
         """
         if self._compared is None:
-            raise ValueError('the report was begun without measured forces')
+            raise ValueError('the report was created without measured forces')
         self._compared.add(seconds, np.concatenate(
             [measured, computed, measured - computed, wrench], axis=1).T)
 
@@ -138,9 +138,9 @@ class Report:
         path : Path
             The file; one that exists is overwritten.
         summary : mapping
-            What summary.json holds.
+            The content of summary.json.
 
-        Raises StewartError where plotly is not installed.
+        Raises StewartError if plotly is not installed.
 
         """
         plotly = _plotly()
@@ -155,7 +155,7 @@ class Report:
         path.write_text(text, encoding='utf-8', errors='backslashreplace', newline='\n')
 
     def _continued(self, angles: Array) -> Array:
-        """Return angles [deg] that go on past half a turn where they would jump to the other."""
+        """Return angles [deg] without jumps at half a turn."""
         whole = np.concatenate([self._angles, angles])
         turns = np.cumsum(np.round(np.diff(whole, axis=0) / 360.0), axis=0)
         continued: Array = angles - 360.0 * turns
@@ -214,14 +214,14 @@ def _base64(numbers: ArrayLike, kind: str) -> str:
 
 @functools.lru_cache(maxsize=1)
 def _plotly() -> str:
-    """Return plotly.js, without the import of the package around it."""
+    """Return plotly.js; the package plotly is not imported."""
     found = importlib.util.find_spec('plotly')
     for folder in found.submodule_search_locations or () if found else ():
         try:
             script = (Path(folder) / 'package_data' / 'plotly.min.js').read_text(encoding='utf-8')
         except OSError:
             continue
-        # A browser reads line ends as \n, and a script until the first of these.
+        # A browser reads line ends as \n, and ends a script at the first of these.
         script = script.replace('\r\n', '\n').replace('\r', '\n')
         return script.replace('</script', r'<\/script').replace('<!--', r'<\!--')
     raise StewartError('the report needs plotly, which is not installed: pip install plotly, or '

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The plots of a report over time: their channels, titles, notes and bounds."""
+"""The time plots of a report: channels, titles, notes and bounds."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 
-# Okabe and Ito's colours, which the colour-blind can tell apart; their yellow is lost on white.
+# Okabe and Ito's palette for the color-blind, without yellow, which is not visible on white.
 COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
 _AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 _BLACK = '#222222'
 
-# The channels of a sample, in their order.
+# The channels of a sample.
 POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
     slice(n, n + 3) for n in range(0, 18, 3))
 LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
@@ -39,7 +39,7 @@ DETERMINANT, CONDITION = 42, 43
 BREAKDOWN = slice(44, 44 + 6 * len(SOURCES))
 CHANNELS = BREAKDOWN.stop
 
-# And those of a comparison with what was measured, behind them.
+# The channels of a comparison with measured forces, after those of the motion.
 MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
 COMPARED = 24
 
@@ -63,7 +63,7 @@ class Bound(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """A plot over time; of several variants one is shown at a time, by the reader's choice."""
+    """A plot over time; the user selects one of its variants."""
 
     key: str
     figure: str
@@ -74,12 +74,12 @@ class Plot(NamedTuple):
     bounds: Sequence[Bound] = ()
     log: bool = False
     contacts: bool = False
-    """Shade when there was an external load."""
+    """Shade the intervals with an external load."""
     spikes: bool = False
-    """A few samples may be far larger than all others: these are not to flatten them."""
+    """A few samples may be far larger than the others: they do not set the scale."""
 
     def plain(self) -> dict[str, Any]:
-        """Return what JSON can hold."""
+        """Return the plot for JSON."""
         return self._asdict() | {
             'bounds': [bound._asdict() for bound in self.bounds],
             'variants': [{'name': name, 'curves': [curve._asdict() for curve in curves]}
@@ -87,7 +87,7 @@ class Plot(NamedTuple):
 
 
 def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
-    """Return the plots of a motion and of what it demands; without velocities fewer."""
+    """Return the plots of motion and forces; those of velocities only if they are known."""
     p, joints = parameters, parameters['joints']
     of_motion = [
         Plot('velocity', '13', 'Velocity of the platform', 'm/s',
@@ -116,14 +116,14 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
                  *_bounds('length_max', p['limits.length_max'])]),
         Plot('determinant', '17', 'det(J)', 'm³',
              {'': [Curve('det(J)', COLORS[0], DETERMINANT)]},
-             'zero where the legs cannot hold some load', [Bound(0.0, 'singular', '#c00000')],
+             'zero at a singularity', [Bound(0.0, 'singular', '#c00000')],
              spikes=True),
         Plot('condition', '17', 'Condition number of J_inv', '–',
              {'': [Curve('condition', COLORS[1], CONDITION)]}, 'dimensionless; 1 is best', [
                  Bound(p['singularity.warn_condition'], 'warn', '#b36b00'),
                  Bound(p['singularity.stop_condition'], 'stop', '#c00000')], log=True),
         Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, FORCES),
-             'as the motion demands them, + pushes',
+             'demanded by the motion, + pushes',
              _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
         *(of_rates if velocities_known else ()),
         Plot('force_breakdown', '', 'Leg force by source', 'N', {
@@ -134,7 +134,7 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
 
 
 def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
-    """Return the plots of a comparison whose channels begin at a number."""
+    """Return the plots of a comparison, whose channels begin at a number."""
     joints = parameters['joints']
     measured, computed, residual, wrench = (
         slice(first + each.start, first + each.stop)
@@ -149,7 +149,7 @@ def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
         Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(joints, residual),
              'measured less computed force', contacts=True, spikes=True),
         Plot('external_force', '', 'External force', 'N', _of_axes(wrench, 'F x', 'F y', 'F z'),
-             'J_inv^T (computed − measured): the load that the model does not have, base axes',
+             'J_inv^T (computed − measured): the load that the model does not include, base axes',
              contacts=True, spikes=True),
         Plot('external_moment', '', 'External moment', 'N m',
              _of_axes(slice(wrench.start + 3, wrench.stop), 'M x', 'M y', 'M z'),
@@ -167,7 +167,7 @@ def _of_axes(channels: slice, *names: str) -> dict[str, list[Curve]]:
 
 
 def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:
-    """Return a line for the bound of all legs, or one in its own colour for each."""
+    """Return one line if the bound is the same for all legs, or one per leg in its color."""
     if values is None:
         return []
     alike = bool(np.all(values == values[0]))

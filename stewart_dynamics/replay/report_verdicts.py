@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a report shows at first sight: what was read, limits, and how near a singularity was."""
+"""The cards on the first screen of a report: reading, limits, singularity."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from typing import Any
 from stewart_dynamics.parameters import PARAMETERS
 
 Summary = Mapping[str, Any]
-"""What summary.json holds."""
+"""The content of summary.json."""
 Verdict = tuple[str, str]
-"""How good it is (good, warn, bad or none), and its title."""
+"""Level (good, warn, bad or none) and title of a card."""
 
 _MARGINS = (('length', 'length_margin_m', 'm'), ('rate', 'rate_margin_m_s', 'm/s'),
             ('force', 'force_margin_n', 'N'))
@@ -42,7 +42,7 @@ def _reading(summary: Summary) -> Verdict:
     if not summary['setpoints']['answered']:
         return 'bad', 'No setpoint could be answered'
     if not summary['complete']:
-        return 'bad', 'Only a part could be read'
+        return 'bad', 'The bag could not be read completely'
     if summary['rejected']:
         return 'warn', 'Some messages were rejected'
     return 'good', 'The whole bag was read'
@@ -54,13 +54,13 @@ def _limits(summary: Summary) -> Verdict:
     if summary['limits_not_checked']:
         return 'warn', 'Not all limits could be checked'
     if not smallest_margins(summary):
-        return 'none', 'No limits to hold'
+        return 'none', 'No limits are given'
     return 'good', 'All limits are held'
 
 
 def _singularity(found: Mapping[str, Any]) -> Verdict:
     if found['crossings'] or found['unsolved']:
-        return 'bad', 'A singularity is met'
+        return 'bad', 'A singularity is reached'
     if found['warnings']:
         return 'warn', 'A singularity is near'
     if found['condition_max'] is None and found['determinant_nearest_m3'] is None:
@@ -69,7 +69,7 @@ def _singularity(found: Mapping[str, Any]) -> Verdict:
 
 
 def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
-    """Return of lengths, rates and forces the leg that is nearest to its limit."""
+    """Return the smallest margins of length, rate and force, each with its leg."""
     found = []
     for name, key, unit in _MARGINS:
         of_legs = [(leg[key], joint) for joint, leg in summary['legs'].items()
@@ -81,7 +81,7 @@ def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
 
 
 def exceeded_limits(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return each limit that is exceeded, with the leg that exceeds it most."""
+    """Return each exceeded limit, with the leg that exceeds it most."""
     found = []
     for name in dict.fromkeys(each['limit'] for each in limits):
         legs = [each for each in limits if each['limit'] == name]
@@ -94,7 +94,7 @@ def exceeded_limits(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
 
 
 def date(stamp: int | None) -> str:
-    """Return a stamp's date where it can be one."""
+    """Return the date of a stamp, empty if it is not a plausible time."""
     if stamp is None or stamp < 1_000_000_000 * 10 ** 9:
         return ''
     try:
@@ -105,5 +105,5 @@ def date(stamp: int | None) -> str:
 
 
 def units() -> dict[str, str]:
-    """Return the unit of each parameter, as it is written."""
+    """Return the unit of each parameter for display."""
     return {name: (PARAMETERS[name].unit or '').replace('^2', '²') for name in PARAMETERS}

@@ -13,19 +13,18 @@
 # limitations under the License.
 
 """
-Residuals: measured leg forces against the computed ones, and what explains them.
+Residuals: measured minus computed leg forces, and fits to them.
 
-Measured efforts are interpolated linearly in time onto the setpoints' stamps, only between two
-samples no farther apart than ``setpoint.timeout``, and compared with the forces that the dynamics
-demand: residual = measured - computed. The external wrench that explains it is
+Measured efforts are interpolated linearly in time onto the setpoints' stamps, between samples at
+most ``setpoint.timeout`` apart, and compared with the demanded forces: residual = measured -
+computed. The external wrench that accounts for it is
 
     w_ext = J_inv^T (f_computed - f_measured)
 
-with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
-base axes (see ``runtime.external_wrench``). A platform that is heavier than its parameters say
-gives an external force downward.
+with the sign of ``~/wrench``: the external load on the platform at its origin, base axes (see
+``runtime.external_wrench``). A platform heavier than in its parameters gives a force downward.
 
-``Comparison.values()`` is what summary.json has under ``measured``; docs/summary.md explains it.
+``Comparison.values()`` is the part ``measured`` of summary.json, see docs/summary.md.
 """
 
 from __future__ import annotations
@@ -43,23 +42,23 @@ from stewart_dynamics.replay.time_matching import interpolated, Waiting
 from stewart_dynamics.runtime.external_wrench import external_wrenches
 from stewart_dynamics.runtime.step import Batch, Outputs
 
-# What waits for the other side at most, setpoints and measured samples.
+# The most setpoints and measured samples that wait to be matched.
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
-# A fit that explains a smaller part than this is not given.
+# A fit that accounts for a smaller share of the residual is not reported.
 _CONVINCING = 0.5
 
 AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
 _UNITS = ('n',) * 3 + ('n_m',) * 3
 
-# Columns of what is kept of a setpoint.
+# Columns of the rows kept of setpoints.
 _SECONDS, _POSE, _ACCELERATION, _RATES, _FORCES = (
     0, slice(1, 13), slice(13, 16), slice(16, 22), slice(22, 28))
 
 
 class Compared(NamedTuple):
-    """Setpoints that were newly compared, K of them."""
+    """K setpoints that were compared."""
 
     seconds: Array
     """(K,)"""
@@ -73,13 +72,13 @@ class Compared(NamedTuple):
 
 class Comparison:
     """
-    Gathers how measured forces differ from the computed ones, in bounded memory.
+    Compares measured forces with the computed ones, in bounded memory.
 
-    Setpoints and measured samples may come in any turn. A setpoint waits for a measured sample
-    with a later stamp; when 32768 wait the longest waiting are dropped as not compared. Where
-    time jumps back by more than ``setpoint.timeout``, a bag that loops, another pass begins, and
-    a pass of the setpoints is compared with the measured samples of the pass of the same number.
-    A single stamp out of line, too late or in the future, begins no pass and is left out.
+    Setpoints and measured samples may be added in any order. A setpoint waits for a measured
+    sample with a later stamp; when 32768 wait, the oldest are dropped as not compared. When
+    time jumps back by more than ``setpoint.timeout``, as in a bag that loops, another pass
+    begins; setpoints of a pass are compared with the measured samples of the pass of the same
+    number. A single stamp that is late or in the future begins no pass and is left out.
 
     Parameters
     ----------
@@ -107,16 +106,16 @@ class Comparison:
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
         """
-        Take setpoints and what the step gave for them; return what could be compared.
+        Add setpoints and their outputs; return the setpoints that could be compared.
 
         Parameters
         ----------
         seconds : (N,)
             Since the first setpoint, never decreasing [s].
         setpoints : Batch
-            N of them.
+            N setpoints.
         outputs : Outputs
-            Of all of them.
+            Of these setpoints.
 
         """
         motions = setpoints.motions
@@ -126,7 +125,7 @@ class Comparison:
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
         """
-        Take measured forces; return what could be compared.
+        Add measured forces; return the setpoints that could be compared.
 
         Parameters
         ----------
@@ -140,7 +139,7 @@ class Comparison:
         return self._compared()
 
     def finish(self) -> Compared:
-        """Return what was left to compare; no more are to come."""
+        """Return the remaining setpoints, after the last call of the others."""
         self._setpoints.confirm()
         self._samples.confirm()
         return self._compared()
@@ -173,7 +172,7 @@ class Comparison:
     def _gather(self, compared: Compared, rows: Array) -> None:
         seconds, wrench = compared.seconds, compared.wrench
         self._bins.add(seconds, wrench)
-        # legs and axes first: sums along what lies side by side are many times as fast
+        # legs and axes first: sums along contiguous memory are many times as fast
         measured, computed, rates, loads, accelerations = map(np.ascontiguousarray, (
             compared.measured.T, compared.computed.T, rows[:, _RATES].T, wrench.T,
             rows[:, _ACCELERATION].T))
@@ -183,7 +182,7 @@ class Comparison:
         self._measured_squares += np.sum(measured ** 2, axis=1)
         self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
                            np.sum(computed * measured, axis=1)]
-        # offset, and of unit coefficients Coulomb and viscous friction
+        # terms of the fit: offset, Coulomb and viscous friction with unit coefficients
         coulomb = np.empty((len(seconds), 6))
         friction(np.ascontiguousarray(rows[:, _RATES]), np.zeros(6), np.ones(6), coulomb)
         terms = np.ones_like(rates), np.ascontiguousarray(coulomb.T), rates
@@ -191,13 +190,13 @@ class Comparison:
             self._fitted[:, row] += np.sum(one * residual, axis=1)
             for column, other in enumerate(terms):
                 self._fit[:, row, column] += np.sum(one * other, axis=1)
-        # a mass that the model lacks pulls the other way
+        # weight and inertia of an unmodelled mass
         drive, force = self._parameters['gravity'][:, None] - accelerations, loads[:3]
-        # not vdot: threads of BLAS that wait for a busy processor cost far more than the sums
+        # not vdot: BLAS threads that wait for a busy processor cost more than the sums
         self._mass += [np.sum(drive ** 2), np.sum(drive * force), np.sum(force ** 2)]
 
     def values(self) -> dict[str, Any]:
-        """Return what summary.json has of it."""
+        """Return the part of summary.json."""
         joints = self._parameters['joints']
         return {
             'setpoints_compared': self._legs.count,
@@ -226,7 +225,7 @@ class Comparison:
         rms = [np.sqrt(each / number) if number else None for each in (measured_squares, squares)]
         spread = ((squares * number - total ** 2)
                   * (measured_squares * number - measured_total ** 2))
-        # forces that do not change, but for rounding, do not correlate
+        # the correlation of constant forces is rounding error
         constant = not spread > 1e-20 * squares * measured_squares * number ** 2
         correlation = None if constant else float(np.clip(
             (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0))
@@ -234,7 +233,7 @@ class Comparison:
                 'correlation': correlation, **self._friction(leg)}
 
     def _friction(self, leg: int) -> dict[str, float | None]:
-        """Return the friction that fits the residual; none where the leg hardly moved."""
+        """Return the friction that fits the residual; None if the leg hardly moved."""
         names = 'offset_n', 'coulomb_friction_n', 'viscous_friction_n_s_m', 'friction_share'
         fit, fitted = self._fit[leg], self._fitted[leg]
         scale = np.sqrt(np.diagonal(fit))
@@ -249,7 +248,7 @@ class Comparison:
         number = self._legs.count
         noise = 0.05 * np.sqrt(variance / number)
         if share < _CONVINCING or min(best[1], best[2] * np.sqrt(fit[2, 2] / number)) < -noise:
-            # Something else is at work, and these numbers are no parameters.
+            # The residual has another source: these numbers are not friction parameters.
             return {**dict.fromkeys(names), 'friction_share': share}
         return dict(zip(names, [*best.tolist(), share], strict=True))
 
@@ -290,7 +289,7 @@ class _Statistics:
         self._peaks_at = np.zeros(quantities)
 
     def add(self, seconds: Array, values: Array) -> None:
-        """Take values (quantities, N) at times (N,)."""
+        """Add values (quantities, N) at times (N,) [s]."""
         first = not self.count
         self.count += len(seconds)
         self.sums += np.sum(values, axis=1)
@@ -302,7 +301,7 @@ class _Statistics:
         self._peaks_at[larger] = seconds[at][larger]
 
     def named(self, number: int, prefix: str, unit: str) -> dict[str, float | None]:
-        """Return RMS, mean and peak under names with units; null where there was nothing."""
+        """Return RMS, mean and peak under names with units; None without samples."""
         names = [f'{prefix}rms_{unit}', f'{prefix}mean_{unit}', f'{prefix}peak_{unit}',
                  f'{prefix}peak_at_s']
         if not self.count:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The folder of a bag's results: it appears when all in it is written."""
+"""The folder of a bag's results: it gets its name only when it is complete."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from stewart_dynamics.replay.options import Options
 
 @contextmanager
 def whole_folder(final: Path, options: Options) -> Iterator[Path]:
-    """Give a folder that takes its final name only when all in it is written."""
+    """Yield a folder that gets its final name only when it is complete."""
     final.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(tempfile.mkdtemp(
         prefix=f'{partial_name(final, options.run)}partial.', dir=final.parent))
@@ -41,14 +41,14 @@ def whole_folder(final: Path, options: Options) -> Iterator[Path]:
     try:
         yield partial
         partial.chmod(0o755)
-        # What is there stays whole until what replaces it is.
+        # Existing results are kept until their replacement is complete.
         if final.exists():
             check_free(final, options)
             final.rename(replaced)
         partial.rename(final)
     finally:
         if os.path.lexists(replaced) and not os.path.lexists(final):
-            replaced.rename(final)  # what was to replace it was never whole
+            replaced.rename(final)  # its replacement was not completed
         for left in (partial, replaced):
             if left.is_symlink():
                 left.unlink()
@@ -56,22 +56,22 @@ def whole_folder(final: Path, options: Options) -> Iterator[Path]:
 
 
 def partial_name(final: Path, run: str) -> str:
-    """Return how the names of what is half written begin, of a folder in a run."""
-    # A long name would leave no room for what comes behind it.
+    """Return the prefix of the names of partial results, of a folder in a run."""
+    # A long name would exceed the limit of the file system with the suffix.
     short = (final.name if len(os.fsencode(final.name)) < 120
              else hashlib.sha256(os.fsencode(final.name)).hexdigest())
     return f'.{short}.{run or "one"}.'
 
 
 def check_free(folder: Path, options: Options) -> None:
-    """Raise BagError if results may not go there."""
+    """Raise BagError if results must not be written there."""
     if not folder.exists():
         return
     if not options.force:
         raise BagError(f'{folder}: exists already; --force replaces results')
     if not (folder / 'summary.json').is_file():
-        raise BagError(f'{folder}: exists already and holds no results of a replay: it is not '
-                       'replaced')
+        raise BagError(f'{folder}: exists already and is not a folder of replay results: it is '
+                       'not replaced')
 
 
 def write_json(path: Path, document: Any) -> None:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Recordings in sqlite3 and those of ROS 1, read through rosbags."""
+"""Bags in sqlite3 and bags of ROS 1, read by rosbags."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from stewart_dynamics.errors import one_line
 from stewart_dynamics.replay.mcap_layout import LARGEST_CHUNK
 from stewart_dynamics.replay.message_blocks import Block, block_of
 
-# Messages that are read at once.
+# Messages in a block.
 _AT_ONCE = 4096
 
 
@@ -47,16 +47,16 @@ class RosbagsRecording:
     Parameters
     ----------
     path : Path
-        rosbags knows it by its suffix: .db3, else a bag of ROS 1.
+        Its suffix tells the format: .db3, else a bag of ROS 1.
 
-    Whatever rosbags raises is raised where it cannot be opened.
+    Raises any exception of rosbags if it cannot be opened.
 
     Attributes
     ----------
     missing : list of str
-        What could not be read, in words.
+        What could not be read.
     unchecked : bool
-        Messages were read that no checksum covers: always.
+        Messages without a checksum were read: always.
 
     """
 
@@ -72,7 +72,7 @@ class RosbagsRecording:
         else:
             self._reader = rosbags.rosbag1.Reader(path)
             self._reader.open()
-            # rosbags decompresses without a bound.
+            # rosbags does not limit what it decompresses.
             self._reader.chunks = {
                 place: chunk._replace(decompressor=_bounded(chunk.decompressor))
                 for place, chunk in self._reader.chunks.items()}
@@ -82,14 +82,14 @@ class RosbagsRecording:
 
     @property
     def topics(self) -> dict[str, str]:
-        """The type of each topic; that of one whose messages are not CDR says so."""
+        """The type of each topic, and its encoding if that is not CDR."""
         kinds: dict[str, set[str]] = {}
         for of in self._reader.connections:
             kinds.setdefault(of.topic, set()).add(self._kinds[of.id])
         return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
 
     def blocks(self, topics: Mapping[str, int]) -> Iterator[tuple[Block, int]]:
-        """Yield these topics' messages as Source says; a fault ends them, and is noted."""
+        """Yield the messages of these topics, see Source; an error ends them, and is noted."""
         wanted = [of for of in self._reader.connections if of.topic in topics]
         rows = self._reader.messages(connections=wanted) if wanted else iter(())
         count = unsound = 0
@@ -109,8 +109,8 @@ class RosbagsRecording:
                     channels.append(topics[of.topic])
                     times.append(time)
                     messages.append(self._as_cdr(data, of.msgtype))
-            except Exception as exc:  # damaged bytes: whatever rosbags makes of them
-                self.missing.append(f'what came after {count} messages: {one_line(exc)}')
+            except Exception as exc:  # damaged bytes: rosbags raises any exception
+                self.missing.append(f'everything after {count} messages: {one_line(exc)}')
                 at_end = True
             block = block_of(channels, times, messages)
             yield block, int(block.sizes.sum())
@@ -124,7 +124,7 @@ class RosbagsRecording:
         self._reader.close()
 
     def _kind_of(self, connection: Any) -> str:
-        """Return the type of a connection's messages, which says so where it is not ours."""
+        """Return the type of a connection's messages, with what is unusual about it."""
         kind = str(connection.msgtype)
         if self._to_cdr is None:
             assert isinstance(connection.ext, ConnectionExtRosbag2)
@@ -144,7 +144,7 @@ class RosbagsRecording:
             return b''  # rejected as malformed
 
     def _check_sqlite(self) -> None:
-        """Note damage that sqlite3 does not report when it reads."""
+        """Note damage that sqlite3 does not report while reading."""
         database = sqlite3.connect(f'{self._path.absolute().as_uri()}?immutable=1', uri=True)
         try:
             (found,), = database.execute('PRAGMA quick_check(1)')
@@ -153,7 +153,7 @@ class RosbagsRecording:
         finally:
             database.close()
         if found != 'ok':
-            self.missing.append(f'damaged, what is missing is not known: {one_line(found)}')
+            self.missing.append(f'damaged, what is missing is unknown: {one_line(found)}')
 
 
 def _bounded(decompress: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:

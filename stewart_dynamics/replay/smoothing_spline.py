@@ -17,28 +17,28 @@
 Smoothing splines through recorded poses.
 
 Positions and the four numbers of the quaternion are each smoothed by the cubic spline f that
-minimises ``sum h_i (y_i - f(t_i))^2 + L * integral f''^2 dt`` over a stretch without gaps, where
+minimises ``sum h_i (y_i - f(t_i))^2 + L * integral f''^2 dt`` over a segment without gaps, where
 h_i is half the time from the pose before to the pose after. By these weights the sum is the
 integral of (y - f)^2 by trapezoids, so the spline is the same filter however the poses are
 spaced: for ``f = H y`` the minimum has ``(1 + L w^4) H(w) = 1`` (Craven and Wahba, Numerische
 Mathematik 31, 1979, doi:10.1007/BF01404567; Unser and Blu, IEEE Trans. Signal Processing 53(6),
 2005, doi:10.1109/TSP.2005.847856). It has no phase. The cut-off frequency f_c is where an
-amplitude comes down to 1/sqrt(2) of it (-3 dB), hence ``L = (sqrt(2) - 1) / (2 pi f_c)^4``:
+amplitude is reduced to 1/sqrt(2) (-3 dB), hence ``L = (sqrt(2) - 1) / (2 pi f_c)^4``:
 
     H = 1 / (1 + (sqrt(2) - 1) (f / f_c)^4)
 
-which leaves 99.9 % at 0.2 f_c, 50 % at 1.25 f_c and 3 % at 3 f_c. On samples h apart w^4 is in
-truth ``(2 - 2 cos wh)^2 / (h^4 (2 + cos wh) / 3)``, w^4 within 0.5 % up to a fifth of the
+which leaves 99.9 % at 0.2 f_c, 50 % at 1.25 f_c and 3 % at 3 f_c. For samples h apart w^4 is
+exactly ``(2 - 2 cos wh)^2 / (h^4 (2 + cos wh) / 3)``, w^4 within 0.5 % up to a fifth of the
 sampling rate. Acceleration passes as w^2 H: white noise of s in poses h apart leaves
 ``s sqrt(sqrt(2) / 16 h W^5)``, ``W = 2 pi f_c / (sqrt(2) - 1)^(1/4)``, which grows so fast with
-the cut-off that the cut-off wants to be as low as the motion allows.
+the cut-off that it should be as low as the motion allows.
 
-The poles of H decay by ``W / sqrt(2)`` = 5.54 f_c in a second, so what is farther away than
-5 / f_c counts less than 1e-12: a long recording is worked off in windows that overlap by this.
-At the ends of a stretch the spline is natural, without acceleration; within about 1 / f_c of
-them the accelerations are too small, and how many setpoints this concerns is counted.
+The poles of H decay by ``W / sqrt(2)`` = 5.54 f_c in a second, so samples farther away than
+5 / f_c contribute less than 1e-12: a long recording is processed in windows that overlap by this.
+At the ends of a segment the spline is natural, without acceleration; within about 1 / f_c of
+them the accelerations are too small, and these setpoints are counted.
 
-The spline is had in the form of Reinsch (Numerische Mathematik 10, 1967,
+The spline is computed in the form of Reinsch (Numerische Mathematik 10, 1967,
 doi:10.1007/BF02162161; Green and Silverman, Nonparametric Regression and Generalized Linear
 Models, 1994, 2.3): a banded system for the second derivatives at the samples. SciPy's own
 ``make_smoothing_spline`` gives the same numbers, but takes 6 us for a pose and axis where this
@@ -55,7 +55,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 
-# Fewer samples say nothing of an acceleration: a natural spline has none at its ends.
+# Fewer samples do not determine an acceleration: it is zero at the ends of a natural spline.
 FEWEST = 5
 
 
@@ -69,16 +69,16 @@ class Spline(NamedTuple):
 
 def smoothing_spline(times: Array, samples: Array, cutoff: float) -> Spline:
     """
-    Return the smoothing spline of K signals that were sampled at the same times.
+    Return the smoothing spline of K signals sampled at the same times.
 
     Parameters
     ----------
     times : (N,)
         [s], increasing, N at least FEWEST.
     samples : (N, K)
-        Of the signals, in any unit.
+        In any unit.
     cutoff : float
-        Frequency that passes with 1/sqrt(2) of its amplitude [Hz].
+        Frequency whose amplitude is reduced to 1/sqrt(2) [Hz].
 
     """
     banded = banded_solver()
@@ -106,8 +106,8 @@ def smoothing_spline(times: Array, samples: Array, cutoff: float) -> Spline:
     residual = np.diff(np.diff(bends, axis=0) * slope[:, None], axis=0, prepend=0.0, append=0.0)
     values = samples - roughness[:, None] * residual
 
-    # the slope at either end of a piece; each sample takes that of its longer piece, where the
-    # difference loses fewer digits
+    # the slope at both ends of an interval; each sample takes that of its longer interval, with
+    # the smaller rounding error
     step = steps[:, None]
     chords = np.diff(values, axis=0) / step
     begins = chords - step * (2.0 * bends[:-1] + bends[1:]) / 6.0
@@ -118,10 +118,10 @@ def smoothing_spline(times: Array, samples: Array, cutoff: float) -> Spline:
 
 
 def banded_solver() -> Any:
-    """Return SciPy's, which only splines need; StewartError where it is not installed."""
+    """Return the solver of SciPy; raises StewartError if SciPy is not installed."""
     try:
         from scipy.linalg import solveh_banded
     except ImportError as exc:
-        raise StewartError('twist and acceleration of poses need scipy, which is not installed: '
+        raise StewartError('--differentiate needs scipy, which is not installed: '
                            'pip install "stewart_dynamics[differentiate]"') from exc
     return solveh_banded

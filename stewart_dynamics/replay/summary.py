@@ -14,10 +14,10 @@
 
 
 """
-What a motion asked of the legs, and how near a singularity it came.
+The summary of a motion: loads on the legs, limits, and distance from singularities.
 
-Samples come block after block and are not kept. But for rounding, it does not matter where
-one block ends and the next begins. docs/summary.md says what each number means.
+Samples are added block by block and are not kept. Apart from rounding, the result does not depend
+on how they are split into blocks. docs/summary.md defines each number.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.limits import (
     FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.gathering import (
+from stewart_dynamics.replay.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
 from stewart_dynamics.runtime.step import Batch, Outputs
 
-# What is not known of a leg where only poses are.
+# Values of a leg that are not known from poses alone.
 _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
@@ -51,7 +51,7 @@ class _Block(NamedTuple):
 
 
 class _Exceeded(NamedTuple):
-    """By leg, how often a limit is exceeded, and when first."""
+    """Of each leg, the number of setpoints that exceed a limit, and the time of the first."""
 
     setpoints: Integers
     first_at: Array
@@ -72,7 +72,7 @@ class Summary:
     parameters : Parameters
         Names of the legs, limits, and ``setpoint.timeout``.
     quasi_static : bool
-        Only poses are known: what depends on velocities is not known, and not zero.
+        Only poses are known: values that depend on velocities are None, not zero.
 
     """
 
@@ -95,7 +95,7 @@ class Summary:
         self._longest = Extreme(6, np.positive)
         self._rate, self._force, self._published, self._power = (
             Extreme(6, np.abs) for _ in range(4))
-        # squares of the forces; power that drives the platform, power that brakes it
+        # squares of the forces; driving power; braking power
         self._means = Integral(18)
         self._nearest = Extreme(1, lambda det: -np.abs(det))
         self._condition = Extreme(1, np.positive)
@@ -103,7 +103,7 @@ class Summary:
         self._unit_load_force = Extreme(6, np.positive)
         self._crossings = Crossings()
         self._warnings = Warnings()
-        # a source at a time: numpy seeks along many columns at once far more slowly
+        # one source at a time: numpy is far slower along many columns at once
         self._source_peaks = [Extreme(6, np.abs) for _ in SOURCES]
         self._source_squares = Integral(6 * len(SOURCES))
         self._has_breakdown = False
@@ -111,17 +111,17 @@ class Summary:
     def add(self, seconds: Array, setpoints: Batch, outputs: Outputs,
             breakdown: Array | None = None) -> None:
         """
-        Take one more block in.
+        Add a block of samples.
 
         Parameters
         ----------
         seconds : (N,)
-            Time of the motion since the first setpoint of all [s]; it stands still where
-            stamps jump back.
+            Time since the first setpoint of the bag [s]; it does not advance where stamps
+            jump back.
         setpoints : Batch
-            Those that were answered.
+            The answered setpoints.
         outputs : Outputs
-            The answers.
+            Their outputs.
         breakdown : (N, 6, 6), optional
             The demanded forces by source: sample, source, leg [N].
 
@@ -137,7 +137,7 @@ class Summary:
             self._release()
 
     def _release(self) -> None:
-        """Take in what was held back until a gap can be told from a usual step."""
+        """Add the samples held back until the usual step is known."""
         if not self._held:
             return
         steps = np.diff(np.concatenate([block.seconds for block in self._held])[:FIRST])
@@ -181,7 +181,7 @@ class Summary:
                 self._source_squares.add(steps, breakdown.reshape(len(seconds), -1) ** 2)
 
     def _steps(self, seconds: Array, setpoints: Batch) -> Array:
-        """Return the time from each setpoint's predecessor to it, none in a gap."""
+        """Return the time from each setpoint's predecessor to it, zero in a gap [s]."""
         assert self._gap is not None
         steps: Array = np.diff(seconds, prepend=self._seconds if self._stamps else seconds[0])
         gaps = steps > self._gap
@@ -196,7 +196,7 @@ class Summary:
         return steps
 
     def values(self) -> dict[str, Any]:
-        """Return the parts of summary.json that a motion gives, plain and finite numbers."""
+        """Return the parts of summary.json that depend on the motion, with finite numbers."""
         self._release()
         limits = self._exceeded_limits()
         return {
@@ -254,7 +254,7 @@ class Summary:
                 for leg in np.flatnonzero(limit.setpoints)]
 
     def _singularity(self) -> dict[str, Any]:
-        # the leg whose largest force under a unit load is the largest of all
+        # the leg with the largest force under a unit load
         most = np.where(np.isnan(self._unit_load_force.values), -np.inf,
                         self._unit_load_force.values)
         leg = int(most.argmax())
@@ -289,5 +289,5 @@ class Summary:
 
 
 def _number(value: float) -> float | None:
-    """Return a plain number, none for what JSON cannot hold."""
+    """Return a plain number, None if it is not finite."""
     return float(value) if math.isfinite(value) else None

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The summary of a motion as lines that a person can read in a terminal."""
+"""The summary of a motion as text for a terminal."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
     Parameters
     ----------
     found : mapping
-        What Summary.values gives.
+        The values of Summary.values.
     parameters : mapping
         The parameters of the hexapod.
 
@@ -57,7 +57,7 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
 
 
 def measured_lines(measured: Mapping[str, Any]) -> list[str]:
-    """Return what the comparison with measured forces says, its headline first."""
+    """Return the result of the comparison with measured forces, the headline first."""
     if not measured['setpoints_compared']:
         return ['measured: no setpoint could be compared']
     lines = []
@@ -87,15 +87,14 @@ def measured_lines(measured: Mapping[str, Any]) -> list[str]:
 def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) -> list[str]:
     lines = []
     if clipped:
-        lines.append('* reaches limits.force_max: published clipped to it, the leg would need '
-                     'more')
+        lines.append('* reaches limits.force_max: the published force is clipped to it')
     for each in found['limits']:
         lines.append(f'{each["limit"]}, {each["bound"]:g}, exceeded by {each["leg"]} in '
                      f'{_counted(each["setpoints"], "setpoint")} from t = '
                      f'{each["first_at_s"]:.2f} s on: {each["worst"]:.6g} at worst')
     for name in found['limits_not_checked']:
         lines.append(f'{name} could not be checked: velocities are not known; --differentiate '
-                     'makes them of the poses')
+                     'computes them from the poses')
     if limits_given and not lines:
         lines.append('all limits held')
     return lines
@@ -115,8 +114,8 @@ def _heading(setpoints: Mapping[str, Any]) -> str:
     return text
 
 
-# Of the legs' table: what it is of, title, key, width, digits after the point. With a leg's name
-# and the mark they fill _WIDTH.
+# Of the table of legs: group, title, key, width, decimals. With the leg's name and the mark they
+# have the width _WIDTH.
 _COLUMNS = (
     ('force [N]', 'peak', 'force_peak_n', 10, 1), ('force [N]', 'at [s]', 'force_peak_at_s', 9, 2),
     ('force [N]', 'RMS', 'force_rms_n', 9, 1), ('force [N]', 'margin', 'force_margin_n', 9, 1),
@@ -131,7 +130,7 @@ _MARKED = 'force_peak_n'
 
 def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
                 marked: Sequence[bool]) -> list[str]:
-    """Return the lines of the legs; a column without any number is left out."""
+    """Return the table of the legs; columns without numbers are left out."""
     columns = [column for column in _COLUMNS
                if any(leg[column[2]] is not None for leg in legs.values())]
     spans: dict[str, int] = {}
@@ -150,7 +149,7 @@ def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
 
 
 def _fitted(value: float | None, width: int, digits: int) -> str:
-    """Return a number with so many digits after the point, fewer where they have no room."""
+    """Return a number with so many decimals, or fewer if it would be too wide."""
     if value is None:
         return f'{"-":>{width}}'
     for text in (f'{value:.{digits}f}', f'{value:.0f}'):

@@ -14,11 +14,11 @@
 
 
 """
-Samples of two sources brought together by their stamps, in bounded memory.
+Matching of samples of two sources by their stamps, in bounded memory.
 
-Where time jumps back by more than a gap, a bag that loops, another pass begins; rows of one pass
-are matched with rows of the pass of the same number. A single stamp out of line, too late or in
-the future, begins no pass.
+When time jumps back by more than a gap, as in a bag that loops, another pass begins; rows are
+matched with rows of the pass of the same number. A single stamp that is late or in the future
+begins no pass.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
 
 
 def interpolated(stamps: Stamps, at: Stamps, values: Array, gap: int) -> Array:
-    """Return values at stamps between two that are no farther apart than the gap, else nan."""
+    """Return values interpolated at stamps; nan between samples farther apart than the gap."""
     result = np.full((len(stamps), values.shape[1]), np.nan)
     if not len(at):
         return result
     after = np.minimum(np.searchsorted(at, stamps), len(at) - 1)
-    # one with the very stamp needs no other
+    # a sample with the same stamp needs no other
     before = np.where(at[after] == stamps, after, np.maximum(after - 1, 0))
     between = (at[before] <= stamps) & (stamps <= at[after]) & (at[after] - at[before] <= gap)
     before, after = before[between], after[between]
@@ -46,22 +46,22 @@ def interpolated(stamps: Stamps, at: Stamps, values: Array, gap: int) -> Array:
 
 
 class Rows(NamedTuple):
-    """Rows with their stamps, and in which pass of the recording they are."""
+    """Rows with their stamps and the numbers of their passes."""
 
     stamps: Stamps
     passes: Integers
     rows: Array
 
     def part(self, which: slice | Stamps | Flags) -> Rows:
-        """Return some of them; a copy where they are not given by a slice."""
+        """Return some of the rows; a copy unless given by a slice."""
         return Rows(self.stamps[which], self.passes[which], self.rows[which])
 
 
 class Waiting:
     """
-    Rows with stamps that wait for those of the other side, in order of pass and stamp.
+    Rows that wait to be matched, in the order of pass and stamp.
 
-    The last row waits outside until the next one shows that its stamp is in line.
+    The last row is held back until the next one shows whether its stamp is in order.
     """
 
     def __init__(self, gap: int, most: int) -> None:
@@ -75,7 +75,7 @@ class Waiting:
         self._waiting = 0
 
     def add(self, stamps: Stamps, rows: Array) -> None:
-        """Take rows (N, K) with their stamps (N,)."""
+        """Add rows (N, K) with their stamps (N,) [ns]."""
         if not len(stamps):
             return
         self.taken += len(stamps)
@@ -86,9 +86,9 @@ class Waiting:
         self._line_up(stamps, rows[:-1])
 
     def confirm(self) -> None:
-        """Take the last row for what it is: no other comes."""
+        """Add the row that was held back: there are no more."""
         if self._unsure is not None:
-            # one that jumps back and has no other behind it is out of line
+            # a last row that jumps back is out of order
             stamps = np.append(self._unsure[0], np.iinfo(np.int64).max)
             rows, self._unsure = self._unsure[1], None
             self._line_up(stamps, rows)
@@ -120,8 +120,8 @@ class Waiting:
         for stamp, after in zip(stamps[:-1], stamps[1:], strict=True):
             ahead = stamp > self.newest
             far = abs(stamp - self.newest) > self._gap
-            # one that the next goes back behind, though not behind what was before, is in the
-            # future; one before what the next goes on from is late
+            # a stamp is in the future if the next is smaller but still after those before it;
+            # it is late if the next continues from those before it
             alone = (self.newest < after < stamp - self._gap if ahead else after > self.newest)
             if not far and not ahead or far and alone:
                 passes.append(-1)
@@ -132,7 +132,7 @@ class Waiting:
         return passes
 
     def take_before(self, pass_number: int, stamp: int) -> Rows:
-        """Return and forget the rows of earlier passes, and of this one up to the stamp."""
+        """Return and remove the rows of earlier passes, and of this one up to the stamp."""
         ready: list[Rows] = []
         while self._chunks:
             chunk = self._chunks[0]
@@ -148,19 +148,19 @@ class Waiting:
         return _rows(ready)
 
     def joined(self) -> Rows:
-        """Return the rows that wait."""
+        """Return the waiting rows."""
         rows = _rows(self._chunks)
         self._chunks = [rows] if len(rows.stamps) else []
         return rows
 
     def oldest(self) -> tuple[int, int]:
-        """Return pass and stamp before which no row will be."""
+        """Return the pass and stamp of the oldest row, or of the newest ever added."""
         if not self._chunks:
             return self.pass_number, self.newest
         return int(self._chunks[0].passes[0]), int(self._chunks[0].stamps[0])
 
     def forget_before(self, pass_number: int, stamp: int) -> None:
-        """Forget the rows before this time but the last one of them."""
+        """Remove the rows before this time except the last one."""
         rows = self.joined()
         before = int(np.count_nonzero((rows.passes < pass_number) | (
             (rows.passes == pass_number) & (rows.stamps <= stamp))))

@@ -51,7 +51,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.home_pose import homes
 from stewart_dynamics.mechanics.jit import entry_point, inlined
@@ -129,7 +130,7 @@ def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
     rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
                 motion[10], motion[11])
     for leg in range(6):
-        a, _length, _inverse_length, s = kernel.leg_line(constants, leg, position, rotation)
+        a, _length, _inverse_length, s = leg_line(constants, leg, position, rotation)
         m = cross(a, s)
         force = weight * (model_forces[leg] - measured_forces[leg])
         for n in range(3):
@@ -195,7 +196,7 @@ def _one(numbers: Array) -> None:
     if dt > 0.0:
         motions = numbers[_MOTIONS].reshape(2, MOTION)
         forces, results = numbers[_FORCES], np.empty((2, RESULT))
-        kernel.solve(constants, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
+        inverse_dynamics.solve(constants, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
         for end in range(2):  # the mean of both ends
             model_forces = results[end, FORCES]
             _add_external_wrench(constants, motions[end], model_forces, forces, 0.5, wrench)

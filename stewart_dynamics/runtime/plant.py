@@ -17,7 +17,7 @@ The plant: the hexapod as it moves under leg forces.
 
 Gravity, friction, end stops, actuators that saturate: what ``stewart_simulator`` puts in the
 place of hardware. Equal commands give equal bits. See ``mechanics.plant_dynamics`` for the
-integration, ``mechanics.end_stops`` and ``mechanics.integration_step``.
+integration, ``mechanics.end_stops`` and ``mechanics.integration_step_size``.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import numpy as np
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.end_stops import stops_of
-from stewart_dynamics.mechanics.integration_step import substeps
+from stewart_dynamics.mechanics.integration_step_size import substeps
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.plant_dynamics import (
     advance, LARGEST_MOVE, LOADS, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,

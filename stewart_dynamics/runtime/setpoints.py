@@ -34,8 +34,8 @@ import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers, Six, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.batch_joining import join_many, Samples, WAITING, Waiting
 from stewart_dynamics.runtime.input_topics import SOURCES, WRENCH
-from stewart_dynamics.runtime.joining import join_many, Samples, WAITING, Waiting
 from stewart_dynamics.runtime.rejections import NOT_JOINED, Rejection, Rejections, TOO_OLD, TWICE
 from stewart_dynamics.runtime.samples import SampleReader
 from stewart_dynamics.runtime.step import Batch, Setpoint

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
@@ -225,8 +225,9 @@ def _one(numbers: Array) -> None:
     settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
     state[:] = numbers[_BEFORE]
-    kernel.solve(numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
-                 numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
+    inverse_dynamics.solve(
+        numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
+        numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
     written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
         settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0, state,
         numbers[_RESTART.start] > 0.0, result, written[_FORCES])

@@ -20,8 +20,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, NO_WRENCH, Six
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.batch_joining import Samples
 from stewart_dynamics.runtime.input_topics import WRENCH
-from stewart_dynamics.runtime.joining import Samples
 from stewart_dynamics.runtime.rejections import Rejections
 from stewart_dynamics.runtime.samples import SampleReader
 

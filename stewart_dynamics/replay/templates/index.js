@@ -6,7 +6,7 @@ const GRAVITY = [0, 1, 3, 2];
 const FAILED = 2;
 const CHUNK = 300;
 
-// All text from bags goes in as text, never as HTML.
+// Text from bags is inserted as text, never as HTML.
 function element(name, text, className) {
   const made = document.createElement(name);
   if (text !== undefined) made.textContent = text;
@@ -20,7 +20,7 @@ function shown(value, digits = 0) {
     .replaceAll(',', '\u202f').replace('-', '−');
 }
 
-// One number of digits for a column, so that sizes can be told at a glance: four for its middle.
+// One number of decimals for a column, so that magnitudes can be compared: four digits for its median.
 const decimals = fleet.columns.map(({number}, m) => {
   const sizes = number ? fleet.rows.map((cells) => Math.abs(cells[m] ?? 0)).filter((size) => size).sort((x, y) => x - y) : [];
   if (!sizes.length || sizes.every(Number.isInteger)) return 0;
@@ -36,7 +36,7 @@ function cellText(value, m) {
   return shown(value, decimals[m]);
 }
 
-// What is out of bounds, and what is near it.
+// Highlighted cells.
 function marked(key, value) {
   if (value === null || value === '') return '';
   if (key.includes('_margin_')) return value < 0 ? 'bad' : '';
@@ -69,7 +69,7 @@ function lineOf(row) {
       pill.title = error;
       cell.append(pill);
     } else if (row.code === FAILED) {
-      // It has no numbers: what is wrong takes their place.
+      // It has no numbers: the error is shown instead.
       if (key !== 'error') return;
       cell.colSpan = fleet.columns.length - row.line.children.length;
       cell.append(element('div', value));
@@ -81,7 +81,7 @@ function lineOf(row) {
   return row.line;
 }
 
-// Sorting: whatever has no value is last, in both directions.
+// Sorting: cells without a value are last, in both directions.
 const collator = new Intl.Collator('en', {numeric: true});
 const body = document.querySelector('tbody');
 let sorted = {column: -1, down: false};
@@ -116,7 +116,7 @@ fleet.columns.forEach(({key, head, unit, number, size}, m) => {
   cell.scope = 'col';
   const button = element('button', head);
   button.type = 'button';
-  button.title = size ? 'sort by size, whatever the sign' : 'sort';
+  button.title = size ? 'sort by magnitude' : 'sort';
   button.append(element('i'));
   if (unit) button.append(element('br'), element('small', unit));
   button.addEventListener('click', () => sortBy(m));
@@ -124,7 +124,7 @@ fleet.columns.forEach(({key, head, unit, number, size}, m) => {
   heads.append(cell);
 });
 
-// What is shown: all that the filters let through, so far as somebody has scrolled.
+// Rows shown: those that pass the filters, as far as the table has been scrolled.
 let only = null;
 let passing = [];
 const filter = document.getElementById('filter');

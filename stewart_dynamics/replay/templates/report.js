@@ -32,12 +32,12 @@ function nearest(times, time) {
   return low > 0 && time - times[low - 1] <= times[low] - time ? low - 1 : low;
 }
 
-// The value drawn nearest to a time; nan where the line is broken there.
+// The drawn value nearest to a time; nan where the line is interrupted.
 function valueAt(number, time) {
   const {times, values} = curve(number);
   if (!times.length) return NaN;
   const at = nearest(times, time);
-  // of several drawn at one time, such as a sample and the break after it, a sample
+  // of several entries at one time, such as a sample and the gap after it, the sample
   for (let n = at; n < times.length && times[n] === times[at]; n++) {
     if (!Number.isNaN(values[n])) return values[n];
   }
@@ -106,7 +106,7 @@ function hoverAt(when) {
   for (const plot of plots) plot.showCursor();
 }
 
-// ---- what is drawn when it comes into view, and only then
+// ---- drawings, drawn when they come into view
 
 const inView = new Set();
 const byCanvas = new Map();
@@ -116,7 +116,7 @@ const watcher = new IntersectionObserver(entries => {
     if (!entry.isIntersecting) inView.delete(drawing);
     else {
       inView.add(drawing);
-      // A hexapod in 3-D can take seconds without a graphics card: the plots go first.
+      // A 3-D scene can take seconds without a graphics card: the plots are drawn first.
       setTimeout(() => drawing.appear(), drawing instanceof TimePlot || drawing.drawn ? 0 : 500);
     }
   }
@@ -205,7 +205,7 @@ class TimePlot {
         if (!Number.isNaN(values[k]) && !(k > 0 && !Number.isNaN(values[k - 1]))
             && !(k + 1 < values.length && !Number.isNaN(values[k + 1]))) alone.push(k);
       }
-      // a sample between two breaks is no line
+      // a sample between two gaps is drawn as a marker
       if (alone.length) {
         traces.push({
           type: 'scatter', mode: 'markers', x: alone.map(k => times[k]), y: alone.map(k => values[k]),
@@ -215,8 +215,8 @@ class TimePlot {
     return traces;
   }
 
-  // What is drawn from least to largest, and the bounds if these are not far off. What is near a
-  // singularity may be far larger than all else: it is not to flatten that.
+  // From the smallest to the largest value, with the bounds if they are close. Values near a
+  // singularity may be far larger than all others: they do not set the scale.
   usualRange() {
     const whole = this.extremes(() => true);
     let [low, high] = whole;
@@ -355,10 +355,10 @@ class TimePlot {
 
   offerEverything() {
     if (!this.spec.spikes || this.offer || !this.spiky) return;
-    this.offer = element('button', {className: 'small', textContent: 'show the spikes whole'});
+    this.offer = element('button', {className: 'small', textContent: 'show full range'});
     this.offer.addEventListener('click', () => {
       this.everything = !this.everything;
-      this.offer.textContent = this.everything ? 'show the usual range' : 'show the spikes whole';
+      this.offer.textContent = this.everything ? 'show usual range' : 'show full range';
       this.yRange = this.usualRange();
       Plotly.relayout(this.canvas, {'yaxis.range': this.yRange.slice()});
     });
@@ -422,7 +422,7 @@ function legLines(joints, forces) {
   return {x: column(points, 0), y: column(points, 1), z: column(points, 2), colors};
 }
 
-// Axes with one scale that hold the base and the platform in all frames.
+// Axes of equal scale that contain base and platform in all frames.
 function scene(numbers, width) {
   const beside = besideBase();
   const low = [0, 1, 2].map(k => Math.min(...column(beside, k)));
@@ -441,16 +441,16 @@ function scene(numbers, width) {
     gridcolor: '#dde2e8', zerolinecolor: '#c3cad3', backgroundcolor: '#fff', showbackground: false,
     showspikes: false, tickfont: {size: 11}});
   return {xaxis: axis('X', 0), yaxis: axis('Y', 1), zaxis: axis('Z', 2), aspectmode: 'data',
-    // narrow ones are seen from farther away
+    // a narrow scene is seen from farther away
     camera: {eye: {x: 1.15 * far, y: -1.35 * far, z: 0.62 * far}, center: {x: 0, y: 0, z: -0.12}}};
 }
 
 function shortened(name) { return name.length > 14 ? `${name.slice(0, 13)}…` : name; }
 
-// Plotly takes markup in the texts that it draws itself, and has no way to escape it in all of them.
+// Plotly interprets markup in texts that it draws, and cannot escape it in all of them.
 function plainText(name) { return name.replace(/</g, '‹').replace(/>/g, '›'); }
 
-// Where the names of the legs stand: outside them.
+// Positions of the names of the legs: outside of the base joints.
 function besideBase() {
   const middle = [0, 1, 2].map(k => column(report.baseJoints, k).reduce((a, b) => a + b) / 6);
   return report.baseJoints.map(joint => joint.map((value, k) => value + 0.14 * (value - middle[k])));
@@ -466,7 +466,7 @@ function baseTraces() {
       text: report.legs.map(name => plainText(shortened(name))), textposition: 'middle center', textfont: {size: 11, color: INK}, hoverinfo: 'skip', showlegend: false}];
 }
 
-// The largest force that the colours tell apart; a few spikes do not wash out all others.
+// The force at the end of the color scale; a few spikes do not set it.
 function colorReach() {
   const sizes = [];
   for (let n = 0; n < frames.times.length; n++) {
@@ -489,8 +489,8 @@ class Player {
     this.drawn = false;
     this.reach = colorReach();
     place.append(element('h2', {textContent: 'Motion'}), element('p', {className: 'note', textContent:
-      'Legs are coloured by the demanded force: red pushes, blue pulls. Play, or move the slider at the '
-      + 'bottom: the cursor in all plots goes with it. Turn the hexapod with the mouse.'}),
+      'Legs are colored by the demanded force: red pushes, blue pulls. Play, or move the slider at the '
+      + 'bottom: the cursor in all plots follows. Drag to rotate the hexapod.'}),
     element('div', {className: 'plot'}, element('div', {className: 'body'}, this.canvas, this.readout)));
     this.listValues();
     watch(this.canvas, this);
@@ -651,7 +651,7 @@ function setUpBar() {
   const speeds = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].filter(
     each => each <= 1 || duration / each >= 2);
   for (const each of speeds) speed.append(element('option', {value: each, textContent: `${each} ×`}));
-  // the whole motion within a minute
+  // the whole motion in at most a minute
   speed.value = speeds.find(each => each >= 1 && duration / each <= 60) || speeds[speeds.length - 1];
   speed.addEventListener('change', () => { if (playing.since !== null) { stop(); play(); } });
   slider.addEventListener('input', () => {
@@ -679,18 +679,18 @@ function setUp() {
   const place = document.getElementById('plots');
   if (!report.samples) {
     place.append(element('p', {className: 'note', textContent:
-      'No setpoint could be answered: there is nothing to draw.'}));
+      'No setpoint could be answered: there are no plots.'}));
     return;
   }
   setUpBar();
   player = new Player(document.getElementById('motion'));
   place.append(element('h2', {textContent: 'Plots over time'}));
-  const drag = 'Drag to zoom: all plots follow. Double click: back. Click: the cursor goes there. ';
+  const drag = 'Drag to zoom: all plots follow. Double click: whole range. Click: move the cursor there. ';
   place.append(element('p', {className: 'note', textContent: drag + (report.samplesInBucket < 2
     ? 'Every sample is drawn.'
-    : `${report.samples.toLocaleString('en')} samples: of every ${report.samplesInBucket} the lowest and the `
-      + 'highest are drawn, and the values are of those nearest to the cursor.')}));
-  const part = (told, all) => told.length < all ? `, the first ${told.length} of ${all.toLocaleString('en')}` : '';
+    : `${report.samples.toLocaleString('en')} samples: of each ${report.samplesInBucket} the lowest and the `
+      + 'highest are drawn; values are those of the drawn sample nearest to the cursor.')}));
+  const part = (listed, all) => listed.length < all ? `, the first ${listed.length} of ${all.toLocaleString('en')}` : '';
   const legend = element('div', {className: 'legend'});
   if (report.warnings.length) {
     const box = element('i');
@@ -723,7 +723,7 @@ document.addEventListener('click', event => {
   }
 });
 
-// On paper all plots are drawn, as wide as the paper.
+// For printing all plots are drawn, in the width of the paper.
 window.addEventListener('beforeprint', () => {
   for (const drawing of byCanvas.values()) {
     inView.add(drawing);

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Efforts in recorded JointState messages: any layout, any order of names, spoiled bytes."""
+"""Efforts in recorded JointState messages: any layout, any order of names, damaged bytes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ import pytest
 from referees import rng
 
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.replay.efforts import Efforts
+from stewart_dynamics.replay.recorded_efforts import Efforts
 
 SECOND = 1_000_000_000
 JOINTS = [f'leg_{n}' for n in range(1, 7)]
@@ -94,7 +94,7 @@ def test_many_layouts_in_many_calls_keep_their_order() -> None:
         assert rejected == {}
 
 
-def test_what_is_no_effort_is_rejected_and_counted() -> None:
+def test_messages_without_valid_efforts_are_rejected_and_counted() -> None:
     good = joint_state(7, JOINTS, range(6))
     bad = {
         'without effort': [joint_state(1, JOINTS, [], positions=6)] * 2,
@@ -126,7 +126,7 @@ def test_numbers_of_joints_that_are_not_asked_for_may_be_anything() -> None:
     assert rejected == {}
 
 
-def test_what_stands_in_the_gaps_between_fields_does_not_count() -> None:
+def test_padding_bytes_are_ignored() -> None:
     names = [f'{joint}x' for joint in JOINTS]
     good = joint_state(7, names, range(6))
     # rclpy leaves in gaps what the memory held: every byte that no field takes may be anything
@@ -134,9 +134,9 @@ def test_what_stands_in_the_gaps_between_fields_does_not_count() -> None:
     efforts.read(*joined([good]))
     gaps = 0
     for at in range(2, len(good)):
-        spoiled = good[:at] + bytes([good[at] ^ 0xff]) + good[at + 1:]
+        damaged = good[:at] + bytes([good[at] ^ 0xff]) + good[at + 1:]
         try:
-            read = STORE.deserialize_cdr(spoiled, 'sensor_msgs/msg/JointState')
+            read = STORE.deserialize_cdr(damaged, 'sensor_msgs/msg/JointState')
             same = (list(read.name) == names and list(read.effort) == list(range(6))
                     and read.header.stamp.nanosec == 7 and read.header.frame_id == ''
                     and not len(read.position) and not len(read.velocity))
@@ -144,12 +144,12 @@ def test_what_stands_in_the_gaps_between_fields_does_not_count() -> None:
             continue
         if same:
             gaps += 1
-            _, numbers, rejected = efforts.read(*joined([spoiled]))
+            _, numbers, rejected = efforts.read(*joined([damaged]))
             assert numbers.tolist() == [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]] and not rejected
     assert gaps > 6
 
 
-def test_spoiled_bytes_never_break_it() -> None:
+def test_damaged_bytes_never_raise() -> None:
     random = rng()
     good = joint_state(7, ['a', *JOINTS], range(7), 'base', positions=7)
     messages = []
@@ -166,19 +166,20 @@ def test_spoiled_bytes_never_break_it() -> None:
     assert stamps[0] == 7
 
 
-def test_a_joint_that_no_message_has_is_named() -> None:
+def test_a_joint_in_no_message_is_named() -> None:
     names = ['leg_1', 'leg_2', 'leg_3', 'leg_4', 'leg_5', 'cylinder_6']
     efforts = Efforts(JOINTS)
     stamps, _, rejected = efforts.read(*joined([joint_state(1, names, range(6))]))
     assert not len(stamps) and rejected == {'lacks one of the joints': 1}
-    with pytest.raises(BagError, match='no message has leg_6; there are leg_1, .*, cylinder_6:'):
+    with pytest.raises(
+            BagError, match='no message contains leg_6; they contain leg_1, .*, cylinder_6:'):
         efforts.check()
-    # many of them are said at once
-    with pytest.raises(BagError, match='no message has leg_6'):
+    # also before the end of the bag
+    with pytest.raises(BagError, match='no message contains leg_6'):
         efforts.read(*joined([joint_state(1, names, range(6))] * 1000))
 
 
-def test_another_publishers_joints_are_no_mistake() -> None:
+def test_joints_of_another_publisher_are_not_an_error() -> None:
     efforts = Efforts(JOINTS)
     other = joint_state(1, ['gripper'], [2.0])
     efforts.read(*joined([other] * 500))

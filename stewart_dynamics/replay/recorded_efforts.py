@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The efforts in recorded sensor_msgs/JointState messages, many at a time."""
+"""The efforts in recorded sensor_msgs/JointState messages, read in blocks."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE
 
-# No force is as large [N]: its square would overflow.
+# Larger than any force [N]: the square would overflow.
 _FORCE_END = 1e100
-# Messages that may lack a joint before it is a mistake.
+# Messages without all joints from which on it is an error.
 _PATIENCE = 1000
 
 
 class Efforts:
     """
-    Reads the efforts of a hexapod's joints.
+    Reads the efforts of the joints of a hexapod.
 
     Parameters
     ----------
     joints : sequence of str
-        Names of the six joints in the order wanted. A message may have others besides, in any
-        order.
+        Names of the six joints in the order of the result. A message may contain other joints,
+        in any order.
 
     """
 
@@ -53,17 +53,17 @@ class Efforts:
     def read(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike,
              ) -> tuple[Stamps, Array, dict[str, int]]:
         """
-        Return stamps (K,) [ns], efforts (K, 6) [N], and of other messages how many, by reason.
+        Return stamps (K,) [ns], efforts (K, 6) [N], and the number of rejected messages by reason.
 
         Parameters
         ----------
         data : bytes or array of them
-            It holds all messages.
+            It contains all messages.
         starts, sizes : (M,)
-            Where each begins, and its length in bytes.
+            Start and length of each message [bytes].
 
-        Messages that lack a joint may be another publisher's, and are rejected. Raises BagError
-        where a thousand did and none had them all.
+        Messages without all joints may come from another publisher, and are rejected. Raises
+        BagError if a thousand were rejected and none had all joints.
 
         """
         stamps, efforts, rejected = self._reader.read_many(data, starts, sizes)
@@ -77,10 +77,10 @@ class Efforts:
         return stamps, efforts, rejected
 
     def check(self) -> None:
-        """Raise BagError where messages lacked a joint, and none had them all."""
+        """Raise BagError if messages lacked a joint, and none had all joints."""
         if self._lacked and not self._reader.found:
             names = self._reader.other_names
             missing = [joint for joint in self._joints if joint not in names]
             raise BagError(
-                f'measured joint states: no message has {", ".join(missing)}; there are '
-                f'{", ".join(names) or "none"}: the names must be those of the parameter joints')
+                f'measured joint states: no message contains {", ".join(missing)}; they contain '
+                f'{", ".join(names) or "nothing"}: they must be those of the parameter joints')

@@ -14,12 +14,12 @@
 
 
 """
-Curves for drawing: of every bucket of samples the lowest and the highest, bounded in number.
+Curves for plots: the lowest and the highest sample of each bucket, of a limited number of buckets.
 
-Buckets hold equally many samples. When all are full neighbours are merged and the next ones hold
-twice as many, so a bag of any length is drawn with about as many points, and every peak is one
-of them, at its true time. Up to two samples a bucket that is every sample. These are never used
-for numbers.
+Buckets contain equally many samples. When all are full, neighbors are merged and the next buckets
+contain twice as many, so a bag of any length is drawn with about the same number of points, and
+each peak is one of them, at its true time. With up to two samples in a bucket, every sample is
+drawn. Figures in tables are not computed from curves.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.replay.gathering import FIRST, longest_step
+from stewart_dynamics.replay.block_statistics import FIRST, longest_step
 
-# More buckets than a plot has pixels across gain nothing. Even, since neighbours are merged.
+# About the width of a plot in pixels. Even, since neighbors are merged.
 BUCKETS = 1024
 
-# A gap in the summary breaks the line. Of more than can be told apart in a plot the longest do.
+# A gap breaks the line; only the longest gaps, up to this number, do.
 _MOST_BREAKS = 1000
 
-# Frames are told apart from here on [s]; a power of two, so that halves of halves meet exactly.
+# Shortest interval between frames [s]; a power of two, so that doubled intervals are exact.
 _FINEST = 2.0 ** -20
 
 
 class Curves:
     """
-    What is drawn of many channels that share their samples.
+    The curves of several channels that share their samples.
 
     The result does not depend on how the samples are split into blocks.
 
     Parameters
     ----------
     channels : int
-        How many.
+        Number of channels.
     timeout : float
         A step in time up to this long never breaks a line [s].
     buckets : int
-        The most there are, even.
+        The largest number of buckets, even.
 
     """
 
@@ -63,7 +63,7 @@ class Curves:
         self._timeout = timeout
         self._lowest = np.full((channels, buckets), np.inf)
         self._highest = np.full((channels, buckets), -np.inf)
-        # when [s]; of the first value missing from a bucket inf where none is
+        # when [s]; the last: of the first missing value in a bucket, inf if there is none
         self._lowest_at = np.full((channels, buckets), np.inf)
         self._highest_at = np.full((channels, buckets), np.inf)
         self._missing_at = np.full((channels, buckets), np.inf)
@@ -80,9 +80,9 @@ class Curves:
         Parameters
         ----------
         seconds : (N,)
-            When, never decreasing [s].
+            Times, never decreasing [s].
         values : (C, N)
-            Of every channel; what is not finite is missing and breaks the line.
+            Of every channel; values that are not finite are missing and break the line.
 
         """
         if not len(seconds):
@@ -99,7 +99,7 @@ class Curves:
                 self._merge()
             size = self.samples_in_bucket
             bucket, filled = divmod(self.samples, size)
-            # the rest of a bucket begun, or whole ones, or what is left
+            # the rest of a started bucket, or whole buckets, or the remaining samples
             count, each = 1, min(size - filled, len(seconds) - at)
             if not filled and each == size:
                 count = min(buckets - bucket, (len(seconds) - at) // size)
@@ -110,7 +110,7 @@ class Curves:
             at = end
 
     def drawn(self, channel: int) -> tuple[Array, Array]:
-        """Return times [s], never decreasing, and values to be joined; nan breaks the line."""
+        """Return times [s], never decreasing, and values of the line; nan breaks it."""
         if not self.samples:
             return np.empty(0), np.empty(0)
         used = slice(0, -(-self.samples // self.samples_in_bucket))
@@ -130,7 +130,7 @@ class Curves:
         return np.insert(times, at, breaks), np.insert(values, at, np.nan)
 
     def breaks(self) -> Array:
-        """Return (B, 2) [s]: between which samples so much time passed that no line joins them."""
+        """Return (B, 2) [s]: begin and end of the gaps that break the line."""
         longest = longest_step(self._first_steps, self._timeout)
         return self._breaks[self._breaks[:, 1] - self._breaks[:, 0] > longest]
 
@@ -145,7 +145,7 @@ class Curves:
 
     def _fold(self, buckets: slice, seconds: Array, values: Array,
               missing: Flags | None) -> None:
-        """Put samples, equally many for each of these buckets, into them."""
+        """Add samples to these buckets, equally many to each."""
         shape = (len(values), buckets.stop - buckets.start, -1)
         times = seconds.reshape(shape[1:])
         each = np.arange(shape[1])
@@ -165,7 +165,7 @@ class Curves:
             np.minimum(self._missing_at[:, buckets], begun, out=self._missing_at[:, buckets])
 
     def _merge(self) -> None:
-        """Merge neighbours; the first of two equal ones stays."""
+        """Merge neighbors; of two equal extremes the first is kept."""
         half = self._lowest.shape[1] // 2
         for extreme, when, none, less in (
                 (self._lowest, self._lowest_at, np.inf, np.less),
@@ -199,17 +199,17 @@ class Curves:
 
 class Frames:
     """
-    True samples, one of each of equally long pieces of time, bounded in number.
+    Unchanged samples, one of each of equally long intervals, limited in number.
 
-    When there are too many the pieces are doubled. The result does not depend on how the
-    samples are split into blocks, and holds every sample while there are few.
+    When there are too many, the intervals are doubled. The result does not depend on how the
+    samples are split into blocks, and contains every sample while there are few.
 
     Parameters
     ----------
     numbers : int
-        How many numbers a sample has.
+        Number of values of a sample.
     most : int
-        The most frames there are, besides the last sample.
+        The largest number of frames, in addition to the last sample.
 
     """
 
@@ -238,7 +238,7 @@ class Frames:
             self._times, self._values = self._times[kept], self._values[kept]
 
     def chosen(self) -> tuple[Array, Array]:
-        """Return times (F,) [s] and samples (F, numbers), the first and the last among them."""
+        """Return times (F,) [s] and samples (F, numbers), with the first and the last."""
         if not len(self._times) or self._times[-1] == self._last_time[0]:
             return self._times, self._values
         return (np.concatenate([self._times, self._last_time]),

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What is drawn of a bag: every extreme, in the order of time, whatever the blocks."""
+"""The curves of a bag: every extreme, in the order of time, for any split into blocks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from stewart_dynamics.replay.curves import BUCKETS, Curves, Frames
+from stewart_dynamics.replay.plot_curves import BUCKETS, Curves, Frames
 
 Array = NDArray[np.float64]
 
@@ -135,7 +135,7 @@ def test_the_number_of_points_is_bounded_and_a_spike_of_one_sample_stays() -> No
     assert (at[0], at[-1]) == (0.0, pytest.approx(999.999))
 
 
-def test_a_gap_is_told_from_slow_samples() -> None:
+def test_a_gap_is_distinguished_from_slow_samples() -> None:
     slow = np.arange(50) * 1.0
     with_gap = np.concatenate([slow, 80.0 + slow])
     values = np.zeros((1, 100))

@@ -14,9 +14,9 @@
 
 
 """
-What is gathered of samples that come block after block: extremes, integrals, crossings, warnings.
+Extremes, integrals, crossings and warnings of samples that are given block by block.
 
-But for rounding, it does not matter where one block ends and the next begins.
+Apart from rounding, the results do not depend on how the samples are split into blocks.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 
-# So many crossings and warnings are listed one by one; all of them are counted.
+# At most so many crossings and warnings are listed; all are counted.
 LISTED = 100
-# A step longer than so many usual ones (and than setpoint.timeout) is a gap; the usual one is
-# the median of the steps between the first setpoints, so many.
+# A step longer than so many usual steps (and than setpoint.timeout) is a gap; the usual step is
+# the median of the steps between the first setpoints, FIRST of them.
 _GAP = 10.0
 FIRST = 1000
 
 
 def longest_step(first: Array, timeout: float) -> float:
-    """Return the longest step that is no gap [s], by those between the first FIRST setpoints."""
+    """Return the longest step that is not a gap [s], from those of the first FIRST setpoints."""
     forward = first[first > 0.0]
     usual = float(np.median(forward)) if len(forward) else 0.0
     return float(max(timeout, _GAP * usual))
@@ -44,9 +44,9 @@ def longest_step(first: Array, timeout: float) -> float:
 
 class Extreme:
     """
-    Of each column the value that is the greatest by a measure, and the first time it is met.
+    Of each column the value that is the greatest by a measure, and when it first occurs.
 
-    nan are left out, as is what measures -inf.
+    Values that are nan, or whose measure is -inf, are left out.
     """
 
     def __init__(self, width: int, measure: Callable[[Array], Array]) -> None:
@@ -57,7 +57,7 @@ class Extreme:
         self.at: Array = np.full(width, np.nan)
 
     def add(self, seconds: Array, values: Array) -> None:
-        """Take values (N, width) at times (N,)."""
+        """Add values (N, width) at times (N,) [s]."""
         measured = self._measure(values)
         unknown = np.isnan(measured)
         if unknown.any():
@@ -74,7 +74,7 @@ class Integral:
     """
     Of each column the integral over time by trapezoids, and the mean.
 
-    Rows with a nan are left out, and the steps from and to them.
+    Rows with a nan are left out, with the steps to and from them.
     """
 
     def __init__(self, width: int) -> None:
@@ -86,7 +86,7 @@ class Integral:
         self._last_known = False
 
     def add(self, steps: Array, values: Array) -> None:
-        """Take the values in, and the times from each sample's predecessor to it."""
+        """Add values (N, width), and the times from each sample's predecessor to it (N,) [s]."""
         known = ~with_nan(values)
         if not known.all():
             values = np.where(known[:, None], values, 0.0)
@@ -99,7 +99,7 @@ class Integral:
 
     @property
     def mean(self) -> Array:
-        """Over time, or over the samples where none has passed; nan without samples."""
+        """Over time, or over the samples if no time has passed; nan without samples."""
         if self._time > 0.0:
             return self.values / self._time
         return self._sum / self._samples if self._samples else np.full_like(self._sum, np.nan)
@@ -107,21 +107,21 @@ class Integral:
 
 class Crossings:
     """
-    Where det(J) changes its sign, also by way of a zero.
+    When det(J) changes its sign, also through a zero.
 
-    Times are interpolated between two samples. A restart is no crossing: what was before it
-    says nothing of what comes after.
+    Times are interpolated between two samples. A change of sign across a restart is not a
+    crossing.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self.first: list[float] = []
-        # the last sample that was not zero, and the one after it
+        # the last sample that is not zero, and the one after it
         self._seconds: Array = np.empty(0)
         self._determinants: Array = np.empty(0)
 
     def add(self, seconds: Array, determinants: Array, restarts: Flags) -> None:
-        """Take samples (N,); of some, time has jumped back before them."""
+        """Add samples (N,); ``restarts``: time has jumped back before the sample."""
         carried = len(self._seconds)
         time = np.concatenate((self._seconds, seconds))
         det = np.concatenate((self._determinants, determinants))
@@ -141,7 +141,7 @@ class Crossings:
 
 
 class Warnings:
-    """From when to when a warning was on."""
+    """Intervals in which a warning was on."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -150,7 +150,7 @@ class Warnings:
         self._on = False
 
     def add(self, seconds: Array, steps: Array, warnings: Flags) -> None:
-        """Take samples (N,), and the times from each one's predecessor to it."""
+        """Add samples (N,), and the times from each one's predecessor to it [s]."""
         before = np.concatenate(([self._on], warnings[:-1]))
         self.seconds += float(steps @ before)
         changes = np.flatnonzero(warnings != before)
@@ -167,6 +167,6 @@ def with_nan(values: Array) -> Flags:
     """Return which rows have a nan in them."""
     unknown = np.isnan(values)
     rows: Flags = np.zeros(len(values), dtype=bool)
-    if unknown.any():  # seldom; to look row by row takes ten times as long
+    if unknown.any():  # rare; a check row by row takes ten times as long
         np.any(unknown, axis=1, out=rows)
     return rows

@@ -14,10 +14,10 @@
 
 
 """
-Pages from the templates beside this module, by Jinja2 with everything escaped.
+HTML pages from the templates in this package, by Jinja2 with autoescaping.
 
-A page holds its own style and scripts, and the browser is told by their digests to run no others.
-Whatever users have named is text and never markup.
+A page contains its style and scripts; its content security policy allows no other scripts, by
+their digests. Names given by users are text, never markup.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _FOLDER = Path(__file__).with_name('templates')
 
 
 def number(value: float | None, decimals: int) -> str:
-    """Return a number with so many decimals, or none where it is large."""
+    """Return a number with so many decimals, without any from 1e5 on."""
     if value is None or not math.isfinite(value):
         return '–'
     return f'{value:.{decimals}f}'.replace('-', '−') if abs(value) < 1e5 else digits(value)
 
 
 def digits(value: float | None) -> str:
-    """Return a number with five digits, or to the unit where that is more."""
+    """Return a number with five digits, or all digits before the point."""
     if value is None or not math.isfinite(value):
         return '–'
     grouped = 1e5 <= abs(value) < 1e10
@@ -56,7 +56,7 @@ def _environment() -> Environment:
                        undefined=StrictUndefined, keep_trailing_newline=True)
     made.filters.update(number=number, digits=digits, exactly=repr)
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
-    # Nothing in the data can end the element that holds it: the filter escapes < > & and '.
+    # Data cannot end the element that contains them: the filter escapes < > & and '.
     made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
     return made
 
@@ -68,11 +68,11 @@ def page(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     Parameters
     ----------
     template : str
-        Name of the template, of its style (.css) and of its script (.js).
+        Name of the template (.html), its style (.css) and its script (.js).
     scripts : sequence of str
-        Other scripts that the page may run.
+        Other scripts that the page is allowed to run.
     values : mapping
-        What the template uses.
+        Variables of the template.
 
     """
     script, style = (_FOLDER.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
