@@ -29,6 +29,7 @@ from urllib.parse import quote
 
 from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.pages import page
+from stewart_dynamics.replay.spreadsheet import harmless
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]
@@ -168,8 +169,8 @@ def _harmless(key: str, cell: Cell) -> Cell:
         return ''
     if isinstance(cell, bool):
         return str(cell).lower()
-    if isinstance(cell, str) and cell[:1] in tuple('=+-@\t\r\n'):
-        return ('./' if key in ('bag', 'results') else "'") + cell
+    if isinstance(cell, str):
+        return harmless(cell, './' if key in ('bag', 'results') else "'")
     return cell
 
 

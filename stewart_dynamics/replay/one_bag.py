@@ -38,8 +38,9 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.efforts import Efforts
+from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable, Table
 from stewart_dynamics.replay.options import code_of, Options
-from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Table
+from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.residuals import Comparison
@@ -260,8 +261,8 @@ class _Run:
             return 0
         self._state = outputs.singularity()
         self._bag.write(setpoints.times, outputs)
-        self._table.write(outputs)
         seconds = self._seconds(setpoints.stamps)
+        self._table.write(seconds, setpoints.motions, outputs)
         breakdown = None
         if self.report is not None and self._breakdown is not None:
             breakdown = self._breakdown(setpoints.motions, setpoints.wrenches)
