@@ -189,7 +189,7 @@ def test_every_bag_is_replayed_once(bags: Path, tmp_path: Path, jobs: int) -> No
     check_each_once(fleet, pairs, output)
     assert [each.code for each in fleet.ended] == [DONE] * 10 + [LIMIT_MET]
     assert (fleet.code(strict=False), fleet.code(strict=True)) == (DONE, LIMIT_MET)
-    assert fleet.text() == '11 bags: 10 done, 1 limit met'
+    assert fleet.text() == '11 bags: 10 done, 1 limit or warning'
     # the row of a bag is its summary's
     summary = json.loads((output / 'singular' / 'summary.json').read_text(encoding='utf-8'))
     row = rows(output)[f'{bags / "singular"}']
@@ -221,7 +221,7 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     assert fleet._replace(ended=(ended['singular'], ended['cut'])).code(True) == PARTLY_READ
     # each is named, with what is wrong, in one line
     head, *told = fleet.text().splitlines()
-    assert head == '16 bags: 11 done, 1 limit met, 1 partly read, 3 failed'
+    assert head == '16 bags: 11 done, 1 limit or warning, 1 incomplete, 3 failed'
     assert len(told) == 4
     for name, why in (('cut', 'cut.mcap: '), ('noise', 'neither MCAP nor sqlite3'),
                       ('none', 'no such file'), ('other', 'exists already')):
@@ -230,8 +230,8 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
         assert line.startswith(f'{ended[name].bag}')
         assert why in line
         row = rows(output)[f'{ended[name].bag}']
-        assert row['error']
-        assert row['error'] in line
+        assert row['reason']
+        assert row['reason'] in line
     assert int(rows(output)[f'{bags / "cut"}']['setpoints']) > 100
     assert rows(output)[f'{bags / "cut"}']['complete'] == 'false'
     assert int(rows(output)[f'{bags / "flawed"}']['rejected']) > 100
@@ -306,8 +306,8 @@ def test_a_bag_whose_process_dies_twice_fails(bags: Path, tmp_path: Path) -> Non
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
     long = fleet.ended[0]
-    assert long.error == (f'{bags / "long"}: the process that replayed it was killed, '
-                          'twice (was there too little memory?)')
+    assert long.error == (f'{bags / "long"}: the process that replayed it was killed '
+                          'twice (out of memory?)')
     assert not long.folder.exists()
     assert hidden(output) == []
     for bag, folder in pairs[1:]:
@@ -543,8 +543,8 @@ def test_a_bag_that_kills_its_workers_does_not_affect_others(
                 os.kill(pid, signal.SIGKILL)
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
-    assert re.search(r'/long: the worker that replayed it died 2 times; the last one was at '
-                     r'tcp://\S+ \(was there too little memory\?\)$', fleet.ended[0].error)
+    assert re.search(r'/long: the worker that replayed it died 2 times, the last one at '
+                     r'tcp://\S+ \(out of memory\?\)$', fleet.ended[0].error)
     assert len(killed) == 2
     assert hidden(output) == []
     for bag, folder in pairs[1:]:

@@ -37,7 +37,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_task import (
     counted, Ended, LOCAL_INTERVAL, replay_task, Results, Task)
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
-from stewart_dynamics.replay.index import Cell, RESULTS, write_fleet
+from stewart_dynamics.replay.index import Cell, SEVERITY, write_fleet
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, Options, PARTLY_READ
 from stewart_dynamics.replay.progress_bar import ProgressBar
 from stewart_dynamics.replay.results_folder import partial_name
@@ -58,9 +58,8 @@ class Fleet(NamedTuple):
 
     def text(self) -> str:
         """Return the number of bags by result, and a line for every bag with an error."""
-        number = Counter(each.code for each in self.ended)
-        counts = ', '.join(f'{number[code]} {RESULTS[code]}'
-                           for code in sorted(number, key=_SEVERITY))
+        number = Counter(str(each.row['result']) for each in self.ended)
+        counts = ', '.join(f'{number[result]} {result}' for result in SEVERITY if number[result])
         return '\n'.join([f'{len(self.ended)} bags: {counts}',
                           *(each.error for each in self.ended if each.error)])
 

@@ -22,7 +22,7 @@ the memory used does not grow with the bag.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing, ExitStack
 from importlib import metadata
 from pathlib import Path
@@ -46,7 +46,7 @@ from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.results_folder import check_free, whole_folder, write_json
 from stewart_dynamics.replay.summary import Summary
-from stewart_dynamics.replay.summary_text import measured_lines, summary_lines
+from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import input_topics as inputs
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
@@ -118,7 +118,7 @@ def replay(
             write_json(partial / 'summary.json', summary)
             if run.report is not None:
                 run.report.write(partial / 'report.html', summary)
-    return Replayed(bag, folder, summary, run.text(summary), code_of(summary))
+    return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 
 class _Run:
@@ -214,23 +214,10 @@ class _Run:
                           'first': self._firsts[rejection]}
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
-            'measured': measured,
+            'measured': measured and {'headline': measured_headline(measured), **measured},
             'parameters': {name: _plain(value)
                            for name, value in self._parameters.items()},
         }
-
-    def text(self, summary: Mapping[str, Any]) -> str:
-        """Return the summary for the terminal."""
-        lines = [f'{self._recording.path}:']
-        if summary['measured']:
-            lines += measured_lines(summary['measured'])
-        lines += summary_lines(summary, self._parameters)
-        lines += summary['notices']
-        for each in summary['rejected']:
-            words = Rejection(f'{each["topic"]}: {each["count"]}', each['reason']).words(
-                f'first: {each["first"]}')
-            lines.append(words if each['first'] else words.removesuffix(': first: '))
-        return '\n'.join(lines)
 
     def _rejected(self, rejection: Rejection, details: str) -> None:
         self._firsts.setdefault(rejection, details)
