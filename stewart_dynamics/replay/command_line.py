@@ -53,7 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (StewartError, OSError) as exc:
         _complain(exc)
         return BAD_INPUT
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as exc:
+        _complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
         return _INTERRUPTED
     finally:
         for each, handler in before.items():

@@ -213,6 +213,18 @@ def write_fleet(output: Path, rows: Sequence[Row]) -> None:
         file.write(_page(output, rows))
 
 
+def listed_results(table: Path) -> set[str] | None:
+    """Return the folders of results in a fleet.csv; None if it cannot be read as one."""
+    try:
+        with table.open(newline='', encoding='utf-8') as file:
+            reader = csv.DictReader(file)
+            if reader.fieldnames != [column.key for column in COLUMNS]:
+                return None
+            return {row['results'].removeprefix('./') for row in reader if row['results']}
+    except (OSError, ValueError, csv.Error):
+        return None
+
+
 def _harmless(key: str, cell: Cell) -> Cell:
     """
     Return a cell that no spreadsheet takes for a formula.

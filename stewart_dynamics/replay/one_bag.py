@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing, ExitStack
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,6 +37,8 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.efforts import Efforts
+from stewart_dynamics.replay.fingerprint import (
+    fingerprint, plain_parameters, software, VERSION)
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable, Table
 from stewart_dynamics.replay.options import code_of, Options
 from stewart_dynamics.replay.output import OutputBag
@@ -52,9 +53,6 @@ from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
-
-# Of summary.json; increased when the meaning of a key changes.
-VERSION = 1
 
 _SECOND = 1_000_000_000
 
@@ -99,6 +97,7 @@ def replay(
     """
     options = options or Options()
     check_free(folder, options)
+    made_of = _fingerprint(bag, parameters, options)
     source = ('pose' if options.cutoff is not None
               else 'combined' if 'combined' in options.topics else None)
     if source:
@@ -114,11 +113,18 @@ def replay(
                 if progress is not None:
                     progress(size, answered)
             run.end()
-            summary = run.summary()
+            summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / 'summary.json', summary)
             if run.report is not None:
                 run.report.write(partial / 'report.html', summary)
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
+
+
+def _fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
+    try:
+        return fingerprint(bag, parameters, options)
+    except OSError:  # reported when the bag is opened
+        return ''
 
 
 class _Run:
@@ -200,7 +206,7 @@ class _Run:
             notices.append(f'and {self._more} more like these')
         return {
             'version': VERSION,
-            'software': _software(),
+            'software': software(),
             'bag': str(self._recording.path),
             'run': self._options.run,
             'complete': not missing,
@@ -215,8 +221,7 @@ class _Run:
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
             'measured': measured and {'headline': measured_headline(measured), **measured},
-            'parameters': {name: _plain(value)
-                           for name, value in self._parameters.items()},
+            'parameters': plain_parameters(self._parameters),
         }
 
     def _rejected(self, rejection: Rejection, details: str) -> None:
@@ -281,16 +286,3 @@ class _Run:
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):
             self.report.add_measured(*compared)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.ravel().tolist()
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _software() -> str:
-    try:
-        return f'stewart_dynamics {metadata.version("stewart_dynamics")}'
-    except metadata.PackageNotFoundError:  # run from its sources
-        return 'stewart_dynamics'

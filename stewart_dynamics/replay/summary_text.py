@@ -116,7 +116,8 @@ def measured_headline(measured: Mapping[str, Any]) -> list[str]:
 
 def _span(legs: Sequence[Mapping[str, Any]], key: str) -> str:
     values = [leg[key] for leg in legs]
-    texts = f'{min(values):.4g}', f'{max(values):.4g}'
+    # without the rounding error of zero
+    texts = (f'{round(value, 6) + 0.0:.4g}' for value in (min(values), max(values)))
     return ' to '.join(dict.fromkeys(texts))
 
 
