@@ -25,6 +25,7 @@ import math
 import os
 from pathlib import Path
 import random
+import re
 import sqlite3
 import tempfile
 import tracemalloc
@@ -247,7 +248,9 @@ def test_the_rows_of_a_damaged_bag_are_rows_of_the_whole_one(
         file.write_bytes(content)
         code = main([str(file), '--params', str(PARAMS), '--output', str(out), '--no-report'])
         table = out / 'bag' / 'legs.csv'
-        rows = table.read_text().splitlines() if table.exists() else []
+        # without the time since the first setpoint that could be read
+        rows = [re.sub(r'^([^,]*),[^,]*', r'\1', row) for row in (
+            table.read_text().splitlines() if table.exists() else [])]
         return code, rows, capsys.readouterr().err
 
     code, whole, err = run(content, tmp_path / 'whole')

@@ -53,7 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (StewartError, OSError) as exc:
         _complain(exc)
         return BAD_INPUT
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as exc:
+        _complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
         return _INTERRUPTED
     finally:
         for each, handler in before.items():
@@ -140,7 +141,7 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     if compiled.HINT:
         print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
     for mistake in likely_mistakes(parameters):
-        print(f'stewart_replay: {mistake}', file=sys.stderr)
+        _complain(f'warning: {mistake}')
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(
