@@ -185,7 +185,7 @@ class Process:
 
     @property
     def memory(self) -> float:
-        """What it has in memory [kB]."""
+        """Return what it has in memory [kB]."""
         lines = Path(f'/proc/{self.process.pid}/status').read_text().splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith('VmRSS'))
 

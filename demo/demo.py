@@ -39,14 +39,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
-from tqdm import tqdm
-
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES, LENGTHS, MOTION, RATES, RESULT
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.step import Batch, Outputs
+from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
 NODE = '/stewart_dynamics'

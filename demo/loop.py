@@ -48,9 +48,6 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
-from tqdm import tqdm
-import yaml
-
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.executables import executable
@@ -59,6 +56,8 @@ from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMoti
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
 from stewart_dynamics.parameters import Parameters
+from tqdm import tqdm
+import yaml
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -159,7 +158,7 @@ class Recorder(Node):
 
     @property
     def time(self) -> int:
-        """Simulated time since its start [ns]."""
+        """Return the simulated time since its start [ns]."""
         last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
         return max(last - BEGIN, 0)
 
@@ -202,7 +201,7 @@ class Program:
 
     @property
     def last_line(self) -> str:
-        """The last line that it has printed."""
+        """Return the last line that it has printed."""
         return (self._output.read_text(errors='replace').splitlines() or ['no output'])[-1]
 
     def check(self) -> None:

@@ -17,6 +17,7 @@
 
 import ast
 from collections.abc import Iterable, Iterator
+import configparser
 import importlib.metadata
 import os
 from pathlib import Path
@@ -238,6 +239,33 @@ def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:
           '--prefix', tmp_path, wheel])
     assert {path.name for path in (tmp_path / 'bin').iterdir()} == set(EXECUTABLES)
     check_share(tmp_path / 'share')
+
+
+def test_flake8_has_the_settings_of_ament_and_no_milder_ones() -> None:
+    settings = configparser.ConfigParser()
+    settings.read(ROOT / 'setup.cfg')
+    # ament_flake8.ini of Jazzy; where docstrings are those of ament_pep257, properties included.
+    assert dict(settings['flake8']) == {
+        'extend-ignore': 'B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202',
+        'import-order-style': 'google', 'max-line-length': '99', 'show-source': 'true',
+        'statistics': 'true', 'docstring-convention': 'all', 'property-decorators': '',
+        'exclude': '.cache,.git,.venv,build,install,log'}
+
+
+def test_no_module_has_the_name_of_one_of_python() -> None:
+    for path in python_files(NAME):  # A005 of flake8-builtins
+        assert path.stem not in sys.stdlib_module_names, path
+
+
+def test_contributing_is_the_text_that_ament_copyright_knows() -> None:
+    text = (ROOT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    begin, section, end = text.split('~~~')
+    assert begin == (
+        'Any contribution that you make to this repository will\nbe under the Apache 2 License, as '
+        'dictated by that\n[license](http://www.apache.org/licenses/LICENSE-2.0.html):\n\n')
+    license_ = (ROOT / 'LICENSE').read_text(encoding='utf-8')
+    assert ' '.join(section.split()) in ' '.join(license_.split())
+    assert end == '\n'
 
 
 @pytest.mark.parametrize('name', EXECUTABLES)
