@@ -261,8 +261,8 @@ def test_contributing_is_the_text_that_ament_copyright_knows() -> None:
     text = (ROOT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
     begin, section, end = text.split('~~~')
     assert begin == (
-        'Any contribution that you make to this repository will\nbe under the Apache 2 License, as '
-        'dictated by that\n[license](http://www.apache.org/licenses/LICENSE-2.0.html):\n\n')
+        'Any contribution that you make to this repository will\nbe under the Apache 2 License, '
+        'as dictated by that\n[license](http://www.apache.org/licenses/LICENSE-2.0.html):\n\n')
     license_ = (ROOT / 'LICENSE').read_text(encoding='utf-8')
     assert ' '.join(section.split()) in ' '.join(license_.split())
     assert end == '\n'
