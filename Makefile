@@ -24,7 +24,7 @@ REQUIREMENTS := requirements.txt
 else
 ROS := pypi
 REQUIREMENTS := requirements.txt requirements-ros.txt
-# What another ROS, or another environment with these wheels, has left in the shell.
+# Variables of another ROS installation, or of another environment with these wheels.
 ifneq ($(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH LD_LIBRARY_PATH RMW_IMPLEMENTATION
 endif
@@ -32,7 +32,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME
 
-# Programs that would keep something in the home folder keep it here.
+# Programs write here instead of into the home folder.
 CACHE := $(CURDIR)/.cache
 export COLCON_HOME := $(CACHE)/colcon
 export HYPOTHESIS_STORAGE_DIRECTORY := $(CACHE)/hypothesis
@@ -48,11 +48,11 @@ export XDG_CACHE_HOME := $(CACHE)
 TESTERS := 3
 
 PIP := .venv/bin/python -m pip --quiet
-# One stamp for each kind of environment: the other kind is no use once ROS is sourced, or not.
+# One stamp for each kind of environment, with and without a sourced ROS.
 DEPENDENCIES := .venv/dependencies-$(ROS)
 INSTALLED := .venv/installed-$(ROS)
 
-# More processes than cores: tests with ROS wait half of their time. A module's tests stay in one.
+# More processes than cores: tests with ROS wait half of the time. One module, one process.
 test: lint
 	.venv/bin/python -m pytest --numprocesses $(TESTERS) --dist loadfile --no-loadscope-reorder
 
@@ -117,8 +117,8 @@ $(DEPENDENCIES): $(REQUIREMENTS)
 	@$(PIP) install --no-build-isolation --requirement .venv/requirements.txt
 	@touch $@
 
-# Not isolated: the build takes the setuptools that is pinned and no other, which warns of every
-# editable package that has a folder of its own name.
+# Not isolated: the build uses the pinned setuptools. It warns of every editable package that has a
+# folder of its own name.
 $(INSTALLED): $(DEPENDENCIES) setup.py setup.cfg pyproject.toml
 	@PYTHONWARNINGS=ignore $(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@

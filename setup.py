@@ -26,8 +26,8 @@ share = f'share/{package_name}'
 version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py').read_text(
     encoding='utf-8'), re.MULTILINE)[0]
 
-# No ROS name stands in install_requires: on a ROS machine they come from package.xml, and pip
-# knows them under other names. Everything else that an executable imports is here.
+# No ROS package is in install_requires: with a ROS installation they come from package.xml, and
+# has them under other names. Everything else that an executable imports is listed here.
 install_requires = [
     'jinja2>=3.1',  # the replay's pages
     'lz4>=4',

@@ -24,8 +24,8 @@ import argparse
 from typing import Any
 
 from inverse_dynamics import (
-    Contestant, example_machine, machine_measured_on, measure, once, random_motions, repeated,
-    ROUNDS, table, Tree, write)
+    Contestant, example_hexapod, measure, measured_on, once, random_motions, repeated, ROUNDS,
+    table, Tree, write)
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import root
@@ -164,14 +164,14 @@ def main() -> None:
     if options.rounds < 1:
         parser.error('--rounds must be at least 1')
 
-    platform = StewartPlatform(example_machine())
+    platform = StewartPlatform(example_hexapod())
     dynamics, kinematics = contestants(platform)
     turns = measure(dynamics + kinematics, options.rounds)
     lines = [
         '', *table('forward dynamics', dynamics, turns),
         '', *table('forward kinematics', kinematics, turns),
         '', *steps_table(platform),
-        '', f'{machine_measured_on()} Medians of {options.rounds} rounds.', '']
+        '', f'{measured_on()} Medians of {options.rounds} rounds.', '']
     print('\n'.join(lines))
     if options.write:
         write(lines, BEGIN, END)

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics import kernel, lagrange
+from stewart_dynamics.mechanics import inverse_dynamics, lagrange
 from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import FORCES, RESULT, WRENCH
@@ -58,7 +58,7 @@ LAGRANGE_SAMPLES = 2_000
 SINGLE_CALLS_SECONDS = 0.005
 AGREEMENT = 1e-9
 
-# Actuators that the example machine does not have, so that their terms count in the checks.
+# Actuators that the example hexapod does not have, so that their terms count in the checks.
 ACTUATORS = {
     'actuator.reflected_mass': (25.0,), 'actuator.viscous_friction': (150.0,),
     'actuator.coulomb_friction': (40.0,)}
@@ -82,14 +82,14 @@ class Turns(NamedTuple):
     """Processor time divided by elapsed time."""
 
 
-def example_machine() -> Parameters:
-    """Return the machine of config/platform.yaml with actuators."""
+def example_hexapod() -> Parameters:
+    """Return the hexapod of config/platform.yaml with actuators."""
     given = Parameters.from_yaml(HERE.parent / 'config' / 'platform.yaml').given
     return Parameters({**given, **ACTUATORS})
 
 
 def random_motions(many: int) -> Motion:
-    """Return motions all over the machine's workspace."""
+    """Return motions all over the hexapod's workspace."""
     rng = np.random.default_rng(20260101)
 
     def within(bound: float) -> Array:
@@ -117,10 +117,10 @@ class PlainC:
         self.function.restype = None
 
     @staticmethod
-    def arguments(machine: Array, motions: Array, wrenches: Array, results: Array) -> list[Any]:
+    def arguments(constants: Array, motions: Array, wrenches: Array, results: Array) -> list[Any]:
         """Return what the function takes for these C-contiguous arrays; it keeps them alive."""
         m, x, w, out = (array.ctypes.data_as(ctypes.c_void_p)
-                        for array in (machine, motions, wrenches, results))
+                        for array in (constants, motions, wrenches, results))
         return [m, x, w, int(len(wrenches) > 1), out, len(motions)]
 
 
@@ -128,7 +128,7 @@ class PlainC:
 
 class Tree:
     """
-    The machine as Pinocchio's rnea takes it: legs and platform side by side, not connected.
+    The hexapod as Pinocchio's rnea takes it: legs and platform side by side, not connected.
 
     Leg: a universal joint that carries the cylinder, a prismatic one that carries the piston.
     Platform: a free flyer. rnea gives joint forces that would move all of them; it knows
@@ -266,9 +266,9 @@ PLAIN_C = 'plain C, one core'
 
 def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     """Return what is measured in single calls and in batches, after checking that all agree."""
-    parameters = example_machine()
-    machine = StewartPlatform(parameters)
-    numbers = machine.constants
+    parameters = example_hexapod()
+    hexapod = StewartPlatform(parameters)
+    numbers = hexapod.constants
     motion = random_motions(samples)
     rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
     results, c_results = (np.empty((samples, RESULT)) for _ in range(2))
@@ -276,7 +276,7 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
 
     wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
     for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
-        kernel.solve(numbers, rows, wrench, results)
+        inverse_dynamics.solve(numbers, rows, wrench, results)
         c.function(*c.arguments(numbers, rows, wrench, c_results))
         check(name, c_results, results)
     forces = results[:, FORCES]
@@ -291,25 +291,25 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     q, v, a, _ = tree.state(one)
     single = [
         Contestant('`inverse_dynamics.solve`, one row: the compiled step', repeated(
-            'solve(machine, rows, wrenches, results)', solve=kernel.solve, machine=numbers,
-            rows=row, wrenches=no_wrench, results=result), RNEA),
+            'solve(constants, rows, wrenches, results)', solve=inverse_dynamics.solve,
+            constants=numbers, rows=row, wrenches=no_wrench, results=result), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),
         Contestant('`StewartPlatform.solve`, one row: what the node calls', repeated(
-            'solve(rows)', solve=machine.solve, rows=row), RNEA),
+            'solve(rows)', solve=hexapod.solve, rows=row), RNEA),
         Contestant('`StewartPlatform.inverse_dynamics`, one `Motion`', repeated(
-            'solve(motion)', solve=machine.inverse_dynamics, motion=one), RNEA),
+            'solve(motion)', solve=hexapod.inverse_dynamics, motion=one), RNEA),
         Contestant('plain C through ctypes', repeated(
             'solve(*arguments)', solve=c.function,
             arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
     batch = [
         Contestant('`inverse_dynamics.solve`, one core', once(
-            samples, kernel.solve, numbers, rows, no_wrench, results), PLAIN_C),
+            samples, inverse_dynamics.solve, numbers, rows, no_wrench, results), PLAIN_C),
         Contestant(PLAIN_C, once(
             samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),
         Contestant('`StewartPlatform.solve`: the default, all cores', once(
-            samples, machine.solve, rows), PLAIN_C),
+            samples, hexapod.solve, rows), PLAIN_C),
         Contestant('`lagrange`, the reference in numpy', once(
             len(part.rows), lagrange_forces, parameters, part), PLAIN_C)]
     return single, batch
@@ -364,7 +364,7 @@ def table(title: str, rows: list[Contestant], turns: dict[str, Turns]) -> list[s
     return lines
 
 
-def machine_measured_on() -> str:
+def measured_on() -> str:
     """Return processor and versions."""
     gcc = subprocess.run([C_COMPILER[0], '-dumpfullversion'], check=True, capture_output=True,
                          text=True).stdout.strip()
@@ -411,7 +411,7 @@ def main() -> None:
     lines = [
         '', *table('one call from Python', single, turns),
         '', *table(f'a sample in a batch of {options.samples:,}', batch, turns),
-        '', f'{machine_measured_on()} Medians of {options.rounds} rounds.', '']
+        '', f'{measured_on()} Medians of {options.rounds} rounds.', '']
     print('\n'.join(lines))
     if options.write:
         write(lines)

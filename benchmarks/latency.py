@@ -16,8 +16,8 @@
 The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
-listener notes when its leg states have come, by the same clock of the machine; a caller asks
-for parameters and states meanwhile, a viewer takes the markers, a machine has its legs measured, a
+listener notes when its leg states have come, by the same clock of the computer; a caller asks
+for parameters and states meanwhile, a viewer takes the markers, a hexapod has its legs measured, a
 planner sends planned trajectories.
 """
 
@@ -287,7 +287,7 @@ def legs(parameters: Parameters, first: int) -> list[bytes]:
 
 def measure(name: str) -> None:
     """Publish measured legs to a node at 1 kHz until a signal, and say how many."""
-    node = rclpy.create_node('machine')
+    node = rclpy.create_node('hexapod')
     publisher = node.create_publisher(JointState, f'/{name}/measured_legs', QOS)
     bodies = legs(Parameters.from_yaml(PARAMETERS), FIRST_STAMP)
     wait_for(publisher.get_subscription_count, 'the node is there')

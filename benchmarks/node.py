@@ -457,11 +457,11 @@ def main() -> None:
             lines[BEGIN_LEGS, END_LEGS] = legs_lines(
                 options.rounds, options.seconds, Path(name))
     versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
-    machine = (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
-               f'{platform.python_version()}, {versions}. {options.rounds} turns of '
-               f'{options.seconds} s each.')
+    computer = (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
+                f'{platform.python_version()}, {versions}. {options.rounds} turns of '
+                f'{options.seconds} s each.')
     for (begin, end), of_part in lines.items():
-        of_part += [machine, '']
+        of_part += [computer, '']
         print('\n'.join(of_part))
         if options.write:
             write(of_part, begin, end)

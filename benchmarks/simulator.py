@@ -72,13 +72,13 @@ SECONDS = 10
 MINUTE = 60
 RATE = 1000.0
 STEPS = (1e-3, 5e-4, 2.5e-4, 1.25e-4)
-# What lets the machine move for good, without loss and without an end stop.
+# What lets the hexapod move for good, without loss and without an end stop.
 IDEAL = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0, **dict.fromkeys(
     ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max'))}
 
 
 def holding(parameters: SimulatorParameters) -> Six:
-    """Return the forces that hold the machine in its initial pose."""
+    """Return the forces that hold the hexapod in its initial pose."""
     pose = parameters['initial_pose']
     motion = Motion.from_euler(pose[:3], pose[3:])
     first, second, third, fourth, fifth, sixth = StewartPlatform(
@@ -232,7 +232,7 @@ def balance_of_a_minute(step: float) -> float:
 
 
 def balance_of_a_tumble(step: float) -> float:
-    """Return the change of energy of a machine that tumbles freely, of all that it has."""
+    """Return the change of energy of a hexapod that tumbles freely, of all that it has."""
     plant = Plant(SimulatorParameters({
         **GIVEN, **IDEAL, 'rate': RATE, 'step': step, 'gravity': [0.0, 0.0, 0.0]}))
     plant._state[STATE_TWIST] = 0.5, -0.3, 1.0, 8.0, -5.0, 12.0

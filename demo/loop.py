@@ -274,7 +274,7 @@ class Loop:
             'leg_controller': {'use_sim_time': True, **self.gains},
             'stewart_trajectory': {'use_sim_time': True, **trajectory}}
 
-    def run(self, feed_forward: bool, payload: float, tell: Callable[[int], object]) -> Run:
+    def run(self, feed_forward: bool, payload: float, progress: Callable[[int], object]) -> Run:
         """Run the four programs, report the simulated time [ns], and return the errors."""
         mass, inertia = self._payload
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
@@ -298,7 +298,7 @@ class Loop:
                     program.check()
                 if reached != (reached := recorder.time):
                     since = now
-                    tell(reached)
+                    progress(reached)
                 if now - since > PATIENCE:
                     raise Failure(f'no progress at {reached * 1e-9:.3f} s; ' + '; '.join(
                         f'{each.name}: {each.last_line}' for each in programs))
@@ -321,7 +321,7 @@ class Loop:
                     program.wait()
                 executor.shutdown()
                 recorder.destroy_node()
-        tell(int(self.times[-1]))
+        progress(int(self.times[-1]))
         return Run(feed_forward, payload, recorder.errors(
             self.times, self._lengths, self._motion))
 

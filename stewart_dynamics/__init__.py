@@ -15,7 +15,7 @@
 """
 Leg forces of Gough-Stewart platforms: inverse dynamics with massive legs, for ROS 2.
 
-Names are imported when they are first used: checking a parameter file needs no compiler.
+Names are imported on first use, so that checking a parameter file needs no compiler.
 """
 
 from importlib import import_module
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
     from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown
-    from stewart_dynamics.mechanics.inverse_dynamics import InverseDynamics
+    from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
     from stewart_dynamics.mechanics.motion import Motion
     from stewart_dynamics.mechanics.pose import Pose
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -45,7 +45,7 @@ _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
     'mechanics.force_breakdown': ('ForceBreakdown',),
-    'mechanics.inverse_dynamics': ('InverseDynamics',),
+    'mechanics.inverse_dynamics_result': ('InverseDynamics',),
     'mechanics.motion': ('Motion',),
     'mechanics.pose': ('Pose',),
     'mechanics.stewart_platform': ('StewartPlatform',),

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The types of arrays that all layers speak of."""
+"""Types of arrays, for all layers."""
 
 from __future__ import annotations
 

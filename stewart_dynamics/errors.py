@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The errors that a user meets; their texts say what, where, which value and which rule."""
+"""The errors of the package; their texts name the parameter or argument, value and rule."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONGEST = 80
 
 
 def one_line(exc: object) -> str:
-    """Return what an error says in one line, or its type where it says nothing."""
+    """Return the text of an error in one line, or its type if it has no text."""
     return ' '.join(f'{exc}'.split()) or type(exc).__name__
 
 
@@ -30,7 +30,7 @@ def shown(value: Any) -> str:
     """Return a value as an error shows it: in one short line."""
     value = list(value) if isinstance(value, tuple) else value
     try:
-        # No more of a long list than is shown.
+        # Only as much of a long list as is shown.
         text = repr(value[:40] if isinstance(value, list | str | bytes) else value)
     except ValueError:  # an integer of more digits than Python writes
         text = f'an integer of {value.bit_length()} bits'
@@ -38,7 +38,7 @@ def shown(value: Any) -> str:
 
 
 def shown_name(name: Any) -> str:
-    """Return a name as an error shows it, whatever was given as one."""
+    """Return a name, of whatever type, as an error shows it."""
     text = str(name)
     return _cut(text if text.isprintable() else repr(text))
 
@@ -48,7 +48,7 @@ def _cut(text: str) -> str:
 
 
 class StewartError(Exception):
-    """The root of all errors that this package raises for its user to read."""
+    """The base class of all errors of this package."""
 
 
 class ParameterError(StewartError, ValueError):
@@ -60,11 +60,11 @@ class MotionError(StewartError, ValueError):
 
 
 class PoseError(StewartError, ValueError):
-    """Leg lengths of which no pose near the guess was found."""
+    """Leg lengths for which no pose near the guess was found."""
 
 
 class SingularityError(StewartError):
-    """A pose in which no leg forces balance the load."""
+    """A pose in which leg forces cannot balance the load."""
 
 
 class BagError(StewartError):

@@ -29,7 +29,7 @@ from typing import Any
 from stewart_dynamics.errors import ParameterError, shown, shown_name
 from stewart_dynamics.parameters_yaml import BLANK, no_space, read_document, scalar
 
-# What ROS itself declares in every node.
+# Parameters that ROS declares in every node.
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 _OF_ROS_PREFIX = 'qos_overrides.'
 
@@ -45,10 +45,15 @@ def is_of_ros(name: str) -> bool:
 
 def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
     """
-    Return the values that a ROS parameter file holds for a node, under dotted names.
+    Return the values of a ROS parameter file for a node, under dotted names.
 
-    Sections apply in the file's order, a later one over an earlier one, as in ROS. Raises
-    ParameterError.
+    Sections apply in the order of the file; a later one overrides an earlier one, as in ROS.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, breaks a rule, or holds no parameters for the node.
+
     """
     document = read_document(path)
     values = dict(parameters_of(document, node, str(path)))
@@ -59,7 +64,7 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
 
 
 def other_nodes(path: str | Path, node: str) -> str:
-    """Return the sections of a file where none is for a node, in words; else nothing."""
+    """Return the sections of a file as text if none is for the node; else an empty text."""
     document = read_document(path)
     names = [section for name, content in document.items()
              for section, _ in _sections(name, content)]
@@ -74,10 +79,10 @@ def _listed(names: Sequence[Any] | Mapping[str, Any]) -> str:
 def parameters_of(document: Mapping[str, Any], node: str, source: str,
                   ) -> Iterator[tuple[str, Any]]:
     """
-    Yield the names and values that a document holds for a node, in their order.
+    Yield the names and values of a document for a node, in their order.
 
-    The sections of other nodes are checked as well for what rcl reads otherwise than it is
-    meant: it reads all of them.
+    Sections of other nodes are checked as well: rcl reads all of them, and may read them otherwise
+    than intended.
     """
     for name, content in document.items():
         sections = list(_sections(name, content))
@@ -100,7 +105,7 @@ def parameters_of(document: Mapping[str, Any], node: str, source: str,
 
 
 def _sections(name: str, content: Any) -> Iterator[tuple[str, Any]]:
-    """Yield nodes' names, their namespaces before them, and what ros__parameters holds."""
+    """Yield names of nodes with their namespaces, and the content of ros__parameters."""
     if not isinstance(content, dict):
         return
     for key, value in content.items():
@@ -111,7 +116,7 @@ def _sections(name: str, content: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _is_meant(section: str, node: str) -> bool:
-    """Return whether a section is for a node: /* is one part of its name, /** are any."""
+    """Return whether a section is for a node; in it /* matches one part of a name, /** any."""
     pattern = re.escape(f'/{section.removeprefix("/")}')
     pattern = re.sub(r'(/\\\*\\\*)+', r'(/\\w+)*', pattern).replace(r'/\*', r'/\w+')
     return re.fullmatch(pattern, f'/{node.strip("/")}') is not None
@@ -136,7 +141,7 @@ def flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
 
 
 def check_given(name: str, value: Any, source: str) -> None:
-    """Raise ParameterError for a value that rcl does not accept, and say what may be meant."""
+    """Raise ParameterError for a value that rcl does not accept, with a likely correction."""
     shown_as = shown_name(name)
     if value == []:
         raise ParameterError(
@@ -148,7 +153,7 @@ def check_given(name: str, value: Any, source: str) -> None:
         elif name.rpartition('.')[2].isdecimal():  # {mass: 0,5}
             hint = '; a decimal comma? write 0.5, not 0,5'
         raise ParameterError(f'{source}: {shown_as}: has no value{hint}')
-    # ROS goes on without it: a node that is to use simulated time does not.
+    # ROS ignores a value of another type: the node would not use simulated time.
     if name in _OF_ROS and not isinstance(value, bool):
         raise ParameterError(f'{source}: {name}: {shown(value)}: must be a bool')
 
@@ -160,13 +165,16 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], units: Mapping[str, 
     Parameters
     ----------
     path : str or Path
-        The file; one that is there is replaced.
+        The file; an existing one is replaced.
     values : mapping of dotted name to value
-        Texts, doubles, bools, or tuples of them; a tuple of one is written as a single value.
+        Texts, doubles, bools, or tuples of them; a tuple of length 1 is written as a single value.
     units : mapping of dotted name to str
-        Empty for none.
+        Empty where there is no unit.
 
-    Raises ParameterError where it cannot be written.
+    Raises
+    ------
+    ParameterError
+        The file cannot be written.
 
     """
     tree: dict[str, Any] = {}
@@ -206,7 +214,7 @@ def _lines(tree: Mapping[str, Any], indent: str) -> Iterator[str]:
 
 
 def _written(value: Any) -> str:
-    """Return a value as YAML that rcl and YAML 1.1 read alike."""
+    """Return a value as YAML with the same meaning to rcl and to YAML 1.1."""
     if isinstance(value, bool):
         return 'true' if value else 'false'
     if isinstance(value, float):

@@ -39,31 +39,31 @@ _PYTHON_TYPES: Mapping[str, Any] = {'string': str, 'double': float, 'bool': bool
 
 class Parameter(NamedTuple):
     """
-    What is known of one parameter.
+    The declaration of one parameter.
 
     Attributes
     ----------
     name : str
         Dotted, as in a file.
     kind : str
-        Its type in ROS, that of an entry for an array: string, double or bool.
+        Its type in ROS, for an array that of an entry: string, double or bool.
     text : str
-        What it means, for the documents, ``--help`` and ROS's description.
+        Its meaning, for the documents, ``--help`` and ROS's description.
     unit : str
-        SI; empty for none.
+        SI; empty if it has none.
     default : object
-        The value where none is given; an empty tuple: none, not checked.
+        The value if it is not given; an empty tuple: no value, not checked.
     required : bool
         Whether it must be given.
     sizes : tuple of int
-        The lengths that an array may have, none for a single value; one of length 1 or 6 may
-        also be given as a single value, for all legs.
+        The lengths that an array may have, empty for a single value; an array of length 1 or 6
+        may also be given as a single value, for all legs.
     minimum, maximum : float
         Bounds of every entry.
     above : bool
         Whether ``minimum`` itself is out of range.
     choices : tuple of str
-        The only texts that are accepted.
+        The accepted texts.
     while_active : bool
         Whether it may be changed while the node is active.
 
@@ -84,14 +84,14 @@ class Parameter(NamedTuple):
 
     @property
     def ros_type(self) -> str:
-        """The type's name in ROS, as in the documents."""
+        """The name of the type in ROS, as in the documents."""
         if not self.sizes:
             return self.kind
         return f'{self.kind}[{" or ".join(map(str, self.sizes))}]'
 
     @property
     def rule(self) -> str:
-        """The values that it may have, in words."""
+        """The accepted values, as text."""
         if self.choices:
             return 'one of ' + ', '.join(self.choices)
         rules = []
@@ -104,19 +104,24 @@ class Parameter(NamedTuple):
 
 class ParameterSet(Mapping[str, Any]):
     """
-    A whole, checked set of parameters under their dotted names; it never changes.
+    A complete, checked set of parameters under their dotted names; immutable.
 
-    Arrays are read-only numpy arrays: joints (6, 3), whatever is given for each leg (6,),
-    limits that are not checked None. Raises ParameterError at the first rule broken.
+    Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
+    checked are None.
 
     Parameters
     ----------
     values : mapping of dotted name to value
-        As YAML, ROS or Python give them; None is not given, and takes its default.
+        As YAML, ROS or Python give them; None stands for the default.
     source : str
         Where they come from, for the text of an error.
     exact_types : bool
-        Reject an integer where a double is due, as ROS does.
+        Reject an integer in place of a double, as ROS does.
+
+    Raises
+    ------
+    ParameterError
+        At the first rule that is broken.
 
     """
 
@@ -147,7 +152,7 @@ class ParameterSet(Mapping[str, Any]):
         return iter(self._values)
 
     def __len__(self) -> int:
-        """Return how many parameters there are."""
+        """Return the number of parameters."""
         return len(self._values)
 
     def __eq__(self, other: object) -> bool:
@@ -159,11 +164,11 @@ class ParameterSet(Mapping[str, Any]):
         return hash(self._key())
 
     def __repr__(self) -> str:
-        """Return how many of the values were given."""
+        """Return the number of values that were given."""
         return f'<{type(self).__name__}: {len(self._given)} of {len(self)} given>'
 
     def __reduce__(self) -> tuple[type[Self], tuple[dict[str, Any]]]:
-        """Return how to make a copy: checked and read-only again."""
+        """Return how to make a copy, which is checked and read-only as well."""
         return type(self), (self._given,)
 
     @property
@@ -177,7 +182,7 @@ class ParameterSet(Mapping[str, Any]):
 
     def replaced(self, changes: Mapping[str, Any], source: str = 'parameters', *,
                  exact_types: bool = False) -> Self:
-        """Return the parameters with these changed, checked as a whole again."""
+        """Return a copy with these values changed, checked as a whole."""
         if not isinstance(changes, Mapping):
             raise ParameterError(
                 f'{source}: {shown(changes)}: must be a mapping of names to values')
@@ -193,18 +198,27 @@ class ParameterSet(Mapping[str, Any]):
         path : str or Path
             The file.
         node : str
-            The node's name, with its namespace if it has one, where it is not the usual one.
+            The name of the node with its namespace, if it is not the default one.
 
-        Raises ParameterError, naming file, parameter, value and rule.
+        Raises
+        ------
+        ParameterError
+            Names file, parameter, value and rule.
 
         """
         return cls(read_yaml(path, node or cls.node), str(path), exact_types=True)
 
     def to_yaml(self, path: str | Path) -> None:
         """
-        Write a whole ROS parameter file, for any node (``/**:``), that reads back equal.
+        Write a complete ROS parameter file, for any node (``/**:``), that reads back equal.
 
-        A file that is there is replaced. Raises ParameterError where it cannot be written.
+        An existing file is replaced.
+
+        Raises
+        ------
+        ParameterError
+            The file cannot be written.
+
         """
         values = {name: self._given.get(name, parameter.default)
                   for name, parameter in self.table.items()}
@@ -214,7 +228,7 @@ class ParameterSet(Mapping[str, Any]):
 
     @classmethod
     def check_file(cls, path: str | Path) -> None:
-        """Raise ParameterError if what a file gives a node breaks a rule; it need not be all."""
+        """Raise ParameterError if a value of a file breaks a rule; the file may be incomplete."""
         source = str(path)
         for name, value in list(parameters_of(read_document(path), cls.node, source)):
             parameter = cls.declared(name, value, source)
@@ -223,7 +237,7 @@ class ParameterSet(Mapping[str, Any]):
 
     @classmethod
     def check_value(cls, name: str, text: str, source: str) -> None:
-        """Raise ParameterError if the text of a value, as a command line has it, breaks a rule."""
+        """Raise ParameterError if a value, as text on a command line, breaks a rule."""
         given = {name: read_value(text, f'{source}: {shown_name(name)}')}
         for _, value in flat(given, '', source):
             check_given(name, value, source)
@@ -234,7 +248,7 @@ class ParameterSet(Mapping[str, Any]):
 
     @classmethod
     def declared(cls, name: str, value: Any = None, source: str = 'parameters') -> Parameter:
-        """Return what is known of a parameter; else ParameterError names the nearest one."""
+        """Return the declaration of a parameter; ParameterError suggests the most similar name."""
         if isinstance(name, str) and name in cls.table:
             return cls.table[name]
         text = shown_name(name)
@@ -245,11 +259,11 @@ class ParameterSet(Mapping[str, Any]):
         raise ParameterError(f'{source}: {text}: unknown parameter{hint}')
 
     def _check_together(self, source: str) -> None:
-        """Check what one parameter demands of another."""
+        """Check the rules between parameters."""
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that nobody else can change; arrays as tuples, of one axis."""
+    """Return an immutable copy of a value; arrays as flat tuples."""
     if isinstance(value, np.ndarray):
         value = value.ravel() if value.ndim else value[()]
     if hasattr(value, 'tolist'):
@@ -258,7 +272,7 @@ def _plain(value: Any) -> Any:
 
 
 def _as_double(parameter: Parameter, value: Any) -> Any:
-    """Return a value with doubles for integers, where doubles are due."""
+    """Return a value with integers converted to double where the parameter is a double."""
     if parameter.kind != 'double':
         return value
     if isinstance(value, tuple):
@@ -269,7 +283,7 @@ def _as_double(parameter: Parameter, value: Any) -> Any:
 
 
 def _checked(parameter: Parameter, value: Any, source: str) -> Any:
-    """Return the value as the package uses it, or raise ParameterError."""
+    """Return the value as the package uses it; ParameterError if it breaks a rule."""
     if value is None:
         if parameter.required:
             raise ParameterError(f'{source}: {parameter.name}: missing, it has no default')
@@ -316,7 +330,7 @@ def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
 
 
 def _wrong_type(kind: str, entry: Any) -> str:
-    """Return in words that a value is of another type, and what is probably meant."""
+    """Return the rule that a value of another type breaks, with a likely correction."""
     if kind == 'double' and type(entry) is int:
         written = f': write {entry}.0' if abs(entry) < 1e15 else ''
         return f'is an integer, must be a double{written}'

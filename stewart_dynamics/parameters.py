@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The parameters of a hexapod: the one table of them, and the rules between them.
+The table of the parameters of a hexapod, and the rules between them.
 
-The check, the node's declaration, ``--help`` and the documents all come from PARAMETERS.
+The check, the node's declaration, ``--help`` and the documents are all made from PARAMETERS.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('external_wrench.moment_max', 'double', "external moment at the platform's origin "
               'above which diagnostics report an ERROR; none: not checked', 'N m', minimum=0.0,
               above=True, while_active=True),
-    Parameter('visualization_rate', 'double', 'maximum rate of ~/markers; 0: none', 'Hz', 30.0,
+    Parameter('visualization_rate', 'double', 'maximum rate of ~/markers; 0: off', 'Hz', 30.0,
               minimum=0.0),
     Parameter('autostart', 'bool', 'configure and activate the node when it starts', default=True),
 )})
@@ -133,7 +133,7 @@ class Parameters(ParameterSet):
     node = 'stewart_dynamics'
 
     def _check_together(self, source: str) -> None:
-        """Check what one parameter demands of another."""
+        """Check the rules between parameters."""
         joints = self['joints']
         if len(set(joints)) < 6 or '' in joints:
             raise ParameterError(f'{source}: joints: {list(joints)}: six different names needed')
@@ -158,7 +158,7 @@ class Parameters(ParameterSet):
             platform_joints - platform_joints.mean(axis=0), axis=1)))
         if size == 0.0:
             raise ParameterError(
-                f'{source}: geometry.platform_joints: all six are one point')
+                f'{source}: geometry.platform_joints: all six are at one point')
         if self['singularity.characteristic_length'] is None:
             self._values['singularity.characteristic_length'] = size
 

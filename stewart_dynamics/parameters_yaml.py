@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-YAML files as ROS reads them: a plain scalar is what it is for rcl, ROS's own reader.
+YAML files as ROS reads them: plain scalars have the type that rcl, ROS's own reader, gives them.
 
 PyYAML's safe loader follows YAML 1.1, rcl does not: for rcl ``1e3`` is a double, ``y`` a bool,
 ``1_000``, ``1:30`` and ``2020-01-01`` are texts.
@@ -31,8 +31,8 @@ import yaml  # type: ignore[import-untyped]
 
 from stewart_dynamics.errors import one_line, ParameterError, shown, shown_name
 
-# A hexapod's file has 4 kB, that of a whole robot seldom more than 50. rcl takes 2 s at worst for
-# a file of this size, but a minute for a list of 500 kB, of any node.
+# The file of a hexapod has 4 kB, that of a whole robot rarely more than 50. rcl needs at most 2 s
+# for a file of this size, but a minute for one list of 500 kB, whichever node it is for.
 LARGEST = 100_000  # [bytes]
 _DEEPEST = 20
 
@@ -42,14 +42,14 @@ class _Blank(str):
 
 
 BLANK = _Blank()
-"""What stands behind a name with nothing behind it; rcl rejects it."""
+"""The value of a name without a value, which rcl rejects."""
 
 _SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 _TRUE = frozenset('Y y yes Yes YES true True TRUE on On ON'.split())
 _FALSE = frozenset('N n no No NO false False FALSE off Off OFF'.split())
 NULL = ('~', 'null', 'Null', 'NULL')
-"""Texts for rcl, no value for us."""
+"""For rcl these are texts; here they stand for no value."""
 _NUMBER = re.compile(
     r'[+-]?((?P<octal>0[0-7]{1,20})|(?P<decimal>0|[1-9][0-9]{0,18})'
     r'|(?P<hexadecimal>0x[0-9a-f]{1,15})|(?P<special>\.?inf|infinity|\.?nan)'
@@ -68,9 +68,9 @@ _NO_SPACE = re.compile(r'\s*(- )?(?P<name>[A-Za-z_/*][\w./*]*):[^\s:][^:]*')
 
 def scalar(text: str) -> Any:
     """
-    Return what ROS reads a text without quotes as: bool, int, float or str.
+    Return the value that ROS reads from a text without quotes: bool, int, float or str.
 
-    None for ``null`` and ``~``, which are texts for rcl: no value is given.
+    None for ``null`` and ``~``, which are texts for rcl: the value is not given.
     """
     if text in NULL:
         return None
@@ -83,18 +83,22 @@ def scalar(text: str) -> Any:
         if found[kind]:
             return int(text, base)
     number = float(text.replace('.', '') if found['special'] else text)
-    # rcl takes what is out of range for a text.
+    # For rcl a number out of range is a text.
     in_range = found['special'] or number == 0.0 or _SMALLEST <= abs(number) < math.inf
     return number if in_range else text
 
 
 def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
     """
-    Return what a YAML file of at most ``largest`` bytes holds, a mapping by names.
+    Return the content of a YAML file of at most ``largest`` bytes, a mapping by names.
 
-    Raises ParameterError, in one line, for what is not such a file, for what rcl does not accept
-    or reads otherwise than YAML has it (aliases, tags, a second document), for a name given
-    twice, and for nesting deeper than 20.
+    Raises
+    ------
+    ParameterError
+        In one line: the file cannot be read, is not YAML, or has what rcl rejects or reads
+        differently from YAML (aliases, tags, a second document), a name given twice, or nesting
+        deeper than 20.
+
     """
     document = _read(_bytes_of(path, largest), str(path))
     if not isinstance(document, dict):
@@ -103,12 +107,12 @@ def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
 
 
 def read_value(text: str, source: str) -> Any:
-    """Return what ROS reads the text of one value as, as on a command line."""
+    """Return the value that ROS reads from a text, as on a command line."""
     return _read(text.encode('utf-8', 'surrogateescape'), source)
 
 
 class _Loader(_SafeLoader):  # type: ignore[misc]
-    """The safe loader, which leaves it to us what a scalar without quotes is."""
+    """The safe loader, without the types that YAML 1.1 gives plain scalars."""
 
     yaml_implicit_resolvers = {None: [(_PLAIN, re.compile('(?!$)', re.DOTALL))]}
 
@@ -116,7 +120,7 @@ class _Loader(_SafeLoader):  # type: ignore[misc]
 def _read(data: bytes, source: str) -> Any:
     try:
         depth = 0
-        for event in yaml.parse(data, Loader=_SafeLoader):  # libyaml's loader recurses unbounded
+        for event in yaml.parse(data, Loader=_SafeLoader):  # its recursion is unbounded
             if isinstance(event, yaml.AliasEvent):
                 raise _wrong(event, 'has a YAML alias (*): write the value out')
             depth += isinstance(event, yaml.CollectionStartEvent)
@@ -155,7 +159,7 @@ def _wrong(where: Any, what: str) -> Exception:
 
 
 def _bytes_of(path: str | Path, largest: int) -> bytes:
-    """Return the bytes of a file of UTF-8 text, and never wait for a pipe."""
+    """Return the bytes of a regular file of UTF-8 text; a pipe is rejected without waiting."""
     try:
         mode = Path(path).stat().st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
@@ -176,9 +180,9 @@ def _bytes_of(path: str | Path, largest: int) -> bytes:
 
 
 def _in_words(exc: Any, data: bytes) -> str:
-    """Return where a text is not YAML, why, and what is probably meant."""
+    """Return where and why a text is not YAML, with a likely correction."""
     mark = getattr(exc, 'problem_mark', None)
-    if mark is None:  # a character that no text may have, and its place in bytes
+    if mark is None:  # an invalid character, with its position in bytes
         line = data.count(b'\n', 0, getattr(exc, 'position', 0)) + 1
         return f'line {line}: {one_line(getattr(exc, "reason", exc))}'
     lines = data.decode('utf-8', 'replace').splitlines()
@@ -199,7 +203,7 @@ def _in_words(exc: Any, data: bytes) -> str:
 
 
 def no_space(text: str) -> str:
-    """Return in words that a space is missing after a text's colon, nothing where none is."""
+    """Return the text that a space is missing after a colon; empty if it is not."""
     found = _NO_SPACE.match(text)
     if not found:
         return ''

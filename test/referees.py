@@ -14,7 +14,7 @@
 
 
 """
-What the tests hold the package against: random machines and motions, and independent physics.
+References for the tests: random hexapods and motions, and independent physics.
 
 Nothing here uses the package's equations; only Parameters and Motion, which carry the numbers.
 """
@@ -66,7 +66,7 @@ def random_direction(random: np.random.Generator) -> Array:
 
 def random_parameters(random: np.random.Generator, actuators: bool = True) -> Parameters:
     """
-    Return a machine with nothing special about it.
+    Return a random hexapod.
 
     Six different legs, base joints off any plane, gravity tilted against the base, a center of
     mass off the platform's origin, a full inertia tensor, pistons balanced anywhere along them.
@@ -112,7 +112,7 @@ def size_of(parameters: Parameters) -> float:
 
 
 def random_motion(parameters: Parameters, random: np.random.Generator, many: int) -> Motion:
-    """Return poses around the machine's middle, with velocities and accelerations, a batch."""
+    """Return poses around the hexapod's middle, with velocities and accelerations, a batch."""
     size = size_of(parameters)
     return Motion(
         size * (np.array([0.0, 0.0, 1.0]) + random.uniform(-0.2, 0.2, (many, 3))),
@@ -129,7 +129,7 @@ def random_wrench(parameters: Parameters, random: np.random.Generator, many: int
 
 
 def symmetric_parameters() -> Parameters:
-    """Return a machine of threefold symmetry: singular where turned by 90 degrees about z."""
+    """Return a hexapod of threefold symmetry: singular where turned by 90 degrees about z."""
     thirds = np.repeat([0.0, 2.0, 4.0], 2) * np.pi / 3
 
     def ring(radius: float, spread: float) -> Array:
@@ -302,11 +302,11 @@ class PinocchioReferee:
     """
     Leg forces by the recursive Newton-Euler algorithm of Pinocchio.
 
-    The machine as an open tree: from the base a universal joint (two revolute ones) and a
+    The hexapod as an open tree: from the base a universal joint (two revolute ones) and a
     prismatic joint for each leg, and the platform on a joint of its own with six freedoms. The
     platform's motion gives all joints' positions, velocities and accelerations, by closed form
     and by Pinocchio's frame Jacobians; its algorithm gives the generalized forces of the tree,
-    and virtual work those of the six prismatic joints that do the same on the closed machine.
+    and virtual work those of the six prismatic joints that do the same on the closed hexapod.
     The parts of a leg have no inertia about its axis, so its spin does nothing.
     """
 

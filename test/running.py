@@ -16,7 +16,7 @@
 What the tests of the executables stand on: the real programs, in processes of their own.
 
 Nothing is mocked: setpoints go in and answers come out over ROS 2 topics, each test in a domain
-that no other has. What is awaited is waited for with a deadline that a loaded machine keeps,
+that no other has. What is awaited is waited for with a deadline that a loaded computer keeps,
 and nothing else depends on time.
 """
 
@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, ExitStack, suppress
+from contextlib import contextmanager, ExitStack, redirect_stderr, suppress
 import fcntl
 from functools import partial
 import gc
@@ -79,7 +79,7 @@ PLATFORM = ROOT / 'config' / 'platform.yaml'
 NODE = '/stewart_dynamics'
 FEEDER = Path(__file__).with_name('feeder.py')
 
-# Nothing here takes seconds on a machine at rest: this is for one that is not.
+# Nothing here takes seconds on a computer at rest: this is for one that is not.
 DEADLINE = 60.0
 
 STEP = 10_000_000  # between two setpoints' stamps [ns]
@@ -101,7 +101,7 @@ SERVICES: dict[str, Any] = {
     'set_parameters_atomically': SetParametersAtomically}
 SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
-# What a program may say on stderr: lines of ROS's log. Fast DDS complains there of what other
+# What a program may print on stderr: lines of ROS's log. Fast DDS reports there what other
 # programs, killed ones, have left in shared memory; and rcl where a signal, which ends ROS from a
 # thread of its own, falls between a line on stderr and the same line on /rosout.
 LOG_LINE = re.compile(
@@ -121,7 +121,7 @@ def executable(name: str) -> str:
 @contextmanager
 def own_domain() -> Iterator[int]:
     """
-    Give a ROS domain that no other test on this machine has, in whatever process.
+    Give a ROS domain that no other test on this computer has, in whatever process.
 
     The programs in it inherit the lock: while one runs on, after its test was killed, no other
     test gets the domain.
@@ -144,13 +144,13 @@ def own_domain() -> Iterator[int]:
 
 
 def log_lines(text: str, level: str = '') -> list[str]:
-    """Return the lines of ROS's log in what a program said, those of a level or all."""
+    """Return the lines of ROS's log in a program's output, those of a level or all."""
     return [line for line in text.splitlines() if line.startswith(f'[{level}')
             and '[RTPS_' not in line]
 
 
 def assert_only_log_lines(text: str) -> None:
-    """Check that a program said nothing on stderr but lines of ROS's log."""
+    """Check that a program printed nothing on stderr but lines of ROS's log."""
     strange = [line for line in text.splitlines() if not LOG_LINE.match(line)]
     assert not strange, text
 
@@ -186,17 +186,17 @@ class Program:
 
     @property
     def stderr(self) -> str:
-        """What it has said on stderr so far, or since it was last forgotten."""
+        """Its output on stderr so far, or since it was last forgotten."""
         return self._err.read_bytes()[self._forgotten:].decode(errors='replace')
 
     def forget(self) -> None:
-        """Forget what it has said on stderr so far, once it is checked."""
+        """Forget its output on stderr so far, once it is checked."""
         assert_only_log_lines(self.stderr)
         self._forgotten = self._err.stat().st_size
 
     @property
     def stdout(self) -> str:
-        """What it has said on stdout so far."""
+        """Its output on stdout so far."""
         return self._out.read_text(errors='replace')
 
     @property
@@ -231,6 +231,38 @@ class Program:
                 'threads': int(status['Threads']), 'memory': int(status['VmRSS'].split()[0])}
 
 
+class _Stderr:
+    """
+    What this process says on stderr while this is entered.
+
+    Nothing is lost of what threads write at any time, as it is with pytest's ``capfd`` between
+    reading and emptying its file.
+    """
+
+    def __enter__(self) -> _Stderr:
+        self._file = tempfile.TemporaryFile('a+', buffering=1)
+        self._python = redirect_stderr(self._file)
+        self._python.__enter__()
+        self._original = os.dup(2)
+        os.dup2(self._file.fileno(), 2)
+        self._whole = ''
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.dup2(self._original, 2)
+        os.close(self._original)
+        self._python.__exit__(None, None, None)
+        self._whole = self.text()
+        self._file.close()
+
+    def text(self) -> str:
+        """Return all that it has said so far."""
+        if self._file.closed:
+            return self._whole
+        file = self._file.fileno()
+        return os.pread(file, os.fstat(file).st_size, 0).decode()
+
+
 class Inside:
     """
     A node of the package in this process, spun by a thread, where a test asks for no process.
@@ -243,31 +275,31 @@ class Inside:
         The command line, without the executable.
     domain : int
         Its ROS domain.
-    said : callable
-        Returns what this process has said on stderr since it was last asked.
     done : Future, optional
         When it is done, its result is the exit code.
 
     """
 
     def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
-                 said: Callable[[], str], done: Future | None = None) -> None:
-        self._said, self._stderr, self._done = said, '', done
-        self._stack = ExitStack()
-        with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
-            rclpy.init(args=sys.argv, domain_id=domain)
-            try:
-                node = kind()
-            except BaseException:
-                rclpy.shutdown()
-                raise
-        self._executor = EventsExecutor()
-        self._executor.add_node(node)
-        self._thread = Thread(target=self._spin)
-        for end in (gc.unfreeze, node.destroy_node, self._executor.shutdown, self._thread.join,
-                    rclpy.try_shutdown):
-            self._stack.callback(end)
-        self._thread.start()
+                 done: Future | None = None) -> None:
+        self._done = done
+        with ExitStack() as stack:
+            self._said = stack.enter_context(_Stderr())
+            with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
+                rclpy.init(args=sys.argv, domain_id=domain)
+                try:
+                    node = kind()
+                except BaseException:
+                    rclpy.shutdown()
+                    raise
+            self._executor = EventsExecutor()
+            self._executor.add_node(node)
+            self._thread = Thread(target=self._spin)
+            for end in (gc.unfreeze, node.destroy_node, self._executor.shutdown,
+                        self._thread.join, rclpy.try_shutdown):  # the last one first
+                stack.callback(end)
+            self._thread.start()
+            self._stack = stack.pop_all()
 
     def _spin(self) -> None:
         # Bounded waits, and an end by ROS's own: as the executables have it.
@@ -277,9 +309,8 @@ class Inside:
 
     @property
     def stderr(self) -> str:
-        """What it has said so far, and this process beside it."""
-        self._stderr += self._said()
-        return self._stderr
+        """Its output so far, and that of this process."""
+        return self._said.text()
 
     @property
     def ended(self) -> bool:
@@ -296,7 +327,7 @@ class Inside:
         return int(self._done.result())
 
     def kill(self) -> None:
-        """End it, and check what it has said."""
+        """End it, and check its output."""
         self._stack.close()
         assert_only_log_lines(self.stderr)
 
@@ -358,7 +389,7 @@ class Peer:
 
 
 class Sample(NamedTuple):
-    """A setpoint's numbers; by default the machine rests at home."""
+    """A setpoint's numbers; by default the hexapod rests at home."""
 
     position: tuple[float, ...] = (0.0, 0.0, 1.1)
     quaternion: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
@@ -456,7 +487,7 @@ class NodeProcess:
         self._begin = partial(
             Program, [*(command or [executable('stewart_dynamics')]), '--ros-args',
                       '--params-file', file, *arguments], self.domain,
-            # Said of who asks before the node knows him: see DynamicsNode.until_known.
+            # A warning for a client that the node has not matched yet: see until_known.
             **{'PYTHONWARNINGS': 'ignore:failed to send response:RuntimeWarning', **environment})
         self._folders = (folder / str(n) for n in count(1))
         self._program: Program | None = None
@@ -473,7 +504,7 @@ class NodeProcess:
         return self._program is not None and not self.program.ended
 
     def start(self) -> Program:
-        """Start it, for the first time or anew."""
+        """Start it, for the first time or again."""
         self._program = self._begin(folder=next(self._folders))
         self._stack.callback(self._program.kill)
         return self._program
@@ -625,7 +656,7 @@ class DynamicsNode:
 
     @property
     def topics(self) -> list[str]:
-        """The topics that the node listens to, as it says."""
+        """The topics that the node subscribes to, by its parameters."""
         return [topic for topic in INPUTS if f'{topic}: writers' in self.values('setpoints')]
 
     def received(self, topic: str) -> list[Any]:
@@ -681,7 +712,7 @@ class DynamicsNode:
 
     def send(self, sample: Sample = HOME, stamp: int | None = None,
              frame: str = 'base') -> int:
-        """Publish a setpoint on all topics that the node listens to, and return its stamp."""
+        """Publish a setpoint on all topics that the node subscribes to, and return its stamp."""
         stamp = self.stamp() if stamp is None else stamp
         messages = {**sample.messages(stamp, frame),
                     'setpoint/combined': sample.combined(stamp, frame)}
@@ -833,7 +864,7 @@ class DynamicsNode:
     # -- the end ---------------------------------------------------------------------------
 
     def stop(self, number: int = signal.SIGINT) -> None:
-        """Stop the node with a signal and check how it ends, and all that it has said."""
+        """Stop the node with a signal and check how it ends, and all of its output."""
         self._process.stop(number)
         self.check_answers()
 
@@ -874,7 +905,7 @@ class DynamicsNode:
                 assert np.all(np.isfinite(numbers)), (topic, message)
 
     def close(self) -> None:
-        """Check what the node has said and answered, and leave ROS; the process may run on."""
+        """Check the node's output and answers, and leave ROS; the process may run on."""
         with self._stack:
             assert_only_log_lines(self.program.stderr)
             self.check_answers()
@@ -882,7 +913,7 @@ class DynamicsNode:
 
 class Feeder(Program):
     """
-    A publisher of setpoints in a process of its own: the machine at rest, over and over.
+    A publisher of setpoints in a process of its own: the hexapod at rest, over and over.
 
     Parameters
     ----------
@@ -912,7 +943,7 @@ class Feeder(Program):
                          node.domain, folder, **environment)
 
     def begin(self, heard: bool = True) -> None:
-        """Let it begin, and expect answers; its first setpoints may be lost if not heard."""
+        """Let it begin, and expect answers; its first setpoints may be lost."""
         if heard:
             self.node.until(lambda: self._writers() > self._before, 'the node hears the feeder')
         else:
@@ -921,7 +952,7 @@ class Feeder(Program):
         self.process.send_signal(signal.SIGUSR1)
 
     def end(self) -> None:
-        """Tell it to end, if it has not yet, and wait until the node knows that it is gone."""
+        """Tell it to end, if it has not yet, and wait until the node has removed it."""
         if not self.ended:
             self.process.terminate()
         assert self.wait() == 0, self.stderr

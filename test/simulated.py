@@ -24,7 +24,7 @@ from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
-MACHINE = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')
+HEXAPOD = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
 FRICTIONLESS = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
 UNLIMITED = dict.fromkeys(
@@ -35,7 +35,7 @@ MASSLESS = {f'legs.{part}.{what}': 0.0 for part in ('cylinder', 'piston')
 
 def simulated(**changes: Any) -> SimulatorParameters:
     """Return the hexapod of config/platform.yaml; ``__`` in a name for a point."""
-    return SimulatorParameters({**MACHINE, 'initial_pose': HOME, **{
+    return SimulatorParameters({**HEXAPOD, 'initial_pose': HOME, **{
         name.replace('__', '.'): value for name, value in changes.items()}})
 
 

@@ -251,7 +251,7 @@ def test_no_bytes_raise_anything_else(data: bytes) -> None:
 @KINDS
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(st.data())
-def test_no_spoiled_message_raises_anything_else(kind: str, data: st.DataObject) -> None:
+def test_no_corrupted_message_raises_anything_else(kind: str, data: st.DataObject) -> None:
     spoiled = bytearray(valid(kind, data.draw(st.booleans())))
     for at in data.draw(st.lists(st.integers(0, len(spoiled) - 1), min_size=1, max_size=6)):
         spoiled[at] = data.draw(st.integers(0, 255))
@@ -300,9 +300,9 @@ def test_what_has_the_layout_of_another_is_read_alike(kind: str, data: st.DataOb
 @KINDS
 @moderately
 @given(st.data())
-def test_one_byte_that_differs_never_makes_another_message_of_it(
+def test_one_byte_that_differs_never_gives_another_message(
         kind: str, data: st.DataObject) -> None:
-    """What a layout reads of a message is what the reader reads, whatever byte is changed."""
+    """A layout reads of a message what the reader reads, whichever byte is changed."""
     good = valid(kind, data.draw(st.booleans()))
     layout = layout_of(READERS[kind], good)
     spoiled = bytearray(good)
@@ -335,7 +335,7 @@ def test_the_numbers_of_an_array_are_read_whatever_its_layout(
                      for label, size, stride in dimensions]
     data = serialize_message(of)
     assert same(float64_values(data), values)
-    if values:  # rosbags refuses what rclpy leaves behind an empty array
+    if values:  # rosbags rejects the padding that rclpy leaves after an empty array
         for little_endian in (True, False):
             again = in_order(data, 'std_msgs/msg/Float64MultiArray', little_endian)
             assert same(float64_values(again), values)
@@ -343,7 +343,7 @@ def test_the_numbers_of_an_array_are_read_whatever_its_layout(
 
 @moderately
 @given(st.data())
-def test_no_spoiled_array_raises_anything_else(data: st.DataObject) -> None:
+def test_no_corrupted_array_raises_anything_else(data: st.DataObject) -> None:
     spoiled = bytearray(float64_array((1.0,) * 6))
     for at in data.draw(st.lists(st.integers(0, len(spoiled) - 1), max_size=6)):
         spoiled[at] = data.draw(st.integers(0, 255))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What config/ has for other programs: RViz, Foxglove and the controller manager."""
+"""Files of config/ for other programs: RViz, Foxglove and the controller manager."""
 
 from __future__ import annotations
 

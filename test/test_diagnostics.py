@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is said of setpoints, singularity, limits and timing, at which level, and how long."""
+"""The statuses of setpoints, singularity, limits and timing: level, text and how long."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def logged(diagnostics: DynamicsDiagnostics, now: float) -> list[tuple[int, str]
     return [(level, text) for level, text, _ in diagnostics.report.make(now)[1]]
 
 
-def test_there_is_one_status_for_each_of_four_things() -> None:
+def test_there_are_four_statuses() -> None:
     assert [s.name for s in report(begun(), BEGIN)] == [
         'setpoints', 'singularity', 'limits', 'timing']
 
@@ -124,7 +124,7 @@ def test_a_topic_that_never_came_is_named() -> None:
     assert TWIST not in of.message
 
 
-def test_topics_that_all_speak_but_do_not_meet_are_stale() -> None:
+def test_topics_that_all_arrive_but_are_not_joined_are_stale() -> None:
     diagnostics = begun()
     for topic in TOPICS:
         diagnostics.setpoints.heard(topic, BEGIN + 1.0)
@@ -155,13 +155,13 @@ def test_the_rate_is_that_of_the_last_seconds() -> None:
     assert (values['setpoints answered'], values['rate (Hz)']) == ('130', '10.0')
 
 
-def test_no_rate_is_of_no_time() -> None:
+def test_the_rate_of_no_time_is_zero() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
     assert dict(status(diagnostics, 'setpoints', BEGIN).values)['rate (Hz)'] == '0.0'
 
 
-def test_reports_that_come_often_do_not_tear_the_rate_apart() -> None:
+def test_frequent_reports_do_not_change_the_rate() -> None:
     diagnostics = begun()
     rates = []
     for n in range(300):  # 5 Hz, reported at 10 Hz as levels change
@@ -189,7 +189,7 @@ def come(diagnostics: DynamicsDiagnostics, seconds: float, topics: tuple[str, ..
     return [text for _, text in lines]
 
 
-def test_a_topic_that_is_missing_is_warned_of_in_the_log_now_and_then() -> None:
+def test_a_missing_topic_is_logged_repeatedly() -> None:
     diagnostics = begun()
     lines = come(diagnostics, 3.0, (POSE, TWIST))
     assert lines == [f'setpoints: no setpoint: {ACCEL} never came']
@@ -199,7 +199,7 @@ def test_a_topic_that_is_missing_is_warned_of_in_the_log_now_and_then() -> None:
     assert come(diagnostics, 0.5, (POSE, TWIST), BEGIN + 15.0) == []
 
 
-def test_stamps_that_do_not_meet_are_warned_of_in_the_log() -> None:
+def test_stamps_that_are_never_equal_are_logged() -> None:
     diagnostics = begun()
     for n in range(3):  # what waited too long was dropped, which explains nothing
         diagnostics.rejected(Rejection(POSE, NOT_JOINED), f'stamp {n} ns', BEGIN + n)
@@ -208,7 +208,7 @@ def test_stamps_that_do_not_meet_are_warned_of_in_the_log() -> None:
         'more than setpoint.sync_tolerance, 0 s']
 
 
-def test_nothing_is_warned_of_in_the_log_where_nobody_sends_or_all_is_answered() -> None:
+def test_nothing_is_logged_without_setpoints_or_when_all_are_answered() -> None:
     diagnostics = begun()
     assert come(diagnostics, 20.0, ()) == []
     for n in range(100):  # a setpoint in a second, and reports in the middle of it
@@ -220,7 +220,7 @@ def test_nothing_is_warned_of_in_the_log_where_nobody_sends_or_all_is_answered()
         assert logged(diagnostics, now + 0.5) == []
 
 
-def test_rejections_are_not_warned_of_twice() -> None:
+def test_rejections_are_not_logged_twice() -> None:
     diagnostics = begun()
     for n in range(100):
         now = BEGIN + 0.1 * n
@@ -231,7 +231,7 @@ def test_rejections_are_not_warned_of_twice() -> None:
 
 # Rejections and writers
 
-def test_refusals_are_counted_with_their_reason_and_warned_of() -> None:
+def test_rejections_are_counted_with_their_reason_and_are_a_warning() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
     for _ in range(3):
@@ -268,7 +268,7 @@ def test_another_node_of_the_same_name_is_an_error() -> None:
     assert status(diagnostics, 'setpoints', BEGIN).level == OK
 
 
-def test_an_error_is_not_covered_by_silence_and_says_that_too() -> None:
+def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN)
     diagnostics.setpoints.found(dict.fromkeys(TOPICS, 2), {}, '/node', 1)
@@ -279,7 +279,7 @@ def test_an_error_is_not_covered_by_silence_and_says_that_too() -> None:
         + ', '.join(f'{topic} silent for 3.0 s' for topic in TOPICS))
 
 
-def test_where_all_is_refused_silence_is_not_said_to_be_of_stamps() -> None:
+def test_where_all_is_rejected_stamps_are_not_the_reason() -> None:
     diagnostics = begun()
     for topic in TOPICS:
         diagnostics.setpoints.heard(topic, BEGIN)
@@ -309,7 +309,7 @@ def test_processing_times_are_those_of_the_last_seconds() -> None:
     assert 'processing time, median (us)' not in dict(of.values)
 
 
-def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> None:
+def test_a_backlog_is_a_warning_for_a_second_and_its_losses_stay_counted() -> None:
     diagnostics = begun()
     for n in range(3):
         diagnostics.rejected(Rejection('setpoint', DROPPED), f'stamp {n} ns', BEGIN)
@@ -324,7 +324,7 @@ def test_a_backlog_is_warned_of_for_a_second_and_its_losses_stay_counted() -> No
     assert of.values[-2:] == (('dropped', '3'), ('incomplete', '1'))
 
 
-def test_what_is_said_of_the_last_setpoint_says_how_old_it_is() -> None:
+def test_the_age_of_the_last_setpoint_is_stated() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, output_of(QUARTER))
     for name in ('singularity', 'limits', 'timing'):
@@ -358,7 +358,7 @@ def test_a_clear_motion_is_ok() -> None:
      'singularity.warn_time is 0.5 s'),
     (Cause.PREDICTED, 5.0, 0.6, 'crossing of det(J) = 0 predicted in 0.6 s, '
      'singularity.warn_time is 0.5 s (the warning ends above 0.625 s)')])
-def test_a_warning_says_its_cause_with_its_own_numbers(
+def test_a_warning_states_its_reason_with_its_own_numbers(
         cause: Cause, condition: float, time: float, message: str) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, CLEAR._replace(condition=condition, singularity=Singularity(
@@ -375,7 +375,7 @@ def near(condition: float, stamp: int = 0) -> Output:
                           singularity=Singularity(cause=Cause.CONDITION))
 
 
-def test_what_is_past_is_said_with_its_own_number_and_since_when() -> None:
+def test_a_past_state_is_reported_with_its_own_number_and_since_when() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, near(23.5))
     answered(diagnostics, BEGIN + 0.4, CLEAR._replace(condition=7.42))
@@ -420,7 +420,7 @@ def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden() -> N
     assert 'inside stop_condition: forces suppressed' in of.message
 
 
-def test_crossings_by_the_hundred_take_a_line_in_a_second_that_counts_them() -> None:
+def test_hundreds_of_crossings_are_one_line_in_a_second_with_their_number() -> None:
     diagnostics = begun()
     crossing = CLEAR._replace(singularity=Singularity(cause=Cause.CROSSED))
     lines = []
@@ -490,14 +490,14 @@ def test_held_limits_are_ok() -> None:
      'leg_3: rate -0.75 m/s is 0.25 m/s above limits.velocity_max'),
     (Exceedance('limits.force_max', 5, -7000.0, 6000.0),
      'leg_6: force -7000 N is 1000 N above limits.force_max, clipped')])
-def test_a_broken_limit_is_an_error_that_says_by_how_much(excess: Exceedance, words: str) -> None:
+def test_an_exceeded_limit_is_an_error_with_the_excess(excess: Exceedance, words: str) -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
     of = status(diagnostics, 'limits', BEGIN)
     assert (of.level, of.message) == (ERROR, words)
 
 
-def test_a_clipped_force_is_said_as_the_leg_would_need_it() -> None:
+def test_of_a_clipped_force_the_demanded_one_is_reported() -> None:
     output = output_of(limits__force_max=100.0)
     assert output.demanded_forces is not None
     diagnostics = begun()
@@ -576,7 +576,7 @@ def test_a_level_holds_for_a_second_after_its_cause() -> None:
     assert status(diagnostics, 'limits', BEGIN + 4.8).level == ERROR
 
 
-def test_a_worse_level_is_not_covered_by_a_lesser_one() -> None:
+def test_a_higher_level_is_not_hidden_by_a_lower_one() -> None:
     diagnostics = begun()
     answered(diagnostics, BEGIN, output_of(QUARTER))
     for after in (0.2, 0.9):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The documentation as a site: it is built without warnings, its links lead somewhere."""
+"""The documentation as a site: it is built without warnings, its links are valid."""
 
 from __future__ import annotations
 

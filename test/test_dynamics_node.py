@@ -50,9 +50,9 @@ OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 
 MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
                 (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
-# All legs lie in the plane of the base: they cannot lift anything.
+# All legs lie in the plane of the base: they cannot carry a load.
 FLAT = Sample((0.0, 0.0, 0.0))
-# Turned by 88 degrees; at 90 the machine is singular.
+# Turned by 88 degrees; at 90 the hexapod is singular.
 TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
 
@@ -75,7 +75,7 @@ def _recorded(bag: Path) -> list[tuple[int, str, bytes]]:
 
 
 def _by_topic(replayed: list[tuple[int, str, bytes]]) -> dict[str, list[bytes]]:
-    """Return messages as they come over the wire: Fast DDS fills them to four bytes."""
+    """Return messages as received: Fast DDS pads them to four bytes."""
     return {topic: [data + bytes(-len(data) % 4) for _, of, data in replayed if of == topic]
             for topic in OUTPUTS}
 
@@ -126,7 +126,7 @@ def test_a_thousand_setpoints_are_answered_with_the_librarys_bits(
     node.until(lambda: all(len(node.raw[topic]) >= len(replayed[topic]) for topic in OUTPUTS),
                'all setpoints are answered')
 
-    # None lost, and what the replay writes is what the node sends, to the last bit.
+    # None is lost, and the replay writes what the node publishes, to the last bit.
     assert len(node.raw['leg_states']) == sent
     assert node.raw == replayed
 
@@ -143,7 +143,7 @@ def test_a_thousand_setpoints_are_answered_with_the_librarys_bits(
         assert bits(forces.data) == bits(state.effort)
         assert bits(determinant.data) == bits(result.determinant)
 
-    # It crosses a singularity: the warning comes and stays. Who comes late is told as well.
+    # It crosses a singularity: the warning comes and stays. A late subscriber gets it as well.
     assert [message.data for message in node.received('singularity_warning')] == [False, True]
     late = Peer(node.domain, 'late')
     try:
@@ -237,7 +237,7 @@ def test_a_bad_sample_is_rejected_counted_and_nothing_is_published(node: Dynamic
         for topic, message in HOME.messages(stamp).items():
             node.publish(topic, bad if topic == bad_topic else message)
             node.rejects(topic, *(reason,) if topic == bad_topic else (NOT_JOINED,))
-        # The next one is answered, and only that: it says so.
+        # The next one is answered, and only that one.
         node.answer(MOVING)
         assert f'{bad_topic} rejected: {reason}' in node.program.stderr, case
     node.until_counted()
@@ -290,7 +290,7 @@ def test_a_jump_back_by_more_than_the_timeout_is_a_restart(fresh: Fresh) -> None
 
 
 def test_zero_stamps_are_joined_in_order_of_arrival(fresh: Fresh) -> None:
-    node = fresh('setpoint.timeout:=1000.0')  # however slow this machine is
+    node = fresh('setpoint.timeout:=1000.0')  # however slow this computer is
     node.until_active()
     samples = [TURNED, HOME, MOVING]
     begun = time.time_ns()
@@ -424,7 +424,7 @@ def test_where_jacobian_cannot_be_solved_there_are_lengths_and_a_warning_but_no_
     node.until_counted()
 
 
-def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: DynamicsNode) -> None:
+def test_forces_above_their_limit_are_clipped_and_reported(node: DynamicsNode) -> None:
     result = node.result_of(LEAPING)
     assert result.forces.max() > 6000.0
     state = node.answer(LEAPING)
@@ -439,7 +439,7 @@ def test_forces_above_their_limit_are_clipped_and_the_excess_is_told(node: Dynam
     node.until_status('limits', OK, '')
 
 
-def test_other_limits_are_told_and_the_answer_goes_out(node: DynamicsNode) -> None:
+def test_other_limits_are_reported_and_the_answer_is_published(node: DynamicsNode) -> None:
     for sample, text in (
             (HOME._replace(position=(0.0, 0.0, 0.5)), 'm below limits.length_min'),
             (HOME._replace(position=(0.0, 0.0, 2.0)), 'm above limits.length_max'),
@@ -452,7 +452,7 @@ def test_other_limits_are_told_and_the_answer_goes_out(node: DynamicsNode) -> No
     node.until_counted()
 
 
-def test_a_warning_tells_its_cause(node: DynamicsNode) -> None:
+def test_a_warning_states_its_reason(node: DynamicsNode) -> None:
     node.answer()
     node.until_status('singularity', OK, 'clear')
     node.answer(TURNED)
@@ -479,7 +479,7 @@ def test_who_reads_the_answers_is_counted(fresh: Fresh) -> None:
     node.until(lambda: readers.items() <= node.values('setpoints').items(), 'it has gone')
 
 
-def test_with_exclusive_setpoints_a_second_writer_is_told_and_rejected(fresh: Fresh) -> None:
+def test_with_exclusive_setpoints_a_second_writer_is_reported_and_rejected(fresh: Fresh) -> None:
     node = fresh('setpoint.exclusive:=true')
     node.until_active()
     node.answer()
@@ -498,7 +498,7 @@ def test_with_exclusive_setpoints_a_second_writer_is_told_and_rejected(fresh: Fr
     node.until_counted()
 
 
-def test_a_writer_that_cannot_be_heard_is_told(fresh: Fresh) -> None:
+def test_a_writer_that_cannot_be_received_is_reported(fresh: Fresh) -> None:
     node = fresh()
     node.until_active()
     node.peer.node.create_publisher(
@@ -509,11 +509,11 @@ def test_a_writer_that_cannot_be_heard_is_told(fresh: Fresh) -> None:
     assert 'setpoint/pose: a publisher offers an incompatible quality of service' in said
 
 
-# More than can be answered
+# More setpoints than can be answered
 
 WITHOUT = """\
 import sys
-sys.modules['{}'] = None  # importing it fails, as if it were not there
+sys.modules['{}'] = None  # importing it fails, as if it were missing
 from stewart_dynamics.nodes.dynamics_node import main
 sys.exit(main())
 """
@@ -564,13 +564,13 @@ def _passed_over(node: DynamicsNode, key: str, sent: int) -> int:
     (WITHOUT_NUMBA, {}, 'the dynamics run uncompiled'),
     (None, {'NUMBA_DISABLE_JIT': '1'}, 'the dynamics run uncompiled'),
 ], ids=['single-threaded executor', 'no numba', 'numba disabled'])
-def test_what_is_missing_is_said_once_and_gives_the_same_bits(
+def test_a_missing_library_is_logged_once_and_the_bits_are_the_same(
         start: Start, command: list[str] | None, environment: dict[str, str], said: str) -> None:
     node = start(command=command, **environment)
     node.until_active()
     for sample in (HOME, MOVING, TURNED, LEAPING):
         node.answer(sample)
-    # one of the samples is near a singularity, which is said as well
+    # one of the samples is near a singularity, which is logged as well
     warnings = [line for line in log_lines(node.program.stderr, 'WARN')
                 if ': singularity: ' not in line]
     assert len(warnings) == 1
@@ -578,7 +578,7 @@ def test_what_is_missing_is_said_once_and_gives_the_same_bits(
     node.stop()
 
 
-def test_with_everything_there_nothing_is_said(start: Start) -> None:
+def test_with_all_libraries_nothing_is_logged(start: Start) -> None:
     node = start()
     node.until_active()
     node.answer()
@@ -616,7 +616,7 @@ def test_setpoints_in_one_message(fresh: Fresh) -> None:
     assert '2 points: a setpoint has one' in node.program.stderr
 
 
-def test_setpoints_of_a_pose_alone_are_quasi_static(fresh: Fresh) -> None:
+def test_setpoints_of_poses_alone_are_quasi_static(fresh: Fresh) -> None:
     node = fresh('setpoint.source:=pose')
     node.until_active()
     assert node.topics == ['setpoint/pose']
@@ -625,7 +625,7 @@ def test_setpoints_of_a_pose_alone_are_quasi_static(fresh: Fresh) -> None:
     assert list(state.velocity) == [0.0] * 6
     # One after another, far apart: no speed is made of them.
     node.answer(HOME)
-    # What comes on the other topics is not heard.
+    # Messages on the other topics are not received.
     stamp = node.stamp()
     for topic, message in MOVING.messages(stamp).items():
         node.publish(topic, message)
@@ -680,7 +680,7 @@ def test_a_wrench_holds_for_the_setpoints_to_come(fresh: Fresh) -> None:
 
 
 def _until_load(node: DynamicsNode, load: tuple[float, ...]) -> None:
-    """Send setpoints until one is answered with a load: nothing else tells that it is held."""
+    """Send setpoints until one is answered with a load: nothing else shows that it is held."""
     expected = bits(node.result_of(HOME, load).forces)
     node.until(lambda: bits(node.state_of(node.send()).effort) == expected, 'the load is held')
 
@@ -733,7 +733,7 @@ def test_a_payload_is_picked_up_while_active(node: DynamicsNode) -> None:
     assert ask(mass=150.0) == [True]
     lighter = StewartPlatform(laden.parameters.replaced({'platform.mass': 150.0}))
     node.answer(MOVING, platform=lighter)
-    # Each change is logged, and what can hardly be meant.
+    # Each change is logged, and likely mistakes.
     assert 'platform.mass: 210.0 -> 150.0' in node.program.stderr
     assert ask(mass=150000.0) == [True]
     node.until(lambda: 'cannot carry the platform' in node.program.stderr, 'it is doubted')
@@ -809,7 +809,7 @@ def test_the_whole_lifecycle(start: Start) -> None:
     node = start('autostart:=false')
     node.until_said('unconfigured: autostart is false')
     assert node.state == 'unconfigured'
-    # What a state does not have is answered, and the node lives on.
+    # A transition that a state does not have is answered, and the node continues.
     for impossible in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_DEACTIVATE,
                        Transition.TRANSITION_CLEANUP, 99):
         assert not node.change(impossible)
@@ -830,7 +830,7 @@ def test_the_whole_lifecycle(start: Start) -> None:
 
     assert node.change(Transition.TRANSITION_DEACTIVATE)
     assert node.state == 'inactive'
-    # Heard in vain: neither answered now nor kept for later.
+    # Neither answered now nor kept for later.
     _send_to_all(node)
     _activate(node)
     node.answer(MOVING, platform=moved)
@@ -859,7 +859,7 @@ def test_the_whole_lifecycle(start: Start) -> None:
 
 
 def _send_to_all(node: DynamicsNode) -> None:
-    """Send a setpoint on the three topics, whatever the node says that it listens to."""
+    """Send a setpoint on the three topics, whatever the node subscribes to."""
     for topic, message in HOME.messages(node.stamp()).items():
         node.publish(topic, message)
 
@@ -894,7 +894,7 @@ def test_a_signal_ends_it_while_it_starts(start: Start, number: signal.Signals) 
     node.stop(number)
 
 
-# What is wrong in a parameter file is said in one line
+# An error in a parameter file is reported in one line
 
 GOOD = """\
 /**:
@@ -926,23 +926,23 @@ BROKEN = {
 
 
 @pytest.mark.parametrize('case', BROKEN)
-def test_a_broken_rule_is_said_in_one_line(domain: int, tmp_path: Path, case: str) -> None:
+def test_a_broken_rule_is_reported_in_one_line(domain: int, tmp_path: Path, case: str) -> None:
     good, bad, text = BROKEN[case]
     assert good in GOOD
-    file = tmp_path / 'machine.yaml'
+    file = tmp_path / 'hexapod.yaml'
     file.write_text(GOOD.replace(good, bad), encoding='utf-8')
     line = rejected(domain, tmp_path / 'node', '--params-file', str(file))
     assert line.startswith(f'stewart_dynamics: {file}: {text}')
 
 
-def test_the_file_that_those_spoil_is_good(tmp_path: Path) -> None:
-    file = tmp_path / 'machine.yaml'
+def test_the_file_that_those_change_is_valid(tmp_path: Path) -> None:
+    file = tmp_path / 'hexapod.yaml'
     file.write_text(GOOD, encoding='utf-8')
     Parameters.check_file(str(file))
     Parameters.from_yaml(file)
 
 
-def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
+def test_a_missing_file_is_reported_in_one_line(domain: int, tmp_path: Path) -> None:
     file = tmp_path / 'none.yaml'
     assert rejected(domain, tmp_path / 'node', '--params-file', str(file)) == (
         f'stewart_dynamics: {file}: cannot be read: No such file or directory')
@@ -952,18 +952,18 @@ def test_a_missing_file_is_said_in_one_line(domain: int, tmp_path: Path) -> None
     ('platform.mass:=150', 'platform.mass: 150: is an integer'),
     ('platfrom.mass:=150.0', 'platfrom.mass: unknown parameter; do you mean platform.mass?'),
 ])
-def test_a_bad_parameter_on_the_command_line_is_said_in_one_line(
+def test_a_bad_parameter_on_the_command_line_is_reported_in_one_line(
         domain: int, tmp_path: Path, override: str, text: str) -> None:
     line = rejected(domain, tmp_path / 'node', '--params-file', str(PLATFORM), '-p', override)
     assert text in line
 
 
-def test_no_parameters_at_all_is_said_in_one_line(domain: int, tmp_path: Path) -> None:
+def test_no_parameters_at_all_is_reported_in_one_line(domain: int, tmp_path: Path) -> None:
     assert rejected(domain, tmp_path / 'node') == (
         'stewart_dynamics: command line: geometry.base_joints: missing, it has no default')
 
 
-# Whatever comes
+# Any input
 
 _numbers_of_any_kind = st.floats(allow_nan=True, allow_infinity=True)
 _six = st.tuples(*[_numbers_of_any_kind] * 6)
@@ -976,9 +976,9 @@ _inputs = st.sampled_from([*SEPARATE, 'wrench'])
 
 @st.composite
 def _messages(draw: st.DrawFn) -> list[tuple[str, Any]]:
-    """Return messages on the node's topics, sound, spoiled or no messages at all."""
+    """Return messages on the node's topics, valid, corrupted or random bytes."""
     if draw(st.booleans()):
-        # A CDR header, of which readers of such messages know some, and anything behind it.
+        # A CDR header, some of them known to readers of such messages, and any bytes after it.
         return [(draw(_inputs), draw(st.sampled_from([b'\0\1\0\0', b'\0\0\0\0', b'\1\7\0\0']))
                  + draw(st.binary(max_size=200)))]
     stamp = draw(st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1))
@@ -998,7 +998,7 @@ def _messages(draw: st.DrawFn) -> list[tuple[str, Any]]:
 @settings(max_examples=60, derandomize=True, deadline=None, database=None,
           suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(st.lists(_messages(), min_size=1, max_size=6))
-def test_whatever_comes_nothing_but_numbers_goes_out_and_a_setpoint_is_answered(
+def test_for_any_input_only_finite_numbers_are_published_and_a_setpoint_is_answered(
         node: DynamicsNode, sent: list[list[tuple[str, Any]]]) -> None:
     for topic, message in (each for messages in sent for each in messages):
         node.publish(topic, message)
@@ -1012,7 +1012,7 @@ def test_whatever_comes_nothing_but_numbers_goes_out_and_a_setpoint_is_answered(
 
 
 @pytest.mark.parametrize('program', ['stewart_dynamics', 'stewart_trajectory'])
-def test_help_is_given_and_a_stray_argument_is_rejected(program: str) -> None:
+def test_help_is_printed_and_a_stray_argument_is_rejected(program: str) -> None:
     path = Path(sys.executable).with_name(program)
     said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
     assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')

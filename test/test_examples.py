@@ -53,7 +53,7 @@ def run(tmp_path: Path) -> Iterator[Run]:
         program.kill()
 
 
-def test_a_planned_motion_is_answered_or_its_rejection_is_said(
+def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
         start: Callable[..., DynamicsNode], run: Run) -> None:
     node = start()
     node.until_active()
@@ -85,7 +85,7 @@ def test_a_planned_motion_is_answered_or_its_rejection_is_said(
 
 
 @pytest.mark.parametrize('name', ['plan_motion.py', 'push_platform.py'])
-def test_where_nobody_is_there_it_says_so_and_ends(domain: int, run: Run, name: str) -> None:
+def test_without_a_node_it_ends_with_one_line(domain: int, run: Run, name: str) -> None:
     program = run(name, domain, '--timeout', '0.5')
     assert program.wait() == 1
     line, = program.stderr.splitlines()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The external wrench: known loads found again, its filter, its noise, and where it gives up."""
+"""The external wrench: known loads, its filter, its noise, and its errors."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 Array = NDArray[np.float64]
 
-MACHINE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+HEXAPOD = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 HOME = Motion([0.0, 0.0, 1.1], np.eye(3))
 LOAD = (150.0, -100.0, 250.0, 60.0, -40.0, 80.0)
 BEGIN = 1_700_000_000_000_000_000
@@ -55,7 +55,7 @@ def six(values: Any) -> Six:
 
 def measured(parameters: Parameters, motion: Motion, loads: Any, stamps: Sequence[int],
              ) -> list[Measurement]:
-    """Return what is measured of a machine that moves so under these loads, (N, ...) of each."""
+    """Return what is measured of a hexapod that moves so under these loads, (N, ...) of each."""
     result = StewartPlatform(parameters).inverse_dynamics(motion, loads)
     return [Measurement(stamp, six(lengths), six(rates), six(forces))
             for stamp, lengths, rates, forces in zip(
@@ -64,7 +64,7 @@ def measured(parameters: Parameters, motion: Motion, loads: Any, stamps: Sequenc
 
 def resting(parameters: Parameters, motion: Motion, load: Any, stamps: Sequence[int],
             ) -> list[Measurement]:
-    """Return the same of a machine that rests in the pose of a motion under a load."""
+    """Return the same of a hexapod that rests in the pose of a motion under a load."""
     still = Motion(motion.position, motion.rotation)
     result = StewartPlatform(parameters).inverse_dynamics(still, load)
     return [Measurement(stamp, six(result.lengths), six(result.rates), six(result.forces))
@@ -96,7 +96,7 @@ def times(random: np.random.Generator, many: int) -> list[int]:
 # Known loads
 
 def test_a_static_load_is_found() -> None:
-    """On random machines, beside a load that is known and not external."""
+    """On random hexapods, with a known load that is not external."""
     random = rng(1)
     for _ in range(20):
         parameters = random_parameters(random).replaced(UNFILTERED)
@@ -114,11 +114,11 @@ def test_a_static_load_is_found() -> None:
 
 
 def test_without_a_load_there_is_none() -> None:
-    found = estimates(ExternalWrench(MACHINE), resting(MACHINE, HOME, None, times(rng(2), 50)))
+    found = estimates(ExternalWrench(HEXAPOD), resting(HEXAPOD, HOME, None, times(rng(2), 50)))
     assert np.max(np.abs(wrenches(found))) < 1e-8  # of forces of 300 N
 
 
-def test_in_motion_it_is_what_the_equation_of_motion_leaves() -> None:
+def test_in_motion_it_is_the_residual_of_the_equation_of_motion() -> None:
     """
     Not filtered, it is the mean over both ends of M dX'/dt + C X' + G - J_inv^T f - known.
 
@@ -152,7 +152,7 @@ def test_in_motion_it_is_what_the_equation_of_motion_leaves() -> None:
 
 
 def test_many_are_the_equation_of_motion_of_each() -> None:
-    """With the sign of ~/wrench: the load that the model does not know of is found."""
+    """With the sign of ~/wrench: the load that the model does not contain is found."""
     random = rng(9)
     for _ in range(10):
         parameters = random_parameters(random)
@@ -176,8 +176,8 @@ def test_many_are_the_equation_of_motion_of_each() -> None:
 
 
 def test_one_not_filtered_is_the_mean_of_many_at_both_ends() -> None:
-    step, platform = ExternalWrench(MACHINE.replaced(UNFILTERED)), StewartPlatform(MACHINE)
-    data = resting(MACHINE, HOME, LOAD, [BEGIN, BEGIN + MILLISECOND])
+    step, platform = ExternalWrench(HEXAPOD.replaced(UNFILTERED)), StewartPlatform(HEXAPOD)
+    data = resting(HEXAPOD, HOME, LOAD, [BEGIN, BEGIN + MILLISECOND])
     found = estimates(step, data)[1]
     rows = np.array([found.motion] * 2)
     model = platform.solve(rows)[:, 12:18]
@@ -191,10 +191,10 @@ def test_it_follows_a_step_by_the_closed_form_at_irregular_times() -> None:
     """And back: 1 - exp(-2 pi cutoff t), then the decay of what it had."""
     random = rng(4)
     cutoff = 3.0
-    step = ExternalWrench(MACHINE.replaced({'external_wrench.cutoff': cutoff}))
+    step = ExternalWrench(HEXAPOD.replaced({'external_wrench.cutoff': cutoff}))
     stamps = times(random, 400)
-    found = estimates(step, [*resting(MACHINE, HOME, LOAD, stamps[:200]),
-                             *resting(MACHINE, HOME, None, stamps[200:])])
+    found = estimates(step, [*resting(HEXAPOD, HOME, LOAD, stamps[:200]),
+                             *resting(HEXAPOD, HOME, None, stamps[200:])])
     since = 2.0 * math.pi * cutoff * np.subtract(stamps, stamps[0])[1:] * 1e-9
     share = -np.expm1(-since[:199])
     share = np.concatenate([share, share[-1] * np.exp(since[198] - since[199:])])
@@ -203,7 +203,7 @@ def test_it_follows_a_step_by_the_closed_form_at_irregular_times() -> None:
 
 def noisy(parameters: Parameters, interval: int, many: int, deviation: float, seed: int,
           ) -> tuple[list[Measurement], Array]:
-    """Return a machine at rest whose rates have noise, and that noise (many, 6) [m/s]."""
+    """Return a hexapod at rest whose rates have noise, and that noise (many, 6) [m/s]."""
     stamps = range(BEGIN, BEGIN + many * interval, interval)
     rest = resting(parameters, HOME, None, stamps)
     noise = deviation * rng(seed).standard_normal((many, 6))
@@ -219,7 +219,7 @@ def test_noise_is_bounded_however_short_the_time_between_measurements(interval: 
     The gain is K x (1 - exp(-x)) sqrt(2 / (1 + exp(-x))) / x^2 with x = K dt, from the filter's
     transfer function, K (1 - z^-1) (1 - a) / x / (1 - a z^-1).
     """
-    frictionless = MACHINE.replaced(
+    frictionless = HEXAPOD.replaced(
         {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0})
     deviation, many = 1e-4, 20_000
     found = estimates(ExternalWrench(frictionless),
@@ -242,7 +242,7 @@ def test_noise_is_bounded_however_short_the_time_between_measurements(interval: 
 
 def test_it_is_a_momentum_observer() -> None:
     """De Luca's residual, r = K (p - integral(J_inv^T f - G + r)), of the same noisy data."""
-    frictionless = MACHINE.replaced(
+    frictionless = HEXAPOD.replaced(
         {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0})
     platform = StewartPlatform(frictionless)
     interval, many = 100_000, 10_000
@@ -269,22 +269,22 @@ def test_it_is_a_momentum_observer() -> None:
 # Time
 
 def test_there_is_no_wrench_before_two_measurements_and_after_a_gap() -> None:
-    step = ExternalWrench(MACHINE)
+    step = ExternalWrench(HEXAPOD)
     gap = 100 * MILLISECOND
     stamps = [0, gap, 2 * gap + 1, 2 * gap + 2, MILLISECOND, 2 * MILLISECOND]
-    found = estimates(step, resting(MACHINE, HOME, LOAD, stamps))
+    found = estimates(step, resting(HEXAPOD, HOME, LOAD, stamps))
     assert [each.wrench is None for each in found] == [True, False, True, False, True, False]
     assert [each.differences is None for each in found] == [each.wrench is None for each in found]
-    # The filter has begun anew: of a nanosecond there is next to nothing.
+    # The filter has restarted: after a nanosecond its output is close to zero.
     assert found[1].force > 200.0
     assert 0.0 < found[3].force < 1e-4
 
 
 def test_the_acceleration_is_the_mean_one() -> None:
-    motion_at = smooth_motion(MACHINE, rng(7))
+    motion_at = smooth_motion(HEXAPOD, rng(7))
     motion = motion_at([0.0, 0.01])
-    found = estimates(ExternalWrench(MACHINE), measured(
-        MACHINE, motion, None, [BEGIN, BEGIN + 10 * MILLISECOND]), motion_at(0.0))
+    found = estimates(ExternalWrench(HEXAPOD), measured(
+        HEXAPOD, motion, None, [BEGIN, BEGIN + 10 * MILLISECOND]), motion_at(0.0))
     assert relative(found[1].motion[12:18], np.concatenate(
         [motion.linear_velocity[1], motion.angular_velocity[1]])) < 1e-9
     assert relative(found[1].motion[18:21], np.diff(motion.linear_velocity, axis=0) / 0.01) < 1e-9
@@ -294,9 +294,9 @@ def test_the_acceleration_is_the_mean_one() -> None:
 # The pose to begin with
 
 def test_it_begins_at_home_where_nothing_is_known() -> None:
-    for parameters in (MACHINE, random_parameters(rng(8))):
+    for parameters in (HEXAPOD, random_parameters(rng(8))):
         size = float(np.mean(np.linalg.norm(parameters['geometry.base_joints'], axis=1)))
-        pose = HOME if parameters is MACHINE else Motion([0.0, 0.0, size], np.eye(3))
+        pose = HOME if parameters is HEXAPOD else Motion([0.0, 0.0, size], np.eye(3))
         at = resting(parameters, pose, None, [BEGIN])[0]
         found = ExternalWrench(parameters)(at, None, NO_WRENCH, None)
         assert relative(found.motion[:3], pose.position) < 1e-9
@@ -305,13 +305,13 @@ def test_it_begins_at_home_where_nothing_is_known() -> None:
 def test_it_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
     """Below the base there is a pose of the same lengths."""
     below = Motion([0.0, 0.0, -1.1], np.eye(3))
-    step = ExternalWrench(MACHINE)
-    at = resting(MACHINE, HOME, None, [BEGIN])[0]
+    step = ExternalWrench(HEXAPOD)
+    at = resting(HEXAPOD, HOME, None, [BEGIN])[0]
     found = step(at, None, NO_WRENCH, below.rows.tolist())
     assert relative(found.motion[:3], below.position) < 1e-9
     again = step(at, found._replace(stamp=BEGIN + 10 ** 12), NO_WRENCH, HOME.rows.tolist())
     assert relative(again.motion[:3], below.position) < 1e-9
-    # From a last pose that leads nowhere: the setpoint is asked.
+    # It does not converge from the last pose: the setpoint is the guess.
     flat = found._replace(stamp=0, motion=tuple(Motion([0.0, 0.0, 0.0], np.eye(3)).rows.tolist()))
     assert relative(step(at, flat, NO_WRENCH, HOME.rows.tolist()).motion[:3],
                     HOME.position) < 1e-9
@@ -323,8 +323,8 @@ def test_it_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
 # What cannot be
 
 def test_lengths_of_no_pose_are_an_error() -> None:
-    at = resting(MACHINE, HOME, None, [BEGIN])[0]
-    step = ExternalWrench(MACHINE)
+    at = resting(HEXAPOD, HOME, None, [BEGIN])[0]
+    step = ExternalWrench(HEXAPOD)
     for lengths in ((0.1, *at.lengths[1:]), (-1.0,) * 6, (1e300,) * 6):
         with pytest.raises((PoseError, SingularityError), match=r'lengths \['):
             step(at._replace(lengths=six(lengths)), None, NO_WRENCH, HOME.rows.tolist())
@@ -335,8 +335,8 @@ def test_lengths_of_no_pose_are_an_error() -> None:
 @pytest.mark.parametrize('changed', [
     {'rates': (1e308,) * 6}, {'forces': (1e308,) * 6}], ids=str)
 def test_numbers_that_overflow_are_an_error(changed: dict[str, Any]) -> None:
-    step = ExternalWrench(MACHINE)
-    first, second = resting(MACHINE, HOME, None, [BEGIN, BEGIN + 1])
+    step = ExternalWrench(HEXAPOD)
+    first, second = resting(HEXAPOD, HOME, None, [BEGIN, BEGIN + 1])
     before = estimates(step, [first])[0]
     with pytest.raises(MotionError, match=f'stamp {BEGIN + 1} ns'):
         step(second._replace(**changed), before, NO_WRENCH, None)
@@ -346,17 +346,17 @@ def test_numbers_that_overflow_are_an_error(changed: dict[str, Any]) -> None:
 
 # Thresholds
 
-def test_what_is_beyond_a_threshold_is_said() -> None:
-    parameters = MACHINE.replaced({**UNFILTERED, 'external_wrench.force_max': 50.0})
-    rest = resting(MACHINE, HOME, (30.0, 0.0, 40.1, 3.0, 0.0, 4.0), [0, MILLISECOND])
+def test_an_exceeded_threshold_is_reported() -> None:
+    parameters = HEXAPOD.replaced({**UNFILTERED, 'external_wrench.force_max': 50.0})
+    rest = resting(HEXAPOD, HOME, (30.0, 0.0, 40.1, 3.0, 0.0, 4.0), [0, MILLISECOND])
     found = estimates(ExternalWrench(parameters), rest)[1]
     assert found.overloads == (Overload('external_wrench.force_max', found.force, 50.0),)
     assert (found.force, found.moment) == pytest.approx((math.hypot(30.0, 40.1), 5.0))
-    both = MACHINE.replaced({**UNFILTERED, 'external_wrench.force_max': 51.0,
+    both = HEXAPOD.replaced({**UNFILTERED, 'external_wrench.force_max': 51.0,
                              'external_wrench.moment_max': 4.9})
     found = estimates(ExternalWrench(both), rest)[1]
     assert [each.limit for each in found.overloads] == ['external_wrench.moment_max']
-    assert estimates(ExternalWrench(MACHINE), rest)[1].overloads == ()
+    assert estimates(ExternalWrench(HEXAPOD), rest)[1].overloads == ()
 
 
 # In the simulator
@@ -381,10 +381,10 @@ def controlled(seconds: float, load_at: Callable[[float], Any], **changes: Any) 
     plant = Plant(simulated)
     rate = simulated['rate']
     seconds_at = np.arange(round(seconds * rate)) / rate
-    wanted = StewartPlatform(MACHINE).inverse_dynamics(swing(seconds_at))
+    wanted = StewartPlatform(HEXAPOD).inverse_dynamics(swing(seconds_at))
     noise = rng(9)
     deviations = [simulated[f'noise.{what}'] for what in ('length', 'rate', 'force')]
-    step, last = ExternalWrench(MACHINE), None
+    step, last = ExternalWrench(HEXAPOD), None
     applied, found = np.empty((len(seconds_at), 6)), np.full((len(seconds_at), 6), np.nan)
     off = 0.0
     for n, now in enumerate(seconds_at.tolist()):
@@ -449,9 +449,9 @@ def test_and_with_noise() -> None:
 
 
 def test_held_forces_leave_an_error_of_second_order() -> None:
-    """Not filtered, of a machine that is let go under held forces and a load, no friction."""
+    """Not filtered, of a hexapod that is released under held forces and a load, no friction."""
     frictionless = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
-    held = six(0.8 * StewartPlatform(MACHINE).inverse_dynamics(HOME).forces)
+    held = six(0.8 * StewartPlatform(HEXAPOD).inverse_dynamics(HOME).forces)
     largest = []
     for rate in (50.0, 100.0, 200.0):
         plant = Plant(SimulatorParameters({
@@ -463,7 +463,7 @@ def test_held_forces_leave_an_error_of_second_order() -> None:
             data.append(Measurement(
                 round(n * 1e9 / rate), state.lengths, state.rates, state.forces))
         found = wrenches(estimates(
-            ExternalWrench(MACHINE.replaced({**UNFILTERED, **frictionless})), data))
+            ExternalWrench(HEXAPOD.replaced({**UNFILTERED, **frictionless})), data))
         largest.append(np.max(np.abs(found - LOAD)))
     orders = np.log2(np.divide(largest[:-1], largest[1:]))
     assert np.all(np.abs(orders - 2.0) < 0.2)
@@ -471,8 +471,8 @@ def test_held_forces_leave_an_error_of_second_order() -> None:
 
 CODE = """
 from test_external_wrench import *
-found = estimates(ExternalWrench(MACHINE), [*measured(
-    MACHINE, swing(np.arange(20) * 1e-3), LOAD, range(BEGIN, BEGIN + 20_000_000, 1_000_000))])
+found = estimates(ExternalWrench(HEXAPOD), [*measured(
+    HEXAPOD, swing(np.arange(20) * 1e-3), LOAD, range(BEGIN, BEGIN + 20_000_000, 1_000_000))])
 print([np.array(each.wrench).tobytes().hex() for each in found[1:]], found[-1])
 """
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is said of the external wrench, at which level, and since when."""
+"""The status of the external wrench: level, text and since when."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from referees import rotation_about
 from test_external_wrench import (
-    BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, UNFILTERED)
+    BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, UNFILTERED)
 
 from stewart_dynamics import Motion
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
@@ -35,14 +35,14 @@ TARGET = tuple(HOME.rows.tolist())
 
 
 def found(load: tuple[float, ...] = LOAD, **changes: float) -> Estimate:
-    """Return the second estimate of a machine at rest under a load."""
-    parameters = MACHINE.replaced({**UNFILTERED, **{
+    """Return the second estimate of a hexapod at rest under a load."""
+    parameters = HEXAPOD.replaced({**UNFILTERED, **{
         f'external_wrench.{name}': value for name, value in changes.items()}})
     return estimates(ExternalWrench(parameters),
-                     resting(MACHINE, HOME, load, [BEGIN, BEGIN + MILLISECOND]))[1]
+                     resting(HEXAPOD, HOME, load, [BEGIN, BEGIN + MILLISECOND]))[1]
 
 
-FIRST = estimates(ExternalWrench(MACHINE), resting(MACHINE, HOME, LOAD, [BEGIN]))[0]
+FIRST = estimates(ExternalWrench(HEXAPOD), resting(HEXAPOD, HOME, LOAD, [BEGIN]))[0]
 CLEAR = found()
 OVER = found(force_max=300.0, moment_max=100.0)
 
@@ -61,15 +61,15 @@ def status(diagnostics: ExternalWrenchDiagnostics, now: float) -> Status:
 
 
 def test_there_is_none_before_a_measurement_has_come() -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     assert diagnostics.status(5.0) is None
     assert diagnostics.level(1e9) == OK
     diagnostics.heard(6.0)
     assert diagnostics.status(6.0) is not None
 
 
-def test_it_comes_behind_the_others() -> None:
-    diagnostics = DynamicsDiagnostics(MACHINE, ('setpoint/pose',), 0.0)
+def test_it_is_the_last_status() -> None:
+    diagnostics = DynamicsDiagnostics(HEXAPOD, ('setpoint/pose',), 0.0)
     names = ['setpoints', 'singularity', 'limits', 'timing']
     assert [each.name for each in diagnostics.report.make(0.0)[0]] == names
     assert not diagnostics.report.level_changed(0.0)
@@ -79,8 +79,8 @@ def test_it_comes_behind_the_others() -> None:
     assert not diagnostics.report.level_changed(0.1)
 
 
-def test_its_keys_are_what_is_felt() -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+def test_its_keys_have_force_and_moment() -> None:
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     felt(diagnostics, 1.0)
     now = status(diagnostics, 1.05)
     assert (now.level, now.message) == (OK, 'no overload')
@@ -103,7 +103,7 @@ def test_its_keys_are_what_is_felt() -> None:
 
 @pytest.mark.parametrize('angle', [1e-9, 1e-3, 1.0, 3.0])
 def test_how_far_it_is_from_the_setpoint(angle: float) -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
     target = Motion([0.003, 0.0, 1.104], rotation_about(axis, angle))
     diagnostics.heard(1.0)
@@ -116,7 +116,7 @@ def test_how_far_it_is_from_the_setpoint(angle: float) -> None:
 
 
 def test_an_overload_is_an_error_and_held_for_a_second() -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     assert not felt(diagnostics, 1.0)
     assert status(diagnostics, 1.0).level == OK
     assert felt(diagnostics, 1.01, OVER)
@@ -133,7 +133,7 @@ def test_an_overload_is_an_error_and_held_for_a_second() -> None:
 
 
 def test_silence_is_stale() -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     felt(diagnostics, 1.0)
     assert status(diagnostics, 1.09).level == OK
     now = status(diagnostics, 3.5)
@@ -143,7 +143,7 @@ def test_silence_is_stale() -> None:
 
 
 def test_measurements_that_are_too_far_apart_are_stale() -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     for now in (1.0, 1.5, 2.0):
         felt(diagnostics, now, FIRST)
     of = status(diagnostics, 2.0)
@@ -153,8 +153,8 @@ def test_measurements_that_are_too_far_apart_are_stale() -> None:
     assert 'distance from the last setpoint (m)' in dict(of.values)
 
 
-def test_a_rejection_is_told_and_counted() -> None:
-    diagnostics = ExternalWrenchDiagnostics(MACHINE)
+def test_a_rejection_is_reported_and_counted() -> None:
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
     felt(diagnostics, 1.0)
     diagnostics.rejected(Rejection(MEASURED_LEGS, MISSING_JOINTS), 'leg_6', 1.01)
     now = status(diagnostics, 1.02)

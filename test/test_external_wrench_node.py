@@ -30,8 +30,8 @@ from referees import rng
 from running import DynamicsNode, executable, HOME, log_lines, nanoseconds, NODE, wrench_message
 from sensor_msgs.msg import JointState
 from test_external_wrench import BEGIN
+from test_external_wrench import HEXAPOD, LOAD, measured, MILLISECOND, resting, six, swing, times
 from test_external_wrench import HOME as AT_HOME
-from test_external_wrench import LOAD, MACHINE, measured, MILLISECOND, resting, six, swing, times
 from test_measured_legs import joint_state, JOINTS, message_of, ZERO_LENGTHS
 from test_simulator_node import Simulator, STEPPED
 
@@ -49,7 +49,7 @@ LEGS = 'measured_legs'
 
 
 class Felt:
-    """A node, and a machine whose legs are measured."""
+    """A node, and a hexapod whose legs are measured."""
 
     def __init__(self, node: DynamicsNode) -> None:
         self.node = node
@@ -62,12 +62,12 @@ class Felt:
         self._writer = self.node.peer.writer(f'{NODE}/{LEGS}', JointState)
 
     def until_heard(self) -> None:
-        """Wait until the node answers and hears what is measured."""
+        """Wait until the node answers and receives measured legs."""
         self.node.until_active()
         self.until_connected()
 
     def until_connected(self) -> None:
-        """Wait until the node hears what is measured."""
+        """Wait until the node receives measured legs."""
         self.node.until(self._writer.get_subscription_count, 'the node hears measured legs')
 
     def disconnect(self) -> None:
@@ -79,9 +79,9 @@ class Felt:
         self._writer.publish(message)
 
     def rest(self, load: tuple[float, ...] = LOAD, step: int = MILLISECOND) -> int:
-        """Publish the machine at rest under a load, and return the stamp."""
+        """Publish the hexapod at rest under a load, and return the stamp."""
         self.stamp += step
-        self.publish(message_of(resting(MACHINE, AT_HOME, load, [self.stamp])[0]))
+        self.publish(message_of(resting(HEXAPOD, AT_HOME, load, [self.stamp])[0]))
         return self.stamp
 
     def received(self) -> list[WrenchStamped]:
@@ -97,7 +97,7 @@ class Felt:
         self.node.until(lambda: stamp in self.stamps(), 'the wrench comes')
 
     def until_status(self, level: bytes, text: str, load: tuple[float, ...] = LOAD) -> None:
-        """Let the machine rest on until diagnostics have a level and a text in it."""
+        """Let the hexapod rest on until diagnostics have a level and a text in it."""
         def reported() -> bool:
             self.rest(load)
             status = self.node.status(STATUS)
@@ -118,7 +118,7 @@ def begin(fresh: Start) -> Callable[..., Felt]:
 
 @pytest.fixture
 def felt(begin: Callable[..., Felt]) -> Iterator[Felt]:
-    """Return a node of which nothing is asked but this; it must be at work afterwards."""
+    """Return a node for this alone; it must be at work afterwards."""
     each = begin('external_wrench.cutoff:=1000.0')
     yield each
     assert np.all(np.isfinite(values(each.received())))
@@ -133,7 +133,7 @@ def values(messages: list[WrenchStamped]) -> Any:
 
 
 def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> None:
-    """Of a machine in motion, measured with noise at irregular times."""
+    """Of a hexapod in motion, measured with noise at irregular times."""
     felt = begin()
     random = rng(11)
     stamps = times(random, 300)
@@ -141,10 +141,10 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
     data = [message_of(Measurement(each.stamp, six(each.lengths + 1e-5 * random.normal(size=6)),
                                    six(each.rates + 1e-4 * random.normal(size=6)),
                                    six(each.forces + 5.0 * random.normal(size=6))))
-            for each in measured(MACHINE, motion, LOAD, stamps)]
+            for each in measured(HEXAPOD, motion, LOAD, stamps)]
     rejected: list[object] = []
-    messages = OutputMessages(MACHINE)
-    legs = MeasuredLegs(MACHINE, ExternalWrench(MACHINE), lambda *said: rejected.append(said),
+    messages = OutputMessages(HEXAPOD)
+    legs = MeasuredLegs(HEXAPOD, ExternalWrench(HEXAPOD), lambda *said: rejected.append(said),
                         rejected.append)
     expected = []
     for each in data:
@@ -159,7 +159,7 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
     assert felt.received()[0].header.frame_id == 'base'
     assert len(expected) == len(stamps) - 1
     felt.node.until(lambda: felt.node.values(STATUS).get('wrenches') == '299', 'it is reported')
-    # No setpoint has come, and nothing is said of the distance to one.
+    # No setpoint has come: there is no distance to one.
     assert not any('setpoint' in key for key in felt.node.values(STATUS))
 
 
@@ -198,7 +198,7 @@ def test_thresholds_are_checked_and_can_be_changed_while_it_is_active(felt: Felt
     assert any('external wrench: no overload' in line for line in log_lines(said, 'INFO'))
 
 
-def test_names_in_another_order_after_the_machine_is_connected_anew(felt: Felt) -> None:
+def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt) -> None:
     last = felt.rest()
     felt.until_answered(last := felt.rest())
     felt.disconnect()
@@ -207,7 +207,7 @@ def test_names_in_another_order_after_the_machine_is_connected_anew(felt: Felt) 
     felt.until_connected()
     names = ['gripper', *reversed(JOINTS)]
     stamps = [last + n * MILLISECOND for n in range(1, 50)]
-    for at in resting(MACHINE, AT_HOME, LOAD, stamps):
+    for at in resting(HEXAPOD, AT_HOME, LOAD, stamps):
         felt.publish(joint_state(at.stamp, names, *(
             [math.nan, *reversed(np.asarray(numbers).tolist())]
             for numbers in (at.lengths - ZERO_LENGTHS, at.rates, at.forces))))
@@ -226,11 +226,11 @@ SPOILT = {
     'out of range: numbers overflow': {'velocity': [1e308] * 6}}
 
 
-def test_measured_legs_that_are_unfit_are_rejected(felt: Felt) -> None:
+def test_invalid_measured_legs_are_rejected(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     for number, (reason, fields) in enumerate(SPOILT.items()):
-        at = resting(MACHINE, AT_HOME, LOAD, [felt.stamp + MILLISECOND])[0]
+        at = resting(HEXAPOD, AT_HOME, LOAD, [felt.stamp + MILLISECOND])[0]
         felt.publish(joint_state(at.stamp, **{
             'names': JOINTS, 'position': at.lengths - ZERO_LENGTHS, 'velocity': at.rates,
             'effort': at.forces, **fields}))
@@ -241,7 +241,7 @@ def test_measured_legs_that_are_unfit_are_rejected(felt: Felt) -> None:
             f'{reason} is counted')
 
     def told() -> bool:
-        felt.publish(message_of(resting(MACHINE, AT_HOME, LOAD, [felt.stamp])[0])[:60])
+        felt.publish(message_of(resting(HEXAPOD, AT_HOME, LOAD, [felt.stamp])[0])[:60])
         felt.rest()
         status = felt.node.status(STATUS)
         return bool(status.level == WARN) and 'measured_legs: malformed' in status.message
@@ -252,7 +252,7 @@ def test_measured_legs_that_are_unfit_are_rejected(felt: Felt) -> None:
     felt.until_status(OK, 'no overload')
 
 
-def test_stamps_of_measured_legs_that_are_none_or_late_are_rejected(felt: Felt) -> None:
+def test_measured_legs_without_a_stamp_or_late_are_rejected(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     many = len(felt.raw)
@@ -272,7 +272,7 @@ def test_stamps_of_measured_legs_that_are_none_or_late_are_rejected(felt: Felt) 
                for line in log_lines(felt.node.program.stderr, 'WARN'))
 
 
-def test_measured_legs_that_fall_silent_or_come_too_seldom_are_told(felt: Felt) -> None:
+def test_measured_legs_that_stop_or_are_too_far_apart_are_reported(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     felt.node.until_status(STATUS, STALE, 'no wrench: measured_legs silent for ')
@@ -289,7 +289,7 @@ def test_measured_legs_that_fall_silent_or_come_too_seldom_are_told(felt: Felt) 
     felt.until_status(OK, 'no overload')
 
 
-def test_measured_legs_do_not_outlive_a_deactivation(felt: Felt) -> None:
+def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
     felt.rest()
     felt.until_answered(felt.rest())
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
@@ -336,7 +336,7 @@ def _step(simulator: Simulator) -> int:
     """Command the forces of the present moment and return the next one's stamp."""
     state = simulator.last()
     stamp = nanoseconds(state.header.stamp)
-    wanted = StewartPlatform(MACHINE).inverse_dynamics(swing((stamp - 10 ** 9) * 1e-9))
+    wanted = StewartPlatform(HEXAPOD).inverse_dynamics(swing((stamp - 10 ** 9) * 1e-9))
     return simulator.step(
         wanted.forces + 61.0 * 900.0 * (wanted.lengths - ZERO_LENGTHS - state.position)
         + 61.0 * 42.0 * (wanted.rates - state.velocity))

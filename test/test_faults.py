@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Every fault in docs/faults.md, done to the real node: over topics, by signals, in its files."""
+"""Every fault in docs/faults.md, on the real node: over topics, by signals, in its files."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ SPECIAL = (math.nan, math.inf, -math.inf)
 
 @pytest.fixture
 def at_work(node: DynamicsNode) -> Iterator[DynamicsNode]:
-    """Return the module's node, as good as new and active."""
+    """Return the module's node, newly configured and active."""
     yield node
     node.at_work()
 
@@ -90,10 +90,10 @@ def _started(start: Start) -> Iterator[Start]:
         each.at_work()
 
 
-# Numbers that are none
+# Invalid numbers
 
 def _spoilt(numbers: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
-    """Yield the numbers with one of them spoilt, each in each way."""
+    """Yield the numbers with one of them invalid, each in each way."""
     for n in range(len(numbers)):
         for value in SPECIAL:
             yield (*numbers[:n], value, *numbers[n + 1:])
@@ -140,7 +140,7 @@ def test_nan_and_infinity_in_each_field_of_one_message_are_rejected(renew: Start
     (0.0,) * 4, (0.0, 0.0, 0.0, 1.0011), (0.0, 0.0, 0.0, 0.9989), (0.0, 0.0, 0.0, 2.0),
     (5e-324,) * 4, (1e200,) * 4, (1.7e308,) * 4,
 ], ids=str)
-def test_a_quaternion_that_is_no_rotation_is_rejected(
+def test_a_quaternion_not_of_unit_length_is_rejected(
         at_work: DynamicsNode, quaternion: tuple[float, ...]) -> None:
     node = at_work
     node.send(MOVING._replace(quaternion=quaternion))
@@ -199,7 +199,7 @@ def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: Dynam
 
 
 @pytest.mark.parametrize('topic', SEPARATE)
-def test_a_stamp_of_the_far_future_on_one_topic_holds_up_nothing(
+def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(
         at_work: DynamicsNode, topic: str) -> None:
     node = at_work
     far = node.stamp(0) + 4 * 10**17  # 12 years
@@ -268,7 +268,7 @@ def test_simulated_time_stands_still_and_jumps(begin: Start) -> None:
         clock.publish(message)
         for _ in range(3):  # it stands still
             answer_at(now * 10**9)
-    # Diagnostics do not need the clock: a topic is silent, and they say so.
+    # Diagnostics do not need the clock: they report that a topic is silent.
     node.until_status('setpoints', STALE, 'silent for ')
     node.answer(MOVING)
     message.clock.sec = 1
@@ -284,7 +284,7 @@ def test_a_time_before_zero_on_clock_is_not_followed(begin: Start) -> None:
     message.clock.sec = -5
 
     def said() -> bool:
-        clock.publish(message)  # best effort: the node may not have heard the first
+        clock.publish(message)  # best effort: the node may have missed the first
         return '/clock: -5 s: not followed' in node.program.stderr
 
     node.until(said, 'it is said')
@@ -356,7 +356,7 @@ def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -
                           if key.startswith('rejected, ')})
     passed = node.expected[f'rejected, setpoint: {DROPPED}']
     incomplete = node.expected[f'rejected, setpoint/pose: {NOT_JOINED}']
-    # What the middleware drops of more than a thousand on one topic, nobody can count.
+    # What the middleware drops of more than a thousand on one topic, is not counted.
     assert len(answered) + passed + incomplete <= len(stamps)
     assert 'more came at once than can be answered' in node.program.stderr
 
@@ -396,10 +396,10 @@ def test_at_the_end_the_last_of_a_series_is_logged(start: Start) -> None:
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def test_best_effort_publishers_are_heard_where_qos_overrides_ask_for_it(begin: Start) -> None:
+def test_best_effort_publishers_are_received_with_qos_overrides(begin: Start) -> None:
     node = begin(*(f'qos_overrides.{NODE}/{topic}.subscription.reliability:=best_effort'
                    for topic in SEPARATE))
-    # Reliable ones are heard as well.
+    # Reliable ones are received as well.
     node.answer(MOVING)
     best_effort = {topic: node.peer.writer(f'{NODE}/{topic}', type(message), BEST_EFFORT)
                    for topic, message in MOVING.messages(0).items()}
@@ -427,11 +427,11 @@ def test_an_incompatible_quality_of_service_is_named(at_work: DynamicsNode) -> N
     node.peer.node.destroy_publisher(deaf)
 
 
-def test_two_publishers_on_one_topic_are_told(at_work: DynamicsNode) -> None:
+def test_two_publishers_on_one_topic_are_reported(at_work: DynamicsNode) -> None:
     node = at_work
     second = node.peer.writer(f'{NODE}/setpoint/pose', PoseStamped)
     node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
-    # Both are heard: which of them is right the node cannot know.
+    # Both are received: the node cannot know which of them is right.
     node.answer(MOVING)
     stamp = node.stamp()
     node.asked[stamp] += 1
@@ -445,7 +445,7 @@ def test_two_publishers_on_one_topic_are_told(at_work: DynamicsNode) -> None:
     node.until(lambda: node.status('setpoints').level != ERROR, 'one writer is left')
 
 
-def test_a_second_node_of_the_same_name_is_told(at_work: DynamicsNode) -> None:
+def test_a_second_node_of_the_same_name_is_reported(at_work: DynamicsNode) -> None:
     node = at_work
     second = Peer(node.domain, 'stewart_dynamics')
     try:
@@ -456,7 +456,7 @@ def test_a_second_node_of_the_same_name_is_told(at_work: DynamicsNode) -> None:
     node.until(lambda: node.status('setpoints').level != ERROR, 'it is alone')
 
 
-# How long others take a participant for living that says nothing any more; 20 s by default.
+# How long a silent participant counts as alive for others; 20 s by default.
 BRIEF = """\
 <?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
@@ -469,20 +469,20 @@ BRIEF = """\
 
 
 def _brief(folder: Path) -> dict[str, str]:
-    """Return the environment of a process that is soon forgotten when it is killed."""
+    """Return the environment of a process that others soon remove when it is killed."""
     profile = folder / 'brief.xml'
     profile.write_text(BRIEF, encoding='utf-8')
     return {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile)}
 
 
-def test_a_publisher_that_is_killed_and_started_again_is_heard(
+def test_a_publisher_that_is_killed_and_started_again_is_received(
         at_work: DynamicsNode, tmp_path: Path) -> None:
     node = at_work
     killed = Feeder(node, tmp_path / 'killed', 100, **_brief(tmp_path))
     killed.begin()
     _until_answered(node, killed)
     killed.kill()
-    # Whether the node knows already that the first is gone or not.
+    # Whether the node has already removed the first or not.
     again = Feeder(node, tmp_path / 'again', 100)
     again.begin(heard=False)
     _until_answered(node, again)
@@ -519,7 +519,7 @@ def _expect_what_was_cut_off(node: DynamicsNode) -> None:
     node.expected = counted
 
 
-def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_forgotten(
+def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_removed(
         renew: Start, tmp_path: Path) -> None:
     node = renew('setpoint.exclusive:=true')
     node.answer(MOVING)
@@ -535,7 +535,7 @@ def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_forgotte
 
 # The node itself
 
-def test_a_killed_node_is_soon_back_at_work(start: Start, tmp_path: Path) -> None:
+def test_a_killed_node_answers_again_after_a_restart(start: Start, tmp_path: Path) -> None:
     killed = start(NUMBA_DEBUG_CACHE='1')
     killed.until_active()
     feeder = Feeder(killed, tmp_path, 100)
@@ -592,7 +592,7 @@ def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
 
 
 @pytest.mark.parametrize('configured', [False, True], ids=['unconfigured', 'inactive'])
-def test_it_is_shut_down_from_where_it_has_not_begun(start: Start, configured: bool) -> None:
+def test_it_is_shut_down_from_unconfigured(start: Start, configured: bool) -> None:
     node = start('autostart:=false')
     node.until_said('unconfigured: autostart is false')
     shutdown = Transition.TRANSITION_UNCONFIGURED_SHUTDOWN
@@ -601,7 +601,7 @@ def test_it_is_shut_down_from_where_it_has_not_begun(start: Start, configured: b
         shutdown = Transition.TRANSITION_INACTIVE_SHUTDOWN
     assert node.change(shutdown)
     assert node.state == 'finalized'
-    # There is no way back, and it says so.
+    # There is no way back, and it is logged.
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE, shutdown):
         assert not node.change(transition)
     assert 'transition rejected: ' in node.program.stderr
@@ -637,7 +637,7 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> 
     assert {bits(state.effort) for state in node.received('leg_states')[before:]} == either
 
 
-def test_a_killed_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+def test_a_killed_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
     node = at_work
     controller = Program([sys.executable, FEEDER], node.domain, tmp_path / 'controller',
                          **_brief(tmp_path))
@@ -654,8 +654,8 @@ def test_a_killed_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Pa
     node.until(lambda: node.peer.node.count_subscribers(forces) == 1, 'it is forgotten')
 
 
-def test_a_stopped_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
-    """A viewer that hangs takes neither forces nor pictures; the node does not wait for it."""
+def test_a_stopped_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
+    """A viewer that hangs reads neither forces nor markers; the node does not wait for it."""
     node = at_work
     viewer = Program([sys.executable, FEEDER], node.domain, tmp_path / 'viewer')
     markers = f'{NODE}/markers'
@@ -678,13 +678,13 @@ def test_a_stopped_listener_costs_no_setpoint(at_work: DynamicsNode, tmp_path: P
 # Singularities
 
 def _turned(degrees: float, rate: float = 0.0) -> Sample:
-    """Return a pose turned about the vertical; at 90 degrees the machine is singular."""
+    """Return a pose turned about the vertical; at 90 degrees the hexapod is singular."""
     half = math.radians(degrees) / 2.0
     return Sample((0.0, 0.0, 1.1), (0.0, 0.0, math.sin(half), math.cos(half)),
                   (0.0,) * 5 + (rate,))
 
 
-def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> None:
+def test_a_singularity_between_two_samples_is_reported(at_work: DynamicsNode) -> None:
     node = at_work
     node.answer()
     node.until(lambda: node.warning is False, 'no warning is on')
@@ -715,7 +715,7 @@ def test_a_singularity_between_two_samples_is_noticed(at_work: DynamicsNode) -> 
         node.program.stderr, 'ERROR')) == said + 2
 
 
-def test_no_forces_go_out_through_a_singularity_where_they_are_suppressed(
+def test_no_forces_are_published_through_a_singularity_where_they_are_suppressed(
         at_work: DynamicsNode) -> None:
     node = at_work
     assert node.set_parameters(singularity__action='suppress_forces').successful
@@ -730,7 +730,7 @@ def test_no_forces_go_out_through_a_singularity_where_they_are_suppressed(
     node.answer()
 
 
-def test_a_machine_that_is_singular_at_home_starts_and_gives_no_forces(
+def test_a_hexapod_that_is_singular_at_home_starts_and_gives_no_forces(
         start: Start, tmp_path: Path) -> None:
     # Similar hexagons: whatever the pose, the legs cannot hold a turn about the vertical.
     angles = np.radians([0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
@@ -775,7 +775,7 @@ def test_both_services_reject_a_bad_parameter(
     assert reason in answer.reason
 
 
-NO_MACHINE = [
+IMPOSSIBLE = [
     ('legs.cylinder.mass', '-12.0', '-12.0 kg: must be at least 0'),
     ('legs.piston.mass', '[6.0, 6.0, 6.0, -6.0, 6.0, 6.0]', ''),
     ('platform.mass', 'heavy', ''),
@@ -787,13 +787,13 @@ NO_MACHINE = [
 ]
 
 
-def test_legs_and_inertias_that_no_machine_has_are_rejected(domain: int, tmp_path: Path) -> None:
+def test_impossible_legs_and_inertias_are_rejected(domain: int, tmp_path: Path) -> None:
     given = Parameters.from_yaml(PLATFORM).given
-    for name, value, reason in NO_MACHINE:
+    for name, value, reason in IMPOSSIBLE:
         with pytest.raises(ParameterError, match=f'^command line: {name}: .*{re.escape(reason)}'):
             Parameters({**given, name: yaml.safe_load(value)}, 'command line')
     for n in (0, -1):
-        name, value, reason = NO_MACHINE[n]
+        name, value, reason = IMPOSSIBLE[n]
         line = rejected(domain, tmp_path / str(n), '--params-file', PLATFORM, '-p',
                         f'{name}:={value}')
         assert line.startswith('stewart_dynamics: ')
@@ -801,7 +801,7 @@ def test_legs_and_inertias_that_no_machine_has_are_rejected(domain: int, tmp_pat
         assert reason in line
 
 
-# Says why each file is rejected, and the most memory [kB] after the first and after all.
+# Prints why each file is rejected, and the most memory [kB] after the first and after all.
 MEASURED = """\
 import sys
 from stewart_dynamics import ParameterError, Parameters
@@ -834,7 +834,7 @@ HOSTILE = {
 }
 
 
-def test_a_hostile_parameter_file_is_rejected_with_little_time_and_memory(
+def test_a_hostile_parameter_file_is_rejected_in_little_time_and_memory(
         domain: int, tmp_path: Path) -> None:
     files = []
     for n, (content, _) in enumerate(HOSTILE.values()):
@@ -891,7 +891,7 @@ UNFIT = {
 }
 
 
-def test_a_trajectory_that_is_unfit_is_rejected_as_a_whole(renew: Start) -> None:
+def test_an_invalid_trajectory_is_rejected_as_a_whole(renew: Start) -> None:
     node = renew('singularity.stop_condition:=1.0e+9', 'limits.force_max:=1.0e+9',
                  'limits.velocity_max:=100.0', 'limits.length_max:=3.0')
     planner = Planner(node)
@@ -920,7 +920,7 @@ def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> 
                'they are counted')
 
 
-def test_a_trajectory_in_work_is_dropped_with_the_node(renew: Start) -> None:
+def test_a_trajectory_in_work_is_dropped_when_the_node_ends(renew: Start) -> None:
     node = renew()
     planner = Planner(node)
     planner.fill()

@@ -69,7 +69,7 @@ def test_every_fault_has_a_test_and_every_test_of_faults_a_row() -> None:
 
 
 @pytest.mark.parametrize('row', rows(), ids=lambda row: row[0])
-def test_the_test_asks_for_the_words_on_the_page(row: list[str]) -> None:
+def test_the_test_requires_the_words_on_the_page(row: list[str]) -> None:
     texts = []
     for test in re.findall(r'`(\w+)`', row[4]):
         tests, constants = next(module for module in TESTS.values() if test in module[0])

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Leg forces split by cause: they sum to the whole, and each is what its own formula says."""
+"""Force breakdown by source: the parts sum to the forces, and each equals its own formula."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ GRAVITY, PLATFORM, LEGS, VELOCITY, FRICTION, WRENCH = range(6)
 
 
 def split(p: Parameters, motion: Motion, wrench: Array) -> Array:
-    """Return the forces by cause of a batch."""
+    """Return the forces by source of a batch."""
     return ForceBreakdownRows(p)(motion.rows, wrench)
 
 
 def off(value: Array, truth: Array, forces: Array) -> float:
-    """Return the largest error in any sample, by the largest force that any cause has there."""
+    """Return the largest error in any sample, by the largest force of any source there."""
     return float(np.max(np.abs(value - truth).max(axis=1) / np.abs(forces).max(axis=(1, 2))))
 
 
@@ -65,9 +65,9 @@ def platform_load(p: Parameters, motion: Motion) -> Array:
     return np.concatenate([force, moment], axis=1)
 
 
-@pytest.mark.parametrize('machine', range(25))
-def test_each_cause_is_what_the_matrices_of_the_reference_say(machine: int) -> None:
-    random = rng(machine)
+@pytest.mark.parametrize('hexapod', range(25))
+def test_each_source_equals_that_of_the_reference_matrices(hexapod: int) -> None:
+    random = rng(hexapod)
     p = random_parameters(random)
     motion = random_motion(p, random, MANY)
     wrench = random_wrench(p, random, MANY)
@@ -86,14 +86,14 @@ def test_each_cause_is_what_the_matrices_of_the_reference_say(machine: int) -> N
         LEGS: solved(p, motion, inertia - of_platform),
         VELOCITY: solved(p, motion, velocity), FRICTION: friction(p, rates),
         WRENCH: -solved(p, motion, wrench)}
-    for cause, truth in truths.items():
-        assert np.abs(truth).max() > 1.0, SOURCES[cause]
-        assert off(forces[:, cause], truth, forces) < 1e-11, SOURCES[cause]
+    for source, truth in truths.items():
+        assert np.abs(truth).max() > 1.0, SOURCES[source]
+        assert off(forces[:, source], truth, forces) < 1e-11, SOURCES[source]
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
 @given(st.integers(0, 10 ** 6), st.integers(1, 100), st.booleans())
-def test_the_causes_sum_to_the_force(seed: int, many: int, loaded: bool) -> None:
+def test_the_breakdown_sum_to_the_force(seed: int, many: int, loaded: bool) -> None:
     random = rng(seed)
     p = random_parameters(random)
     motion = random_motion(p, random, many)
@@ -110,16 +110,16 @@ def test_many_are_split_as_each_alone() -> None:
     motion = random_motion(p, random, 2500)
     wrench = random_wrench(p, random, 2500)
     forces = split(p, motion, wrench)
-    causes = ForceBreakdownRows(p)
+    breakdown = ForceBreakdownRows(p)
     for n in (0, 1023, 1024, 1025, 2499):
-        alone = causes(motion.rows[n:n + 1], wrench[n:n + 1])
+        alone = breakdown(motion.rows[n:n + 1], wrench[n:n + 1])
         np.testing.assert_array_equal(forces[n], alone[0])
     same = np.repeat(wrench[:1], 2500, axis=0)
     np.testing.assert_array_equal(split(p, motion, wrench[:1]), split(p, motion, same))
 
 
 def near_a_singularity(turn: float, p: Parameters) -> Motion:
-    """Return the symmetric machine turned towards a quarter, where J_inv cannot be solved."""
+    """Return the symmetric hexapod turned towards a quarter, where J_inv cannot be solved."""
     c, s = np.cos(turn), np.sin(turn)
     return Motion([[0.0, 0.0, size_of(p)]], [[[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]],
                   [[0.1, 0.2, 0.3]], [[0.1, 0.2, 0.3]], [[1.0, 2.0, 3.0]], [[1.0, 2.0, 3.0]])
@@ -145,7 +145,7 @@ def test_no_force_is_split_where_there_is_none() -> None:
     assert np.isnan(forces[1]).all()
 
 
-def test_what_is_not_there_causes_nothing() -> None:
+def test_what_is_not_there_breakdown_nothing() -> None:
     random = rng()
     p = random_parameters(random)
     still = Motion([[0.0, 0.0, size_of(p)]], np.eye(3))
@@ -153,11 +153,11 @@ def test_what_is_not_there_causes_nothing() -> None:
     assert np.abs(forces[0, GRAVITY]).min() > 0.0
     assert not forces[0, 1:].any()
     motion = random_motion(p, random, MANY)
-    machine = p.replaced({'gravity': [0.0, 0.0, 0.0], 'actuator.viscous_friction': 0.0,
+    hexapod = p.replaced({'gravity': [0.0, 0.0, 0.0], 'actuator.viscous_friction': 0.0,
                           'actuator.coulomb_friction': 0.0, 'actuator.reflected_mass': 0.0,
                           **{f'legs.{part}.{what}': 0.0 for part in ('cylinder', 'piston')
                              for what in ('mass', 'inertia')}})
-    forces = split(machine, motion, np.zeros((MANY, 6)))
+    forces = split(hexapod, motion, np.zeros((MANY, 6)))
     assert not forces[:, [GRAVITY, FRICTION, WRENCH]].any()
     assert np.abs(forces[:, LEGS]).max() < 1e-12 * np.abs(forces[:, PLATFORM]).max()
 

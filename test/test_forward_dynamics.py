@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Forward dynamics: the way back from the forces, by identities and by independent physics."""
+"""Forward dynamics: identities with the inverse dynamics, and independent physics."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit() -> None:
     (np.zeros((4, 6)), None, 'motion (3,), forces (4,)'),
     (np.zeros(6), np.zeros(5), 'wrench: shape (5,)'),
     ([1e308] * 6, None, 'overflow')])
-def test_what_does_not_fit_is_refused(forces: Any, wrench: Any, text: str) -> None:
+def test_arguments_of_wrong_shape_are_rejected(forces: Any, wrench: Any, text: str) -> None:
     p = random_parameters(rng())
     with pytest.raises(MotionError) as error:
         StewartPlatform(p).forward_dynamics(random_motion(p, rng(), 3), forces, wrench)
@@ -166,10 +166,10 @@ def test_what_does_not_fit_is_refused(forces: Any, wrench: Any, text: str) -> No
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     p = random_parameters(rng())
     rows, forces = random_motion(p, rng(), 10).rows, np.arange(60.0).reshape(10, 6)
-    machine, wrench = StewartPlatform(p).constants, random_wrench(p, rng(), 10)
-    given = {'machine': machine, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench}
+    hexapod, wrench = StewartPlatform(p).constants, random_wrench(p, rng(), 10)
+    given = {'hexapod': hexapod, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench}
     plain = uncompiled(
         'from stewart_dynamics.mechanics.forward_dynamics import solve\n'
-        "solve(given['machine'], given['rows'], given['forces'], given['wrench'])\n", given)
-    forward_dynamics.solve(machine, rows, forces, wrench)
+        "solve(given['hexapod'], given['rows'], given['forces'], given['wrench'])\n", given)
+    forward_dynamics.solve(hexapod, rows, forces, wrench)
     assert np.array_equal(plain['rows'], rows)

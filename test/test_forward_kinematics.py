@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Forward kinematics: the pose comes back from its lengths, and no other pose ever does."""
+"""Forward kinematics: it returns the pose of the lengths, and never another assembly."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ AT_HOME = Pose(HOME, np.eye(3))
 
 
 @pytest.fixture(scope='module')
-def machine() -> StewartPlatform:
-    """Return the machine in config/."""
+def hexapod() -> StewartPlatform:
+    """Return the hexapod in config/."""
     return StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
 
 
@@ -63,7 +63,7 @@ def away(pose: Any, random: np.random.Generator, distance: float, angle: float) 
 
 
 def legal_poses(p: Parameters, random: np.random.Generator, many: int) -> Pose:
-    """Return poses all over the workspace: all lengths legal, turned by 20, 20, 30 deg at most."""
+    """Return poses of the whole workspace: lengths within limits, angles up to 20, 20, 30 deg."""
     position = np.array(HOME) + random.uniform(-0.6, 0.6, (20 * many, 3))
     rotation = from_euler(random.uniform(-1.0, 1.0, (20 * many, 3)) * np.radians([20, 20, 30]))
     lengths = independent_lengths(p, position, rotation)
@@ -74,7 +74,7 @@ def legal_poses(p: Parameters, random: np.random.Generator, many: int) -> Pose:
 
 
 @pytest.mark.parametrize('seed', range(50))
-def test_a_pose_comes_back_from_its_lengths_and_a_twist_from_its_rates(seed: int) -> None:
+def test_the_pose_is_found_from_lengths_and_the_twist_from_rates(seed: int) -> None:
     random = rng(seed)
     p = random_parameters(random)
     platform = StewartPlatform(p)
@@ -93,48 +93,48 @@ def test_a_pose_comes_back_from_its_lengths_and_a_twist_from_its_rates(seed: int
 
 
 def test_from_far_it_takes_six_steps_at_most_and_never_ends_at_another_pose(
-        machine: StewartPlatform) -> None:
-    p, random, many = machine.parameters, rng(), 100_000
+        hexapod: StewartPlatform) -> None:
+    p, random, many = hexapod.parameters, rng(), 100_000
     poses = legal_poses(p, random, many)
     guess = away(poses, random, 0.2 * HOME[2], 0.2)
     lengths = independent_lengths(p, poses.position, poses.rotation)
     rows = Motion.from_pose(guess).rows.copy()
     codes, steps, residuals = (np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64),
                                np.empty(many))
-    forward_kinematics.poses(machine.constants, lengths, rows, codes, steps, residuals)
+    forward_kinematics.poses(hexapod.constants, lengths, rows, codes, steps, residuals)
     found = codes == FOUND
     assert np.mean(found & (steps <= 6)) > 0.999
     assert np.max(residuals[found]) <= RESIDUAL
     assert np.max(np.abs(independent_lengths(
         p, rows[found, :3], rows[found, 3:12].reshape(-1, 3, 3)) - lengths[found])) <= RESIDUAL
-    # A guess that lies itself beyond a singularity finds what assembly there is, if any.
-    same_side = (np.sign(np.linalg.det(machine.inverse_jacobian(poses)))
-                 == np.sign(np.linalg.det(machine.inverse_jacobian(guess))))
+    # A guess on the other side of a singularity gives an assembly of that side, if any.
+    same_side = (np.sign(np.linalg.det(hexapod.inverse_jacobian(poses)))
+                 == np.sign(np.linalg.det(hexapod.inverse_jacobian(guess))))
     assert 0.999 < np.mean(same_side) < 1.0
     assert np.all(found[same_side])
     assert np.max(np.abs(rows[same_side, :12] - poses.rows[same_side])) < 1e-10
-    # What is not found is left as it was guessed.
+    # Where no pose is found the guess is unchanged.
     assert np.array_equal(rows[~found], Motion.from_pose(guess).rows[~found])
 
 
-def test_the_assembly_of_the_guess_is_kept(machine: StewartPlatform) -> None:
-    # Base and platform joints of this machine lie in planes: mirrored in the base's, the pose
+def test_the_assembly_of_the_guess_is_kept(hexapod: StewartPlatform) -> None:
+    # Base and platform joints of this hexapod lie in planes: mirrored in the base's, the pose
     # has the same lengths, and its det(J) the other sign.
     position, rotation = np.array([0.1, -0.05, 1.15]), from_euler([0.1, -0.2, 0.3])
     mirror = np.diag([1.0, 1.0, -1.0])
     below = Pose(mirror @ position, mirror @ rotation @ mirror)
-    lengths = machine.inverse_kinematics(Pose(position, rotation))
-    assert np.allclose(machine.inverse_kinematics(below), lengths, atol=1e-15)
+    lengths = hexapod.inverse_kinematics(Pose(position, rotation))
+    assert np.allclose(hexapod.inverse_kinematics(below), lengths, atol=1e-15)
     for pose in (Pose(position, rotation), below):
         guess = Pose(pose.position + [0.05, 0.05, -0.08],
                      pose.rotation @ from_euler([0.1, 0.0, 0.1]))
-        found = machine.forward_kinematics(lengths, guess)
+        found = hexapod.forward_kinematics(lengths, guess)
         assert np.max(np.abs(found.position - pose.position)) < 1e-13
         assert np.max(np.abs(found.rotation - pose.rotation)) < 1e-13
 
 
-def test_it_does_not_go_through_a_singularity() -> None:
-    # Turned by 90 degrees about its axis this machine is singular, and there the squares of the
+def test_the_search_does_not_cross_a_singularity() -> None:
+    # Turned by 90 degrees about its axis this hexapod is singular, and there the squares of the
     # lengths of even and odd legs differ most.
     platform = StewartPlatform(symmetric_parameters())
 
@@ -156,7 +156,7 @@ def test_it_does_not_go_through_a_singularity() -> None:
             platform.forward_kinematics(beyond, turned(guess))
 
 
-def test_a_singular_guess_is_refused() -> None:
+def test_a_singular_guess_is_rejected() -> None:
     platform = StewartPlatform(symmetric_parameters())
     lengths = platform.inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
     singular = Pose([0.0, 0.0, 1.0], QUARTER_TURN)
@@ -169,60 +169,60 @@ def test_a_singular_guess_is_refused() -> None:
 @pytest.mark.parametrize('lengths', [
     [9.0, 1.0, 1.0, 1.0, 1.0, 1.0],  # two neighbouring legs cannot differ by more than a triangle
     [0.0] * 6, [-1.2] * 6, [1e-300] * 6, [1e200] * 6, [5.0, 0.1, 5.0, 0.1, 5.0, 0.1]])
-def test_lengths_that_belong_to_no_pose_are_an_error(
-        machine: StewartPlatform, lengths: Any) -> None:
+def test_lengths_without_a_pose_are_an_error(
+        hexapod: StewartPlatform, lengths: Any) -> None:
     with pytest.raises(PoseError, match='sample 0: lengths'):
-        machine.forward_kinematics(lengths, AT_HOME)
+        hexapod.forward_kinematics(lengths, AT_HOME)
 
 
-def test_of_many_lengths_those_of_no_pose_are_named(machine: StewartPlatform) -> None:
-    lengths = machine.inverse_kinematics(AT_HOME)
+def test_of_many_lengths_those_without_a_pose_are_named(hexapod: StewartPlatform) -> None:
+    lengths = hexapod.inverse_kinematics(AT_HOME)
     with pytest.raises(PoseError) as error:
-        machine.forward_kinematics(
+        hexapod.forward_kinematics(
             [lengths, lengths + [0.9, -0.3, 0.0, 0.0, 0.0, 0.0]], AT_HOME)
     assert str(error.value).startswith('sample 1: lengths [')
     assert str(error.value).endswith('iterations, must be at most 1e-12')
     assert 'm: did not converge: residual ' in str(error.value)
 
 
-def test_following_a_motion_from_pose_to_pose_does_not_drift(machine: StewartPlatform) -> None:
+def test_following_a_motion_from_pose_to_pose_does_not_drift(hexapod: StewartPlatform) -> None:
     times = np.linspace(0.0, 20.0, 20_000)[:, None]
     motion = Motion.from_euler(
         HOME + 0.1 * np.sin(times * [1.0, 1.3, 1.7]), 0.2 * np.sin(times * [1.1, 0.7, 0.9]))
-    lengths = independent_lengths(machine.parameters, motion.position, motion.rotation)
+    lengths = independent_lengths(hexapod.parameters, motion.position, motion.rotation)
     row = motion.rows[:1].copy()
     code, steps, residual = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64), np.empty(1)
     for n in range(len(times)):
-        forward_kinematics.poses(machine.constants, lengths[n:n + 1], row, code, steps, residual)
+        forward_kinematics.poses(hexapod.constants, lengths[n:n + 1], row, code, steps, residual)
         assert code[0] == FOUND
         assert steps[0] <= 3
         assert np.max(np.abs(row[0, :12] - motion.rows[n, :12])) < 2e-14
 
 
-def test_a_guess_is_a_motion_or_a_pose(machine: StewartPlatform) -> None:
+def test_a_guess_is_a_motion_or_a_pose(hexapod: StewartPlatform) -> None:
     truth = Pose(np.array([0.1, 0.0, 1.2]), from_euler([0.1, 0.0, -0.1]))
-    lengths = machine.inverse_kinematics(truth)
-    found = [machine.forward_kinematics(lengths, each) for each in (
+    lengths = hexapod.inverse_kinematics(truth)
+    found = [hexapod.forward_kinematics(lengths, each) for each in (
         AT_HOME, Motion.from_pose(AT_HOME, [1.0, 2.0, 3.0]))]
     for pose in found:
         assert np.array_equal(pose.position, found[0].position)
         assert np.max(np.abs(pose.rotation - truth.rotation)) < 1e-14
-    assert np.max(np.abs(machine.forward_kinematics(lengths, found[0]).position
+    assert np.max(np.abs(hexapod.forward_kinematics(lengths, found[0]).position
                          - truth.position)) < 1e-15
 
 
-def test_leading_shapes_broadcast(machine: StewartPlatform) -> None:
-    poses = legal_poses(machine.parameters, rng(), 12)
-    lengths = machine.inverse_kinematics(poses)
-    one_by_one = [machine.forward_kinematics(each, AT_HOME) for each in lengths]
-    shaped = machine.forward_kinematics(lengths.reshape(3, 4, 6), AT_HOME)
+def test_leading_shapes_broadcast(hexapod: StewartPlatform) -> None:
+    poses = legal_poses(hexapod.parameters, rng(), 12)
+    lengths = hexapod.inverse_kinematics(poses)
+    one_by_one = [hexapod.forward_kinematics(each, AT_HOME) for each in lengths]
+    shaped = hexapod.forward_kinematics(lengths.reshape(3, 4, 6), AT_HOME)
     assert shaped.position.shape == (3, 4, 3)
     assert shaped.rotation.shape == (3, 4, 3, 3)
     assert np.array_equal(shaped.position.reshape(12, 3), [each.position for each in one_by_one])
     guesses = Pose(np.tile(HOME, (12, 1)), np.eye(3))
-    assert machine.forward_kinematics(lengths[0], guesses).position.shape == (12, 3)
-    assert machine.twist(shaped, np.ones(6)).shape == (3, 4, 6)
-    assert machine.twist(AT_HOME, np.ones((5, 6))).shape == (5, 6)
+    assert hexapod.forward_kinematics(lengths[0], guesses).position.shape == (12, 3)
+    assert hexapod.twist(shaped, np.ones(6)).shape == (3, 4, 6)
+    assert hexapod.twist(AT_HOME, np.ones((5, 6))).shape == (5, 6)
     if COMPILED:
         assert len(forward_kinematics.poses.signatures) == 1
         assert len(forward_kinematics.twists.signatures) == 1
@@ -233,17 +233,17 @@ def test_leading_shapes_broadcast(machine: StewartPlatform) -> None:
     ([np.nan] * 6, AT_HOME, 'lengths[0]: nan'),
     (np.ones(6), (HOME, np.eye(3)), 'guess: a value of type tuple: must be a Pose or a Motion'),
     (np.ones((2, 6)), Pose([HOME] * 3, np.eye(3)), 'lengths (2,), guess (3,)')])
-def test_what_does_not_fit_is_refused(
-        machine: StewartPlatform, lengths: Any, guess: Any, text: str) -> None:
+def test_arguments_of_wrong_shape_are_rejected(
+        hexapod: StewartPlatform, lengths: Any, guess: Any, text: str) -> None:
     with pytest.raises(MotionError) as error:
-        machine.forward_kinematics(lengths, guess)
+        hexapod.forward_kinematics(lengths, guess)
     assert text in str(error.value)
 
 
 @pytest.mark.parametrize('rates', [np.ones(5), [np.inf] * 6, np.ones((3, 6))])
-def test_rates_that_do_not_fit_are_refused(machine: StewartPlatform, rates: Any) -> None:
+def test_rates_that_do_not_fit_are_rejected(hexapod: StewartPlatform, rates: Any) -> None:
     with pytest.raises(MotionError, match='rates'):
-        machine.twist(Pose([HOME] * 2, np.eye(3)), rates)
+        hexapod.twist(Pose([HOME] * 2, np.eye(3)), rates)
 
 
 def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
@@ -272,9 +272,9 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
         assert np.array_equal(plain[name], value), name
 
 
-def test_the_lengths_found_are_those_of_the_readable_reference(machine: StewartPlatform) -> None:
-    poses = legal_poses(machine.parameters, rng(), 200)
-    lengths = lagrange.legs(machine.parameters, poses.position, poses.rotation).lengths
-    found = machine.forward_kinematics(lengths, AT_HOME)
-    again = lagrange.legs(machine.parameters, found.position, found.rotation).lengths
+def test_the_lengths_found_are_those_of_the_readable_reference(hexapod: StewartPlatform) -> None:
+    poses = legal_poses(hexapod.parameters, rng(), 200)
+    lengths = lagrange.legs(hexapod.parameters, poses.position, poses.rotation).lengths
+    found = hexapod.forward_kinematics(lengths, AT_HOME)
+    again = lagrange.legs(hexapod.parameters, found.position, found.rotation).lengths
     assert np.max(np.abs(again - lengths)) < RESIDUAL

@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
-MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
+HEXAPOD, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
 # What is run, and what it prints: the last by itself, with the node.
 *PARTS, WITH_NODE = re.findall(r'```python\n(.*?)```\n```text\n(.*?)```', PAGE, flags=re.DOTALL)
 
@@ -42,8 +42,8 @@ MACHINE, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
 @pytest.fixture(scope='module')
 def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Run the page's program, compare what it prints, and return its names."""
-    folder = tmp_path_factory.mktemp('machine')
-    (folder / 'my_hexapod.yaml').write_text(MACHINE, encoding='utf-8')
+    folder = tmp_path_factory.mktemp('hexapod')
+    (folder / 'my_hexapod.yaml').write_text(HEXAPOD, encoding='utf-8')
     assert len(PARTS) + 1 == PAGE.count('```python') == 6
     program: dict[str, Any] = {}
     with pytest.MonkeyPatch.context() as patch:
@@ -55,7 +55,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return program
 
 
-def test_the_file_on_the_page_is_the_machine_that_is_computed(names: dict[str, Any]) -> None:
+def test_the_file_on_the_page_is_the_hexapod_that_is_computed(names: dict[str, Any]) -> None:
     assert names['platform'].parameters == names['parameters']
     assert likely_mistakes(names['parameters']) == ()
 
@@ -65,7 +65,7 @@ def test_the_node_gives_the_forces_on_the_page(
     pytest.importorskip('rclpy')
     from running import executable, log_lines, Program
     file = tmp_path / 'my_hexapod.yaml'
-    file.write_text(MACHINE, encoding='utf-8')
+    file.write_text(HEXAPOD, encoding='utf-8')
     node = Program([executable('stewart_dynamics'), '--ros-args', '--params-file', file,
                     '-p', 'setpoint.source:=pose'], domain, tmp_path / 'node')
     code, expected = WITH_NODE
@@ -100,7 +100,7 @@ def test_the_motion_on_the_page_begins_at_home_and_keeps_all_limits(
     assert result.condition_number.max() < limits['singularity.warn_condition']
 
 
-# What the node says of a mistake: the words on the page, and what is done wrong.
+# What the node reports of a mistake: the words on the page, and the mistake.
 def mistakes(names: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
     """Return of each mistake that is told the changes that make it."""
     p = names['parameters']

@@ -79,7 +79,8 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
                      'warnings': 1}), results='deep/a')])
     assert table(tmp_path) == [{
         'bag': 'a', 'code': '1', 'result': 'limit or warning', 'complete': 'true',
-        'setpoints': '1000', 'duration_s': '10.0', 'force_worst_n': '-120.5', 'force_worst_leg': 'leg_1',
+        'setpoints': '1000', 'duration_s': '10.0', 'force_worst_n': '-120.5',
+        'force_worst_leg': 'leg_1',
         'force_worst_at_s': '1.0', 'force_margin_n': '-20.5', 'length_margin_m': '',
         'rate_margin_m_s': '0.0', 'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3',
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
@@ -266,7 +267,8 @@ def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
     limits = [{'limit': f'limits.{limit}', 'leg': f'leg_{n}'} for n in range(6)
               for limit in ('length_max', 'force_max', 'velocity_max')]
     long = 'a_recording_with_a_long_name/of_a_long_day'
-    reason = 'part of it could not be read: ' + '; '.join(f'the chunk at byte {n}' for n in range(9))
+    reason = 'part of it could not be read: ' + '; '.join(
+        f'the chunk at byte {n}' for n in range(9))
     page.page.set_viewport_size({'width': 1440, 'height': 800})
     page.show(tmp_path, [
         row(f'{long}/limits', 1, summary([1.0], limits=limits)),

@@ -54,7 +54,7 @@ def test_it_has_pose_twist_and_acceleration_of_its_ends(turn: float, end: int) -
     between, durations, rows = some(turn)
     which = np.arange(MANY)
     assert np.array_equal(between.at(which, np.full(MANY, float(end))), rows[which + end])
-    # The polynomials themselves: so near that they go no farther than the tolerance.
+    # The polynomials themselves, so near the ends that they change by less than the tolerance.
     near = between.at(which, np.full(MANY, abs(end - 1e-10)))
     bounds = np.abs(rows).max() * np.ones(24)
     bounds[18:24] = 1e4  # third derivatives, over the shortest duration
@@ -82,7 +82,7 @@ def test_twist_and_acceleration_are_derivatives(turn: float) -> None:
 
 
 @pytest.mark.parametrize('angle', [0.0, 1e-6, 0.7, 3.0, np.pi - 1e-9])
-def test_a_steady_turn_stays_one(angle: float) -> None:
+def test_a_rotation_at_constant_rate_is_interpolated_exactly(angle: float) -> None:
     axis = np.array([0.36, -0.48, 0.8])
     rotations = np.stack([np.eye(3), rotation_about(axis, angle)])
     rows = np.zeros((2, 24))
@@ -97,7 +97,7 @@ def test_a_steady_turn_stays_one(angle: float) -> None:
     assert np.abs(got[:, 21:24]).max() < 1e-6
 
 
-def test_path_and_bend_keep_within_their_bounds() -> None:
+def test_path_and_bend_are_within_their_bounds() -> None:
     between, durations, _ = some(1.0)
     arm = 0.5
     part = np.linspace(0.0, 1.0, 401)

@@ -27,14 +27,14 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from test_cdr import same, SECOND, sixes, stamps, texts
-from test_efforts import joined, joint_state, JOINTS
+from test_recorded_efforts import joined, joint_state, JOINTS
 
 from stewart_dynamics.messages.cdr import MALFORMED, MalformedError
 from stewart_dynamics.messages.joint_state import (
     FIELDS, JointStateError, JointStateReader, JointStateWriter)
 
-
 # Writing
+
 
 def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
     """Return the fields of a JointState's bytes, and nothing of what stands between them."""
@@ -125,7 +125,7 @@ def one_by_one(reader: JointStateReader, messages: Sequence[bytes],
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(st.data(), st.lists(st.sampled_from(FIELDS), min_size=1, max_size=3, unique=True))
 def test_many_are_what_they_are_one_by_one(data: st.DataObject, fields: list[str]) -> None:
-    """Of any layouts, some of them spoiled; through readers that have read others before."""
+    """Of any layouts, some of them corrupted; through readers that have read others before."""
     messages = []
     for _ in range(data.draw(st.integers(0, 12))):
         names = data.draw(st.permutations(data.draw(st.sampled_from(

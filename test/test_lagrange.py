@@ -36,7 +36,7 @@ STATES = 10
 
 
 class Case(NamedTuple):
-    """A machine and a batch of motions."""
+    """A hexapod and a batch of motions."""
 
     parameters: Parameters
     platform: StewartPlatform
@@ -59,7 +59,7 @@ class Case(NamedTuple):
 
 @pytest.fixture(params=range(6))
 def case(request: pytest.FixtureRequest) -> Case:
-    """Return a random machine and its motions."""
+    """Return a random hexapod and its motions."""
     random = rng(request.param)
     p = random_parameters(random)
     platform = StewartPlatform(p)
@@ -89,7 +89,7 @@ def test_gravity_vector_is_the_gradient_of_the_potential_energy(case: Case) -> N
     gravity = case.platform.gravity_vector(case.motion)
     for axis in range(6):
         way = np.tile(np.eye(6)[axis], (STATES, 1))
-        # moved() needs a turn to turn about; a vanishing one moves nothing that is seen
+        # moved() needs an axis of rotation; this angle is below rounding
         along = Motion(case.motion.position, case.motion.rotation, way[:, :3],
                        way[:, 3:] + 1e-30)
 
@@ -115,7 +115,7 @@ def test_mass_rate_less_twice_the_christoffel_coriolis_matrix_is_skew(case: Case
     assert np.max(np.abs(n + np.swapaxes(n, -1, -2))) < 1e-8 * np.abs(rate).max()
 
 
-def test_the_papers_coriolis_matrix_is_not_skew_but_does_the_same_force(case: Case) -> None:
+def test_the_papers_coriolis_matrix_is_not_skew_but_gives_the_same_force(case: Case) -> None:
     rate = case.mass_rate()
     n = rate - 2.0 * case.coriolis(False)
     assert np.max(np.abs(n + np.swapaxes(n, -1, -2))) > 1e-4 * np.abs(rate).max()
@@ -167,7 +167,7 @@ def test_jacobian_rate_is_the_derivative_of_j_inv(case: Case) -> None:
                          derivative(jacobian_after, 1e-3)) < 1e-9
 
 
-def test_coriolis_matrices_of_a_leg_do_the_same_to_its_joint(case: Case) -> None:
+def test_both_coriolis_matrices_of_a_leg_give_the_same_force(case: Case) -> None:
     at = lagrange.legs(case.parameters, case.motion.position, case.motion.rotation)
     joint_rates = case.motion.linear_velocity[:, None] + np.cross(
         case.motion.angular_velocity[:, None], at.arms)
@@ -211,7 +211,7 @@ def misprints() -> Any:
     return module
 
 
-def test_the_paper_with_every_line_mended_gives_the_forces_of_the_package(
+def test_the_paper_with_every_line_corrected_gives_the_forces_of_the_package(
         misprints: Any) -> None:
     p = misprints.hexapod()
     states = misprints.random_states(p)

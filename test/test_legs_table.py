@@ -90,7 +90,8 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
         quaternions = to_quaternion(motions[:, 3:12].reshape(-1, 3, 3))
         for n in range(number):
             row, same = rows[at], [column[at] for column in columns]
-            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.lengths[n], *outputs.rates[n], *outputs.forces[n],
+            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.lengths[n],
+                        *outputs.rates[n], *outputs.forces[n],
                         *outputs.demanded_forces[n], outputs.determinants[n],
                         outputs.determinant_rates[n], outputs.conditions[n]]
             assert int(row[0]) == same[0] == outputs.stamps[n]

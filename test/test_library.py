@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The package's names: complete, documented, and imported without what they do not need."""
+"""The package's names: complete, documented, and imported without unneeded modules."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_the_version_is_that_of_the_package() -> None:
 
 def test_a_parameter_file_is_checked_without_compiler_ros_and_bags() -> None:
     def ran(code: str) -> tuple[float, set[str]]:
-        """Return the computer's time for some code, and what it imports."""
+        """Return the CPU time of some code, and what it imports."""
         code += '\nimport sys, time\nprint(time.process_time(), *sys.modules)'
         done = subprocess.run([sys.executable, '-c', code], cwd=ROOT, capture_output=True,
                               text=True, check=False)
@@ -93,7 +93,7 @@ def test_a_parameter_file_is_checked_without_compiler_ros_and_bags() -> None:
     ('ForceBreakdown', ('gravity', 'platform_inertia', 'friction', 'wrench', '[N]', 'total')),
     ('NaturalModes', ('frequencies', 'shapes', '[Hz]')),
     ('StewartPlatform', ('parameters', 'inverse_dynamics', 'natural_modes', 'home_pose'))])
-def test_help_says_what_the_fields_are(name: str, fields: tuple[str, ...]) -> None:
+def test_help_describes_the_fields(name: str, fields: tuple[str, ...]) -> None:
     text = pydoc.plain(pydoc.render_doc(getattr(stewart_dynamics, name)))
     summary = text.partition('Method resolution order')[0]
     for field in fields:

@@ -40,16 +40,16 @@ def row() -> NDArray[np.float64]:
 
 @pytest.mark.parametrize('limit', LIMITS)
 @pytest.mark.parametrize('leg', range(6))
-def test_each_limit_of_each_leg_is_judged_alike_everywhere(limit: str, leg: int) -> None:
+def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
     limits = Limits(symmetric_parameters().replaced(GIVEN))
     bound = float(limits.bounds[limit][leg])
     outward = -1.0 if limit == LENGTH_MIN else 1.0
     signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
-    for beyond, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
                              (2.0 * TOLERANCE, True), (0.1, True)):
         for sign in signs:
             result = row()
-            result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + beyond * outward)
+            result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + excess * outward)
             assert any_exceeded(limits.thresholds.ravel(), result) is exceeded
             for other in LIMITS:
                 expected = [exceeded and other == limit and n == leg for n in range(6)]
@@ -67,7 +67,7 @@ def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
     assert np.isinf(limits.force_max).all() and not limits.bounds
 
 
-def test_forces_that_are_unknown_exceed_nothing() -> None:
+def test_unknown_forces_exceed_no_limit() -> None:
     limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
     result = row()
     result[FORCES] = np.nan
@@ -82,5 +82,5 @@ def test_forces_that_are_unknown_exceed_nothing() -> None:
      'c: rate -0.75 m/s is 0.25 m/s above limits.velocity_max'),
     (Exceedance(FORCE_MAX, 5, -7000.0, 6000.0),
      'f: force -7000 N is 1000 N above limits.force_max')])
-def test_it_is_said_by_how_much(exceedance: Exceedance, words: str) -> None:
+def test_the_text_says_which_leg_and_by_how_much(exceedance: Exceedance, words: str) -> None:
     assert exceedance.words('abcdef') == words

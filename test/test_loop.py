@@ -67,7 +67,7 @@ def test_feed_forward_cuts_the_tracking_error(
     assert len(alone.errors.seconds) == len(forward.errors.seconds) == 501
     for name, error in forward.rms.items():
         assert 0.0 < times * error < alone.rms[name], name
-    # PD alone carries the weight by its error: what it lacks is what the node says.
+    # PD alone carries the weight by its error: what is missing is the node's force.
     assert 100.0 < alone.rms['all legs'] < 10e3  # [um]
 
 
@@ -77,7 +77,7 @@ def test_the_same_run_gives_the_same_bits(run: Callable[..., Any]) -> None:
         assert one.tobytes() == other.tobytes()
 
 
-def test_a_program_that_does_not_start_ends_the_demo_with_what_it_said(
+def test_a_program_that_does_not_start_ends_the_demo_with_its_output(
         run: Callable[..., Any], demo: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(demo.PROGRAMS, 'leg_controller', [
         sys.executable, '-c', 'raise SystemExit("no legs here")'])
@@ -85,7 +85,7 @@ def test_a_program_that_does_not_start_ends_the_demo_with_what_it_said(
         run(True, 1.0, number=1)
 
 
-def test_a_program_that_is_lost_ends_the_demo_with_its_name(domain: int, tmp_path: Path) -> None:
+def test_a_program_that_ends_early_ends_the_demo(domain: int, tmp_path: Path) -> None:
     program = Program([sys.executable, ROOT / 'demo' / 'loop.py', '--seconds', '1000.0',
                        '--output', tmp_path / 'looped'], domain, tmp_path / 'demo')
     peer = Peer(domain)
@@ -117,7 +117,7 @@ def _children(pid: int) -> list[int]:
     ('--motion', ROOT / 'config' / 'trajectory_sine.yaml', 'must begin at rest'),
     ('--seconds', '-1.0', 'motion.duration: -1.0'),
     ('--bandwidth', '0.0', 'bandwidth')])
-def test_what_cannot_be_run_is_said_in_one_line(
+def test_what_cannot_be_run_is_reported_in_one_line(
         domain: int, tmp_path: Path, option: str, value: str | Path, said: str) -> None:
     program = Program([sys.executable, ROOT / 'demo' / 'loop.py', '--output', tmp_path, option,
                        value], domain, tmp_path / 'demo')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The picture for RViz and Foxglove: whole messages, the machine's geometry, honest colours."""
+"""The markers for RViz and Foxglove: messages, geometry, colours."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
-from stewart_dynamics.nodes import markers as pictures  # noqa: E402
+from stewart_dynamics.nodes import markers as module  # noqa: E402
 from stewart_dynamics.nodes.markers import Markers  # noqa: E402
 from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, WARN  # noqa: E402
 from stewart_dynamics.runtime.step import Output, Setpoint, Step  # noqa: E402
@@ -43,7 +43,7 @@ from stewart_dynamics.runtime.step import Output, Setpoint, Step  # noqa: E402
 Array = NDArray[np.float64]
 Start = Callable[..., DynamicsNode]
 
-MACHINE = Parameters.from_yaml(PLATFORM)
+HEXAPOD = Parameters.from_yaml(PLATFORM)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STAMP = 1_700_000_000_123_456_789
 
@@ -118,11 +118,11 @@ def joints_of(parameters: Parameters, to: Setpoint) -> tuple[Array, Array]:
             + parameters['geometry.platform_joints'] @ rotation.T)
 
 
-def machines() -> list[tuple[Parameters, Setpoint]]:
-    """Return machines and poses: random ones, one that hangs, one with its legs in a plane."""
+def hexapods() -> list[tuple[Parameters, Setpoint]]:
+    """Return hexapods and poses: random ones, one that hangs, one with its legs in a plane."""
     random = rng()
-    cases = [(MACHINE, HOME), (MACHINE, setpoint((0.0, 0.0, -1.1))),
-             (MACHINE, setpoint((0.0, 0.0, 0.0))), (MACHINE, SINGULAR)]
+    cases = [(HEXAPOD, HOME), (HEXAPOD, setpoint((0.0, 0.0, -1.1))),
+             (HEXAPOD, setpoint((0.0, 0.0, 0.0))), (HEXAPOD, SINGULAR)]
     for _ in range(20):
         parameters = random_parameters(random)
         cases += [(parameters, Setpoint(STAMP, tuple(row)))
@@ -130,7 +130,7 @@ def machines() -> list[tuple[Parameters, Setpoint]]:
     return cases
 
 
-CASES = machines()
+CASES = hexapods()
 
 
 # The message
@@ -141,7 +141,7 @@ CASES = machines()
 @pytest.mark.parametrize('frame', ['', 'b', 'ba', 'bas', 'base', 'base\u00e4'])
 @pytest.mark.parametrize('to', [HOME, NEAR, SINGULAR], ids=['home', 'near', 'singular'])
 def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoint) -> None:
-    parameters = MACHINE.replaced({'joints': joints, 'base_frame': frame})
+    parameters = HEXAPOD.replaced({'joints': joints, 'base_frame': frame})
     data = Markers(parameters).write(to.motion, answer(parameters, to))
     message = deserialize_message(data, MarkerArray)
     again = bytes(serialize_message(message))
@@ -176,18 +176,18 @@ def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoin
     assert [by_name(message)['names', n].text for n in range(6)] == list(joints)
 
 
-def test_a_message_has_nothing_of_the_one_before() -> None:
-    writer = Markers(MACHINE)
-    first = [writer.write(to.motion, answer(MACHINE, to)) for to in (HOME, NEAR, SINGULAR)]
-    assert [writer.write(to.motion, answer(MACHINE, to))
+def test_a_message_does_not_depend_on_the_one_before() -> None:
+    writer = Markers(HEXAPOD)
+    first = [writer.write(to.motion, answer(HEXAPOD, to)) for to in (HOME, NEAR, SINGULAR)]
+    assert [writer.write(to.motion, answer(HEXAPOD, to))
             for to in (SINGULAR, NEAR, HOME)] == first[::-1]
 
 
 @pytest.mark.parametrize('rate, seconds', [
     (1e9, 2.0), (30.0, 2.0), (1.0, 2.0), (0.5, 4.0), (0.001, 2000.0), (5e-324, 86400.0)])
-def test_pictures_of_a_silent_node_vanish_but_not_before_the_next_may_come(
+def test_markers_of_a_silent_node_vanish_but_not_before_the_next_are_due(
         rate: float, seconds: float) -> None:
-    for marker in picture(MACHINE.replaced({'visualization_rate': rate}), HOME).values():
+    for marker in picture(HEXAPOD.replaced({'visualization_rate': rate}), HOME).values():
         assert nanoseconds(marker.lifetime) == seconds * 1e9
 
 
@@ -245,7 +245,7 @@ def test_plates_and_balls_are_at_the_joints(parameters: Parameters, to: Setpoint
 
 
 def test_the_platforms_axes_are_those_of_its_frame() -> None:
-    axes = points(picture(MACHINE, SINGULAR)['platform', 2]).reshape(3, 2, 3)
+    axes = points(picture(HEXAPOD, SINGULAR)['platform', 2]).reshape(3, 2, 3)
     assert np.allclose(axes[:, 0], SINGULAR.motion[:3])
     directions = axes[:, 1] - axes[:, 0]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -253,7 +253,7 @@ def test_the_platforms_axes_are_those_of_its_frame() -> None:
 
 
 def test_the_centre_of_mass_is_drawn_in_the_platform() -> None:
-    parameters = MACHINE.replaced({'platform.center_of_mass': [0.1, -0.2, 0.3]})
+    parameters = HEXAPOD.replaced({'platform.center_of_mass': [0.1, -0.2, 0.3]})
     for to in (HOME, NEAR, SINGULAR):
         rotation = np.reshape(to.motion[3:12], (3, 3))
         ball = picture(parameters, to)['platform', 3]
@@ -264,7 +264,7 @@ def test_the_centre_of_mass_is_drawn_in_the_platform() -> None:
 
 
 def test_the_text_stands_above_the_platform() -> None:
-    drawn = picture(MACHINE, NEAR)
+    drawn = picture(HEXAPOD, NEAR)
     where = drawn['singularity', 0].pose.position
     assert (where.x, where.y) == NEAR.motion[:2]
     assert where.z > max(points(drawn['platform', 0])[:, 2].max(),
@@ -282,25 +282,25 @@ def _leg_colors(parameters: Parameters, forces: Any) -> list[tuple[float, ...]]:
 
 
 def test_legs_are_coloured_by_force_over_limit() -> None:
-    parameters = MACHINE.replaced({'limits.force_max': [100.0, 200.0, 300.0, 400.0, 500.0, 600.0]})
+    parameters = HEXAPOD.replaced({'limits.force_max': [100.0, 200.0, 300.0, 400.0, 500.0, 600.0]})
     none, half, push, pull, little, zero = _leg_colors(
         parameters, (1e-9, 100.0, 300.0, -400.0, -5.0, -0.0))
-    assert none == zero == shade(pictures.NO_LOAD)
-    assert push == shade(pictures.PUSH)
-    assert pull == shade(pictures.PULL)
-    assert half == shade(tuple(np.mean([pictures.NO_LOAD, pictures.PUSH], axis=0)))
+    assert none == zero == shade(module.NO_LOAD)
+    assert push == shade(module.PUSH)
+    assert pull == shade(module.PULL)
+    assert half == shade(tuple(np.mean([module.NO_LOAD, module.PUSH], axis=0)))
     assert little == shade(tuple(
-        0.99 * np.array(pictures.NO_LOAD) + 0.01 * np.array(pictures.PULL)))
+        0.99 * np.array(module.NO_LOAD) + 0.01 * np.array(module.PULL)))
 
 
 def test_without_a_limit_the_largest_force_has_the_full_colour() -> None:
-    parameters = Parameters({name: value for name, value in MACHINE.given.items()
+    parameters = Parameters({name: value for name, value in HEXAPOD.given.items()
                              if name != 'limits.force_max'})
     colors = _leg_colors(parameters, (1.0, 0.0, -2.0, 1.0, -1.0, 0.5))
-    assert colors[2] == shade(pictures.PULL)
+    assert colors[2] == shade(module.PULL)
     assert colors[0] == colors[3] == shade(tuple(
-        np.mean([pictures.NO_LOAD, pictures.PUSH], axis=0)))
-    assert _leg_colors(parameters, (0.0,) * 6) == [shade(pictures.NO_LOAD)] * 6
+        np.mean([module.NO_LOAD, module.PUSH], axis=0)))
+    assert _leg_colors(parameters, (0.0,) * 6) == [shade(module.NO_LOAD)] * 6
     forces = answer(parameters, HOME).forces
     assert forces is not None
     text = picture(parameters, HOME)['singularity', 0].text
@@ -308,8 +308,8 @@ def test_without_a_limit_the_largest_force_has_the_full_colour() -> None:
 
 
 def test_legs_without_forces_are_grey() -> None:
-    assert _leg_colors(MACHINE, None) == [shade(pictures.NO_FORCE)] * 6
-    assert 'colour' not in picture(MACHINE, SINGULAR)['singularity', 0].text
+    assert _leg_colors(HEXAPOD, None) == [shade(module.NO_FORCE)] * 6
+    assert 'colour' not in picture(HEXAPOD, SINGULAR)['singularity', 0].text
 
 
 # How a colour in linear red, green and blue is seen without the cones for red, green or blue:
@@ -325,9 +325,9 @@ SEEN = {
 
 
 @pytest.mark.parametrize('sight', SEEN)
-def test_the_colour_blind_can_tell_the_colours_apart(sight: str) -> None:
-    legs = [pictures.PUSH, pictures.PULL, pictures.NO_LOAD, pictures.NO_FORCE]
-    for colors in (legs, list(pictures.PLATFORM.values())):
+def test_colours_are_distinct_for_the_colour_blind(sight: str) -> None:
+    legs = [module.PUSH, module.PULL, module.NO_LOAD, module.NO_FORCE]
+    for colors in (legs, list(module.PLATFORM.values())):
         linear = np.array(colors)[:, :3] ** 2.2
         seen = np.clip(linear @ np.array(SEEN[sight]).T, 0.0, 1.0) ** (1.0 / 2.2)
         for n, first in enumerate(seen):
@@ -337,31 +337,31 @@ def test_the_colour_blind_can_tell_the_colours_apart(sight: str) -> None:
 
 # The state of the singularity
 
-def test_the_platform_and_the_text_tell_of_the_singularity() -> None:
-    suppressing = MACHINE.replaced({'singularity.action': 'suppress_forces',
+def test_the_platform_and_the_text_show_the_singularity() -> None:
+    suppressing = HEXAPOD.replaced({'singularity.action': 'suppress_forces',
                                     'singularity.stop_condition': 25.0})
     for parameters, to, level, words in (
-            (MACHINE, HOME, OK, ''), (MACHINE, NEAR, WARN, 'condition number '),
+            (HEXAPOD, HOME, OK, ''), (HEXAPOD, NEAR, WARN, 'condition number '),
             (suppressing, NEAR, ERROR, 'inside stop_condition: forces suppressed'),
-            (MACHINE, SINGULAR, ERROR, 'J_inv cannot be solved: no forces')):
+            (HEXAPOD, SINGULAR, ERROR, 'J_inv cannot be solved: no forces')):
         drawn, output = picture(parameters, to), answer(parameters, to)
-        assert color(drawn['platform', 0]) == shade(pictures.PLATFORM[level])
+        assert color(drawn['platform', 0]) == shade(module.PLATFORM[level])
         lines = drawn['singularity', 0].text.split('\n')
         assert lines[0].startswith(words or 'det(J)')
         assert (f'det(J) {output.determinant:.4g} m^3, condition number {output.condition:.4g}'
                 in lines)
 
 
-def test_the_text_names_legs_beyond_their_limits() -> None:
-    parameters = MACHINE.replaced({'limits.length_max': [1.65, 1.0, 1.65, 1.65, 1.65, 1.0]})
+def test_the_text_names_legs_that_exceed_their_limits() -> None:
+    parameters = HEXAPOD.replaced({'limits.length_max': [1.65, 1.0, 1.65, 1.65, 1.65, 1.0]})
     text = picture(parameters, HOME)['singularity', 0].text
     assert 'limits exceeded: leg_2, leg_6' in text.split('\n')
-    assert 'limits' not in picture(MACHINE, HOME)['singularity', 0].text
-    different = MACHINE.replaced({'limits.force_max': [6000.0] * 5 + [5000.0]})
+    assert 'limits' not in picture(HEXAPOD, HOME)['singularity', 0].text
+    different = HEXAPOD.replaced({'limits.force_max': [6000.0] * 5 + [5000.0]})
     assert 'saturated at limits.force_max' in picture(different, HOME)['singularity', 0].text
 
 
-def test_whatever_is_answered_the_picture_has_only_numbers() -> None:
+def test_for_any_answer_markers_have_only_finite_numbers() -> None:
     random = rng()
     step, writer = Step(symmetric_parameters()), Markers(symmetric_parameters())
     drawn = 0
@@ -384,20 +384,20 @@ def test_whatever_is_answered_the_picture_has_only_numbers() -> None:
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('size', [1e-150, 1e-20, 1e20, 1e150, 1e160, 1e307])
 @pytest.mark.parametrize('joints', [
-    MACHINE['geometry.base_joints'], np.zeros((6, 3)), np.outer(np.arange(6.0), [1.0, 2.0, 3.0])],
+    HEXAPOD['geometry.base_joints'], np.zeros((6, 3)), np.outer(np.arange(6.0), [1.0, 2.0, 3.0])],
     ids=['as they are', 'one point', 'a line'])
-def test_no_machine_is_too_strange_to_be_drawn(joints: Array, size: float) -> None:
+def test_a_hexapod_of_any_geometry_is_drawn(joints: Array, size: float) -> None:
     with np.errstate(all='ignore'):
-        parameters = MACHINE.replaced({
+        parameters = HEXAPOD.replaced({
             'geometry.base_joints': size * joints,
-            'geometry.platform_joints': size * MACHINE['geometry.platform_joints']})
+            'geometry.platform_joints': size * HEXAPOD['geometry.platform_joints']})
     Markers(parameters)
 
 
 # The node
 
 def _look(node: DynamicsNode) -> list[Any]:
-    """Return a list that gets every picture."""
+    """Return a list that gets all markers."""
     seen: list[Any] = []
     node.peer.node.create_subscription(
         MarkerArray, f'{NODE}/markers', seen.append, QoSProfile(depth=100))
@@ -409,7 +409,7 @@ def _stamps(pictures: list[Any]) -> list[int]:
 
 
 def _seen(node: DynamicsNode) -> list[Any]:
-    """Return a list as ``_look`` does, once the node knows that somebody looks."""
+    """Return a list as ``_look`` does, once the node has matched the subscriber."""
     pictures = _look(node)
 
     def found() -> bool:
@@ -420,7 +420,7 @@ def _seen(node: DynamicsNode) -> list[Any]:
     return pictures
 
 
-def test_a_picture_is_the_one_of_its_answer(node: DynamicsNode) -> None:
+def test_markers_show_the_answer(node: DynamicsNode) -> None:
     seen = _seen(node)
     sample = Sample((0.1, -0.05, 1.15), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
                     (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
@@ -428,8 +428,8 @@ def test_a_picture_is_the_one_of_its_answer(node: DynamicsNode) -> None:
     node.answer(sample, stamp=stamp)
     node.until(lambda: stamp in _stamps(seen), 'it is drawn')
     motion = tuple(sample.motion().rows.ravel().tolist())
-    expected = Markers(MACHINE).write(
-        motion, answer(MACHINE, Setpoint(stamp, motion)))
+    expected = Markers(HEXAPOD).write(
+        motion, answer(HEXAPOD, Setpoint(stamp, motion)))
     assert seen[_stamps(seen).index(stamp)] == deserialize_message(expected, MarkerArray)
 
 
@@ -457,11 +457,11 @@ def test_no_answer_is_drawn_twice_at_whatever_rate(fresh: Start) -> None:
     assert len(seen) > 50
 
 
-def test_pictures_come_no_more_often_than_the_rate(fresh: Start) -> None:
+def test_markers_are_published_no_more_often_than_the_rate(fresh: Start) -> None:
     node = fresh('visualization_rate:=0.001')
     node.until_active()
     _look(node)
-    # The first answer is due, and the next one in 1000 s, whether somebody looks or not.
+    # The first answer is due, and the next one in 1000 s, with or without subscribers.
     for _ in range(100):
         node.answer()
     seen = _look(node)
@@ -480,7 +480,7 @@ def test_without_a_rate_there_is_no_such_topic(fresh: Start) -> None:
     assert f'{NODE}/markers' not in topics
 
 
-def test_who_looks_later_sees_nothing_of_before(fresh: Start) -> None:
+def test_a_later_subscriber_gets_no_earlier_markers(fresh: Start) -> None:
     node = fresh()
     node.until_active()
     before = node.stamp()
@@ -495,7 +495,7 @@ def test_the_rate_changes_only_while_unconfigured(node: DynamicsNode) -> None:
     assert 'only changed while the node is unconfigured' in result.reason
 
 
-def test_a_payload_and_thresholds_change_the_picture_while_active(node: DynamicsNode) -> None:
+def test_a_payload_and_thresholds_change_the_markers_while_active(node: DynamicsNode) -> None:
     seen = _seen(node)
     changes = {'platform.center_of_mass': [0.05, -0.04, 0.25], 'singularity.warn_condition': 1.5}
     assert node.set_parameters(**{

@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 64  # as the kernel has it
+MOST_STEPS = 64  # as the inverse dynamics have it
 
 
 @pytest.fixture(scope='module')
@@ -72,7 +72,7 @@ def whole(t: tuple[float, ...]) -> Array:
 
 
 def largest(matrix6: Any, t: tuple[float, ...]) -> float:
-    """Return where Laguerre's iteration comes to rest from 1, in no more steps than it gets."""
+    """Return the eigenvalue to which Laguerre's iteration converges from 1."""
     x, steps = 1.0 + 1e-14, 0
     while (nearer := matrix6.laguerre_step(x, t)) != x:
         assert nearer < x
@@ -107,7 +107,7 @@ def test_every_permutation_is_inverted_exactly_with_its_sign(matrix6: Any) -> No
         assert det == round(np.linalg.det(p))
 
 
-def test_zeros_on_the_diagonal_are_pivoted_around(matrix6: Any) -> None:
+def test_a_matrix_with_zeros_on_the_diagonal_is_inverted(matrix6: Any) -> None:
     random = rng()
     for _ in range(100):
         a = random.normal(size=(6, 6))
@@ -117,7 +117,7 @@ def test_zeros_on_the_diagonal_are_pivoted_around(matrix6: Any) -> None:
         assert det == pytest.approx(np.linalg.det(a), rel=1e-13 * np.linalg.cond(a))
 
 
-def test_a_tiny_first_pivot_costs_no_digits(matrix6: Any) -> None:
+def test_a_tiny_first_pivot_loses_no_digits(matrix6: Any) -> None:
     a = np.eye(6)[::-1] + 1e-20 * np.eye(6)
     found, det = inverse(matrix6, a)
     assert np.allclose(found, np.eye(6)[::-1], rtol=0.0, atol=1e-15)
@@ -166,7 +166,7 @@ def test_tridiagonal_keeps_the_eigenvalues(matrix6: Any) -> None:
 
 @pytest.mark.parametrize('kind', [
     'any', 'double', 'triple', 'fourfold', 'fivefold', 'near double', 'one alone'])
-def test_laguerre_comes_down_to_the_largest_eigenvalue(matrix6: Any, kind: str) -> None:
+def test_laguerre_converges_to_the_largest_eigenvalue(matrix6: Any, kind: str) -> None:
     random = rng()
     for _ in range(60):
         values = np.sort(random.uniform(0.0, 1.0, 6))[::-1]
@@ -189,7 +189,7 @@ def test_laguerre_stays_finite_on_matrices_without_directions(matrix6: Any) -> N
     assert 0.0 < found <= 1.0 + 1e-14
 
 
-def test_where_laguerre_rests_no_further_step_moves_it(matrix6: Any) -> None:
+def test_a_converged_laguerre_iteration_is_not_changed_by_a_further_step(matrix6: Any) -> None:
     random = rng()
     for _ in range(50):
         values = random.uniform(0.0, 1.0, 6)

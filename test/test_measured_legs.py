@@ -26,7 +26,7 @@ from messages import STORE
 import numpy as np
 import pytest
 from test_external_wrench import (
-    BEGIN, estimates, HOME, LOAD, MACHINE, MILLISECOND, resting, six, swing)
+    BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, six, swing)
 
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
@@ -38,9 +38,9 @@ from stewart_dynamics.runtime.rejections import (
     MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
 
 KIND = 'sensor_msgs/msg/JointState'
-JOINTS = list(MACHINE['joints'])
+JOINTS = list(HEXAPOD['joints'])
 TARGET = tuple(HOME.rows.tolist())
-ZERO_LENGTHS = MACHINE['geometry.zero_length']
+ZERO_LENGTHS = HEXAPOD['geometry.zero_length']
 
 
 def joint_state(stamp: int, names: Sequence[str], position: Any, velocity: Any, effort: Any,
@@ -54,14 +54,14 @@ def joint_state(stamp: int, names: Sequence[str], position: Any, velocity: Any, 
 
 
 def message_of(at: Measurement, **options: Any) -> bytes:
-    """Return the message that says a measurement of MACHINE."""
+    """Return the message of a measurement of HEXAPOD."""
     return joint_state(at.stamp, JOINTS, at.lengths - ZERO_LENGTHS, at.rates, at.forces, **options)
 
 
 class Followed:
-    """Measured legs, and what was said of them."""
+    """Measured legs, and what was reported of them."""
 
-    def __init__(self, parameters: Parameters = MACHINE) -> None:
+    def __init__(self, parameters: Parameters = HEXAPOD) -> None:
         self.rejected: list[tuple[Rejection, str]] = []
         self.noticed: list[str] = []
         self._legs = MeasuredLegs(
@@ -83,13 +83,13 @@ class Followed:
         assert '\n' not in said
 
 
-REST = resting(MACHINE, HOME, LOAD, range(BEGIN, BEGIN + 50 * MILLISECOND, MILLISECOND))
-EXPECTED = estimates(ExternalWrench(MACHINE), [
+REST = resting(HEXAPOD, HOME, LOAD, range(BEGIN, BEGIN + 50 * MILLISECOND, MILLISECOND))
+EXPECTED = estimates(ExternalWrench(HEXAPOD), [
     each._replace(lengths=six(each.lengths - ZERO_LENGTHS + ZERO_LENGTHS))
     for each in REST])
 
 
-def test_what_comes_of_messages_is_what_the_step_makes_of_their_numbers() -> None:
+def test_messages_give_what_the_step_gives_for_their_numbers() -> None:
     followed = Followed()
     assert [followed.take(message_of(each)) for each in REST] == EXPECTED
     assert not followed.rejected
@@ -118,7 +118,7 @@ def test_any_order_of_names_with_others_among_them(data: st.DataObject) -> None:
     assert not followed.rejected
 
 
-def test_bytes_that_only_fill_are_not_looked_at() -> None:
+def test_padding_bytes_are_ignored() -> None:
     """Fast DDS fills messages up to four bytes, and what aligns numbers may be anything."""
     followed = Followed()
     for at, filling in zip(REST[:8], (b'', b'\0', b'\0', b'\xff\xff\xff', b'', b'\1', b'\2', b''),
@@ -165,20 +165,20 @@ def changed(**fields: Any) -> Callable[[Measurement], bytes]:
     (lambda at: message_of(at._replace(stamp=BEGIN - 2 * MILLISECOND)), TOO_OLD,
      'is 0.002 s older than the last used'),
 ])
-def test_what_is_rejected_is_as_if_it_never_came(
+def test_a_rejected_message_changes_nothing(
         make: Callable[[Measurement], bytes], reason: str, details: str) -> None:
     followed = Followed()
     assert followed.take(message_of(REST[0])) == EXPECTED[0]
     followed.rejects(make(REST[1]), reason, details)
     assert followed.take(message_of(REST[2])) == estimates(
-        ExternalWrench(MACHINE), [REST[0], REST[2]])[1]
+        ExternalWrench(HEXAPOD), [REST[0], REST[2]])[1]
     assert len(followed.rejected) == 1
 
 
-def test_a_machine_that_is_singular_everywhere_is_rejected() -> None:
+def test_a_hexapod_that_is_singular_everywhere_is_rejected() -> None:
     """Base and platform are similar hexagons."""
-    similar = MACHINE.replaced({
-        'geometry.base_joints': (1.5 * MACHINE['geometry.platform_joints']).ravel()})
+    similar = HEXAPOD.replaced({
+        'geometry.base_joints': (1.5 * HEXAPOD['geometry.platform_joints']).ravel()})
     followed = Followed(similar)
     lengths = StewartPlatform(similar).inverse_kinematics(Pose([0.0, 0.0, 1.1], np.eye(3)))
     followed.rejects(message_of(REST[0]._replace(lengths=six(lengths))), SINGULAR, 'lengths [')
@@ -186,7 +186,7 @@ def test_a_machine_that_is_singular_everywhere_is_rejected() -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(st.binary(max_size=120), st.integers(0, 400), st.integers(0, 255))
-def test_whatever_comes_a_wrench_is_of_numbers(noise: bytes, at: int, byte: int) -> None:
+def test_for_any_input_a_wrench_is_finite(noise: bytes, at: int, byte: int) -> None:
     followed = Followed()
     sound = message_of(REST[0])
     for data in (noise, sound[:at] + noise, sound[:at] + bytes([byte]) + sound[at + 1:],
@@ -209,7 +209,7 @@ def test_a_jump_back_is_a_restart() -> None:
     assert not followed.rejected
 
 
-def test_after_a_gap_it_begins_anew() -> None:
+def test_after_a_gap_it_restarts() -> None:
     followed = Followed()
     for at in REST[:3]:
         followed.take(message_of(at._replace(stamp=at.stamp - 10 ** 12)))
@@ -217,11 +217,11 @@ def test_after_a_gap_it_begins_anew() -> None:
     assert not followed.rejected
 
 
-def test_where_no_pose_is_found_for_long_the_setpoint_is_asked() -> None:
-    """Such a machine was moved meanwhile; until then only the last pose is believed."""
+def test_where_no_pose_is_found_for_long_the_setpoint_is_the_guess() -> None:
+    """Such a hexapod was moved meanwhile; until then only the last pose is believed."""
     followed = Followed()
     assert followed.take(message_of(REST[0])) is not None
-    away = StewartPlatform(MACHINE).inverse_dynamics(swing(0.9))
+    away = StewartPlatform(HEXAPOD).inverse_dynamics(swing(0.9))
     for n in range(1, 4):
         followed.rejects(changed(position=[5.0, 0.3, 0.3, 0.3, 0.3, 0.3])(
             REST[0]._replace(stamp=BEGIN + n * 30 * MILLISECOND)), NOT_CONVERGED, ' iterations')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Motions, and the rotations and angular velocities they are made of."""
+"""Motions, rotations and angular velocities."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_euler_angles_turn_about_x_then_y_then_z() -> None:
         assert np.allclose(from_euler([alpha, beta, gamma]), turned, rtol=0.0, atol=1e-15)
 
 
-def test_rotation_changes_as_the_angular_velocity_of_the_euler_rates_has_it() -> None:
+def test_angular_velocity_of_euler_rates_is_the_derivative_of_the_rotation() -> None:
     random = rng()
     for _ in range(50):
         angles, rates = random.uniform(-3.0, 3.0, (2, 3))
@@ -96,7 +96,7 @@ def test_angular_velocity_is_the_euler_rates_at_zero_angles_only() -> None:
     assert not np.allclose(tilted.angular_velocity, rates, atol=1e-3)
 
 
-def test_quaternions_give_their_rotations_back() -> None:
+def test_quaternions_and_rotations_convert_both_ways() -> None:
     random = rng()
     turns = np.array([rotation_about(random_direction(random), angle)
                       for angle in random.uniform(-np.pi, np.pi, 200)])
@@ -143,7 +143,7 @@ def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
 @settings(derandomize=True, max_examples=200, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
     lambda q: np.linalg.norm(q) > 1e-3))
-def test_any_quaternion_comes_back_up_to_its_sign(numbers: list[float]) -> None:
+def test_any_quaternion_is_converted_both_ways_up_to_its_sign(numbers: list[float]) -> None:
     quaternion = np.array(numbers) / np.linalg.norm(numbers)
     back = to_quaternion(of_quaternion(quaternion))
     assert abs(np.dot(back, quaternion)) == pytest.approx(1.0, abs=1e-14)
@@ -161,7 +161,7 @@ def test_rotations_take_any_leading_shape() -> None:
 
 # Motions
 
-def test_parts_are_given_back_and_what_is_left_out_is_zero() -> None:
+def test_parts_are_as_given_and_zero_by_default() -> None:
     motion = Motion([1.0, 2.0, 3.0], UPRIGHT, angular_velocity=[4.0, 5.0, 6.0])
     assert motion.shape == ()
     assert np.array_equal(motion.position, [1.0, 2.0, 3.0])
@@ -214,7 +214,7 @@ def test_arrays_are_copied_and_their_views_read_only() -> None:
     (([0.0, 0.0, 1.0 + 2.0j], UPRIGHT), ['position: ', 'real numbers', 'complex128']),
     (([0.0, 0.0, 1.0], UPRIGHT, {'x': 1.0}), ['linear_velocity: a value of type dict: ']),
 ])
-def test_bad_arguments_are_rejected_with_its_place_and_rule(
+def test_bad_arguments_are_rejected_with_index_and_rule(
         arguments: Any, texts: list[str]) -> None:
     with pytest.raises(MotionError) as caught:
         Motion(*arguments)
@@ -234,6 +234,6 @@ def test_bad_euler_angles_are_rejected(arguments: Any, text: str) -> None:
         Motion.from_euler(*arguments)
 
 
-def test_a_rotation_as_coarse_as_a_message_s_rounding_is_taken() -> None:
+def test_a_rotation_rounded_as_in_messages_is_accepted() -> None:
     rounded = rotation_about(X, 0.3).astype(np.float32)
     assert Motion(np.zeros(3), rounded).shape == ()

@@ -182,7 +182,7 @@ _LIMITED = Step(PARAMETERS.replaced({
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(st.floats(5e-324, 1.79e308), st.floats(0.0, 1.79e308), st.floats(0.0, 1.79e308),
        st.tuples(*[st.floats(-2.0, 2.0)] * 3), rotations, st.tuples(*[sizes] * 12))
-def test_only_finite_numbers_are_published_whatever_the_machine(
+def test_only_finite_numbers_are_published_for_any_hexapod(
         mass: float, leg_mass: float, zero_length: float, position: tuple[float, ...],
         rotation: tuple[float, ...], rates: tuple[float, ...]) -> None:
     step = Step(PARAMETERS.replaced({

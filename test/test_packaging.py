@@ -109,7 +109,7 @@ def depends(*kinds: str) -> set[str]:
 
 
 def call(arguments: Iterable[str | Path], **options: object) -> str:
-    """Run a program to its end, which must be a good one, and return what it printed."""
+    """Run a program to its end with exit code 0, and return what it printed."""
     done = subprocess.run(
         [str(argument) for argument in arguments], stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=300, **options)
@@ -143,7 +143,7 @@ def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def distribution(wheel: Path) -> importlib.metadata.Distribution:
-    """Return what the wheel says of itself."""
+    """Return the metadata of the wheel."""
     folder = next(path for path in zipfile.Path(wheel).iterdir()
                   if path.name.endswith('.dist-info'))
     return importlib.metadata.PathDistribution(folder)
@@ -201,7 +201,7 @@ def test_colcon_result_runs(install: Path) -> None:
 
 def test_wheel_has_entry_points_and_no_scripts(
         wheel: Path, distribution: importlib.metadata.Distribution) -> None:
-    """What setup.cfg says to colcon about scripts does not leak into the wheel."""
+    """The folder of scripts that setup.cfg gives colcon is not that of the wheel."""
     assert {point.name for point in distribution.entry_points} == set(EXECUTABLES)
     names = zipfile.ZipFile(wheel).namelist()
     assert not [name for name in names if '/scripts/' in name or '/lib/' in name]
@@ -282,6 +282,6 @@ def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None
 @pytest.mark.parametrize('path', python_files(*SOURCES),
                          ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_copyright_header(path: Path) -> None:
-    """Each file that says something begins with the header that ament_copyright asks for."""
+    """Each file that is not empty begins with the header that ament_copyright asks for."""
     text = path.read_text()
     assert not text or HEADER.match(text)

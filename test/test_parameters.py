@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The parameters: what a good file gives, and what each bad one is told."""
+"""Parameters: the values of a valid file, and the error of each invalid one."""
 
 from __future__ import annotations
 
@@ -66,15 +66,15 @@ def written(path: Path, text: str) -> Path:
 
 
 def rejection(path: Path, text: str) -> str:
-    """Return what is said of a parameter file with this text."""
+    """Return the error of a parameter file with this text."""
     with pytest.raises(ParameterError) as caught:
         Parameters.from_yaml(written(path, text))
     return str(caught.value)
 
 
-# What a good file gives
+# Valid files
 
-def test_a_good_file_gives_its_values(tmp_path: Path) -> None:
+def test_a_valid_file_gives_its_values(tmp_path: Path) -> None:
     p = Parameters.from_yaml(written(tmp_path, GOOD))
     assert set(p) == set(PARAMETERS)
     assert len(p) == len(PARAMETERS)
@@ -87,7 +87,7 @@ def test_a_good_file_gives_its_values(tmp_path: Path) -> None:
     assert p['visualization_rate'] == 25.0
 
 
-def test_what_is_left_out_takes_its_default(tmp_path: Path) -> None:
+def test_omitted_parameters_have_their_defaults(tmp_path: Path) -> None:
     p = Parameters.from_yaml(written(tmp_path, GOOD))
     assert np.array_equal(p['gravity'], [0.0, 0.0, -9.80665])
     assert p['base_frame'] == 'base'
@@ -156,7 +156,7 @@ def test_the_section_may_be_the_node_s(tmp_path: Path, section: str) -> None:
     assert p['platform.mass'] == 150.0
 
 
-def test_a_later_section_overrides_an_earlier_one_and_others_nodes_do_not_count(
+def test_a_later_section_overrides_an_earlier_one_and_other_nodes_are_ignored(
         tmp_path: Path) -> None:
     later = """\
 stewart_dynamics:
@@ -184,7 +184,7 @@ def test_the_hexapod_of_the_package_can_be_computed() -> None:
     assert np.all(lengths > 0.0)
 
 
-# What a bad file is told: the line that is changed, what of it, and the words of the answer
+# Invalid files: the line that is changed, its new text, and the words of the error
 
 BAD = {
     'missing required value': ('      mass: 150.0\n', '', ['platform.mass', 'missing']),
@@ -333,7 +333,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('case', BAD)
-def test_a_bad_file_is_told_file_parameter_value_and_rule(tmp_path: Path, case: str) -> None:
+def test_the_error_of_a_bad_file_names_all(tmp_path: Path, case: str) -> None:
     old, new, words = BAD[case]
     assert GOOD.count(old) == 1
     message = rejection(tmp_path, GOOD.replace(old, new))
@@ -354,7 +354,7 @@ def test_a_bad_file_is_told_file_parameter_value_and_rule(tmp_path: Path, case: 
     ('{' * 1500, ['not YAML']),
     ('/**: \x07\n', ['not YAML: line 1', 'control characters']),
 ])
-def test_a_file_with_another_root_is_told_what_it_must_be(
+def test_the_error_of_a_file_with_another_root_says_what_it_must_be(
         tmp_path: Path, text: str, words: list[str]) -> None:
     message = rejection(tmp_path, text)
     assert message.startswith(f'{tmp_path / "hexapod.yaml"}: ')
@@ -362,7 +362,7 @@ def test_a_file_with_another_root_is_told_what_it_must_be(
         assert word in message
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r'nowhere\.yaml: cannot be read: No such file'):
         Parameters.from_yaml(tmp_path / 'nowhere.yaml')
     with pytest.raises(ParameterError, match='cannot be read: Is a directory'):
@@ -372,7 +372,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, 'mkfifo'), reason='needs named pipes')
-def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_pipe_in_place_of_a_file_is_rejected_at_once(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / 'pipe')
     for path in (tmp_path / 'pipe', Path('/dev/zero')):
         with pytest.raises(ParameterError, match='cannot be read: not a regular file'):
@@ -383,14 +383,14 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     lambda text: '\ufeff' + text, lambda text: text.replace('\n', '\r\n'),
     lambda text: '%YAML 1.2\n---\n' + text, lambda text: text.replace('150.0', '&a 150.0')],
     ids=['byte order mark', 'CRLF', 'version', 'anchor'])
-def test_what_ros_reads_past_changes_nothing(tmp_path: Path, change: Any) -> None:
+def test_sections_that_ros_ignores_change_nothing(tmp_path: Path, change: Any) -> None:
     given = Parameters.from_yaml(written(tmp_path, GOOD))
     path = tmp_path / 'hexapod.yaml'
     path.write_bytes(change(GOOD).encode())
     assert Parameters.from_yaml(path) == given
 
 
-def test_a_file_that_is_not_text_is_told_so(tmp_path: Path) -> None:
+def test_a_file_that_is_not_text_is_rejected(tmp_path: Path) -> None:
     file = tmp_path / 'hexapod.yaml'
     for data in (b'\xff\xfe\x00a', GOOD.encode('utf-16'), b'a: \xc3'):
         file.write_bytes(data)
@@ -416,7 +416,7 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
     (f'{"a" * 1000}: 1.0', 'unknown parameter'),
     (f'platform.mass: {"9" * 90000}', 'out of range|must be a double'),
     ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
-def test_yaml_that_a_reader_may_choke_on_is_rejected_in_one_short_line(
+def test_difficult_yaml_is_rejected_in_one_short_line(
         tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / 'hexapod.yaml'
     path.write_text(f'/**:\n  ros__parameters:\n    {text}\n')
@@ -427,7 +427,7 @@ def test_yaml_that_a_reader_may_choke_on_is_rejected_in_one_short_line(
     assert len(str(caught.value)) < 400 + len(str(path))
 
 
-def test_what_yaml_leaves_empty_takes_its_default() -> None:
+def test_null_takes_the_default() -> None:
     parameters = Parameters({**GIVEN, 'gravity': None, 'joints': None,
                              'singularity.warn_condition': None, 'limits.force_max': None})
     assert set(parameters.given) == set(GIVEN)
@@ -435,7 +435,7 @@ def test_what_yaml_leaves_empty_takes_its_default() -> None:
     assert parameters['joints'] == tuple(f'leg_{n}' for n in range(1, 7))
 
 
-# Whatever is given
+# Arbitrary input
 
 NAMES = sorted(PARAMETERS)
 GIVEN = {'geometry.base_joints': [0.1 * n for n in range(18)],
@@ -455,7 +455,7 @@ values = st.recursive(plain, lambda inner: st.one_of(
 @given(st.dictionaries(st.one_of(st.sampled_from(NAMES), st.text(max_size=8)), values,
                        max_size=4))
 @np.errstate(all='ignore')
-def test_any_values_are_taken_or_rejected_with_a_parameter_error(changes: Any) -> None:
+def test_any_values_are_accepted_or_rejected_with_a_parameter_error(changes: Any) -> None:
     try:
         parameters = Parameters({**GIVEN, **changes})
     except ParameterError:
@@ -486,7 +486,7 @@ def check_any(file: Path) -> None:
                 assert not known.above or np.all(value > known.minimum)
 
 
-# A place in the good file, how much of it goes, and what comes there.
+# A place in the valid file, how many characters are removed, and what is inserted.
 cuts = st.tuples(st.integers(0, len(GOOD)), st.integers(0, 40))
 SPECIAL = '{}[],:-&?!|>\'"%@`# \n\t\r\0\\01.e+<*~_\ufeff\u2028'
 scalars = st.sampled_from([
@@ -502,7 +502,7 @@ scalars = st.sampled_from([
     st.tuples(cuts, st.text(alphabet=SPECIAL, max_size=6)).map(
         lambda cut: GOOD[:cut[0][0]] + cut[1] + GOOD[sum(cut[0]):])))
 @np.errstate(all='ignore')
-def test_any_text_is_taken_or_rejected_in_one_line(tmp_path: Path, text: str) -> None:
+def test_any_text_is_accepted_or_rejected_in_one_line(tmp_path: Path, text: str) -> None:
     file = tmp_path / 'any.yaml'
     file.write_text(text, encoding='utf-8', errors='surrogatepass')
     check_any(file)
@@ -514,7 +514,7 @@ def test_any_text_is_taken_or_rejected_in_one_line(tmp_path: Path, text: str) ->
     st.binary(max_size=60), st.tuples(cuts, st.binary(max_size=4)).map(
         lambda cut: GOOD.encode()[:cut[0][0]] + cut[1] + GOOD.encode()[sum(cut[0]):])))
 @np.errstate(all='ignore')
-def test_any_bytes_are_taken_or_rejected_in_one_line(tmp_path: Path, data: bytes) -> None:
+def test_any_bytes_are_accepted_or_rejected_in_one_line(tmp_path: Path, data: bytes) -> None:
     file = tmp_path / 'any.yaml'
     file.write_bytes(data)
     check_any(file)
@@ -528,7 +528,7 @@ def test_any_bytes_are_taken_or_rejected_in_one_line(tmp_path: Path, data: bytes
         st.floats().map(repr), max_size=18).map(lambda many: f'[{", ".join(many)}]')),
     max_size=5))
 @np.errstate(all='ignore')
-def test_any_values_in_a_file_are_taken_or_rejected_in_one_line(
+def test_any_values_in_a_file_are_accepted_or_rejected_in_one_line(
         tmp_path: Path, changes: dict[str, str]) -> None:
     file = tmp_path / 'any.yaml'
     lines = [f'    ? {name!r}\n    : {value}\n' for name, value in changes.items()]
@@ -542,7 +542,7 @@ def test_any_values_in_a_file_are_taken_or_rejected_in_one_line(
 @pytest.mark.parametrize('name', [
     'use_sim_time: false',
     'qos_overrides: {/a/setpoint/pose: {subscription: {reliability: best_effort}}}'])
-def test_what_ros_declares_itself_is_left_to_it(tmp_path: Path, name: str) -> None:
+def test_parameters_that_ros_declares_are_ignored(tmp_path: Path, name: str) -> None:
     path = tmp_path / 'hexapod.yaml'
     path.write_text(f'/**:\n  ros__parameters:\n    platform.mass: 3.0\n    {name}\n')
     assert read_yaml(path, 'stewart_dynamics') == {'platform.mass': 3.0}
@@ -559,7 +559,7 @@ def test_what_ros_declares_itself_is_left_to_it(tmp_path: Path, name: str) -> No
     ('gravity', '{x: 1.0}', 'gravity: 1.0 m/s^2: must be an array of 3'),
     ('gravity', '[', 'gravity: not YAML: line '), ('gravity', '\udcff', 'gravity: not YAML'),
     ('use_sim_time', '1', 'use_sim_time: 1: must be a bool')])
-def test_a_bad_value_of_a_command_line_is_told(name: str, text: str, said: str) -> None:
+def test_a_bad_value_on_a_command_line_is_rejected(name: str, text: str, said: str) -> None:
     Parameters.check_value('platform.mass', '150.0', 'command line')
     Parameters.check_value('use_sim_time', 'true', 'command line')
     with pytest.raises(ParameterError) as caught:
@@ -571,7 +571,7 @@ def test_a_bad_value_of_a_command_line_is_told(name: str, text: str, said: str) 
 @pytest.mark.parametrize('value, rule', [
     ('5', 'must be a bool'), ("'true'", 'must be a bool'), ('[]', 'ROS accepts no empty list'),
     ('~', 'None: must be a bool'), ('', 'has no value')])
-def test_what_ros_would_go_on_without_is_rejected(tmp_path: Path, value: str, rule: str) -> None:
+def test_a_value_that_ros_would_ignore_is_rejected(tmp_path: Path, value: str, rule: str) -> None:
     path = written(tmp_path, f'/**: {{ros__parameters: {{use_sim_time: {value}}}}}\n')
     with pytest.raises(ParameterError, match=f'use_sim_time: .*{rule}'):
         Parameters.check_file(path)
@@ -595,7 +595,7 @@ def test_sections_are_matched_as_ros_matches_them(
             read_yaml(path, node or Parameters.node)
 
 
-def test_a_file_of_a_hundred_megabytes_is_rejected_unread(tmp_path: Path) -> None:
+def test_a_file_of_a_hundred_megabytes_is_rejected_without_reading_it(tmp_path: Path) -> None:
     path = tmp_path / 'hexapod.yaml'
     with path.open('wb') as file:
         file.truncate(100_000_000)
@@ -679,7 +679,7 @@ def test_a_whole_file_is_written_that_reads_back_equal(tmp_path: Path, file: str
     assert read == parameters
 
 
-def test_a_written_file_is_easy_to_read(tmp_path: Path) -> None:
+def test_a_written_file_has_units_and_short_lines(tmp_path: Path) -> None:
     parameters = Parameters.from_yaml(written(tmp_path, GOOD)).replaced({
         'platform.mass': 1e-5, 'base_frame': "on 'deck'", 'platform_frame': 'y',
         'legs.cylinder.inertia': 1e17})
@@ -727,7 +727,7 @@ def test_a_file_for_another_node_is_named(tmp_path: Path) -> None:
     assert other_nodes(file, '/a/b') == ''
 
 
-def test_what_was_given_cannot_be_changed_behind_its_back() -> None:
+def test_the_given_values_cannot_be_changed() -> None:
     given = {name: list(value) if isinstance(value, list) else value
              for name, value in GIVEN.items()}
     parameters = Parameters(given)

@@ -29,7 +29,7 @@ import yaml
 from stewart_dynamics import ParameterError
 from stewart_dynamics.parameters_yaml import no_space, read_document, read_value
 
-# Each as it stands in a file, and what both readers make of it.
+# Each as written in a file, and the value that both readers return.
 VALUES = {
     # doubles
     '1e3': 1000.0, '1.e3': 1000.0, '1E5': 1e5, '5.': 5.0, '.5': 0.5, '+.5': 0.5, '-.5e-3': -5e-4,
@@ -37,12 +37,12 @@ VALUES = {
     '2.2250738585072014e-308': 2.0 ** -1022, '&a 1.0': 1.0,
     'inf': float('inf'), '-Infinity': -float('inf'), '.inf': float('inf'), '+.INF': float('inf'),
     '-.Inf': -float('inf'),
-    # integers, which no parameter of ours is
+    # integers, which no parameter of the package is
     '0': 0, '-0': 0, '+5': 5, '010': 8, '0150': 104, '0x10': 16, '-0X1f': -31,
     '9223372036854775807': 2 ** 63 - 1, '-9223372036854775808': -2 ** 63,
-    # truths
+    # bools
     'yes': True, 'y': True, 'On': True, 'TRUE': True, 'no': False, 'N': False, 'off': False,
-    # and all else is a text
+    # everything else is a text
     '1_000': '1_000', '0b101': '0b101', '0o17': '0o17', '1,5': '1,5', '1:30': '1:30',
     '2020-01-01': '2020-01-01', '1e400': '1e400', '1e-310': '1e-310',
     '1e': '1e', '0x': '0x', '1.5f': '1.5f', '.e3': '.e3', '.': '.', 'tRUE': 'tRUE', '=': '=',
@@ -68,7 +68,7 @@ def parameters_of(texts: list[str]) -> str:
         f'    p{n}: {text}\n' for n, text in enumerate(texts))
 
 
-def test_texts_mean_what_they_mean_to_ros(tmp_path: Path) -> None:
+def test_texts_have_the_meaning_that_they_have_to_ros(tmp_path: Path) -> None:
     file = file_of(tmp_path, parameters_of(list(VALUES)))
     found = list(read_document(file)['/**']['ros__parameters'].values())
     for text, value, expected in zip(VALUES, found, VALUES.values(), strict=True):
@@ -142,7 +142,7 @@ def test_what_launch_writes_is_read(tmp_path: Path) -> None:
     'x: {<<: {a: 1}, <<: {a: 1}}', 'a: 1\na: 1', 'a: !<plain> {b: 1}', 'a: !!str [b]',
     'a: !!python/tuple b', 'a: !!map [b]'],
     ids=lambda text: repr(text[:10]))
-def test_what_could_take_long_is_rejected_when_it_begins(tmp_path: Path, text: str) -> None:
+def test_input_that_could_take_long_is_rejected_early(tmp_path: Path, text: str) -> None:
     with pytest.raises(ParameterError) as caught:
         read_document(file_of(tmp_path, text))
     message = str(caught.value)
@@ -153,7 +153,7 @@ def test_what_could_take_long_is_rejected_when_it_begins(tmp_path: Path, text: s
 @pytest.mark.parametrize('text', [
     '1' * 90_000 + 'x', '0x' + '1' * 90_000 + 'x', '.' + '1' * 90_000 + 'x', ' ' * 90_000 + 'x',
     '1e' + '1' * 90_000 + 'x', 'nan(' + 'a' * 90_000, '+' * 90_000, '1' * 90_000])
-def test_what_is_nearly_a_number_is_a_text(tmp_path: Path, text: str) -> None:
+def test_a_text_that_is_almost_a_number_is_a_text(tmp_path: Path, text: str) -> None:
     assert read_document(file_of(tmp_path, f'a: {text}\n')) == {'a': text.strip()}
 
 

@@ -307,7 +307,7 @@ def test_a_double_crossing_between_two_points_is_found(
     assert check(leap(short_of, 200)[0], UNBOUND).accepted
 
 
-def test_where_the_legs_fold_up_on_a_wide_way_is_found() -> None:
+def test_a_singularity_of_the_legs_on_a_wide_way_is_found() -> None:
     """Two points at rest, 20 s apart: the platform's own way between them is clear."""
     motion = Motion.from_euler([[0.3157, -0.3343, 1.0948], [-0.3375, -0.0826, 0.9219]],
                                [[-0.5036, 0.3398, 0.2156], [-0.5072, 0.5726, -1.1678]])

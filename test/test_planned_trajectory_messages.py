@@ -108,7 +108,7 @@ def test_without_effort_points_have_none(joint: str) -> None:
         assert point.time_from_start == other.time_from_start
 
 
-def test_values_say_what_it_asks_of_the_hexapod() -> None:
+def test_values_have_the_largest_force_and_condition_number() -> None:
     times, rows = sampled('clear', SECOND // 100)
     outcome = outcome_of(messages.trajectory(STAMP, times, rows))
     values = dict(outcome.values)
@@ -192,7 +192,7 @@ def test_parameters_and_wrench_are_those_it_began_with() -> None:
 # Rejected
 
 def spoilt(**changes: Any) -> bytes:
-    """Return a message of four points, spoilt."""
+    """Return a message of four points, corrupted."""
     times, rows = some(4)
     times = list(changes.pop('times', times))
     for (point, column), value in changes.pop('numbers', {}).items():
@@ -245,7 +245,7 @@ BAD: dict[str, tuple[bytes, str, str]] = {
 
 @pytest.mark.parametrize('case', BAD)
 @pytest.mark.parametrize('names', [('platform',), ('p',)])
-def test_bad_input_is_rejected_in_words(case: str, names: tuple[str, ...]) -> None:
+def test_bad_input_is_rejected_with_its_reason(case: str, names: tuple[str, ...]) -> None:
     data, reason, words = BAD[case]
     outcome = outcome_of(data)
     assert outcome.reason.startswith(reason)
@@ -263,7 +263,7 @@ def test_of_too_many_points_none_is_read() -> None:
     assert outcome.message == 'rejected: malformed: 100001 points: must be 1 to 100000'
 
 
-def test_too_many_samples_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_samples_than_allowed_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     times, rows = sampled('clear', SECOND)
     monkeypatch.setattr(planned_trajectory, 'MOST_SAMPLES', 100)
     outcome = outcome_of(messages.trajectory(STAMP, times, rows))
@@ -273,7 +273,7 @@ def test_too_many_samples_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None
 
 @settings(max_examples=300, deadline=None)
 @given(st.data())
-def test_whatever_comes_is_accepted_or_rejected(data: st.DataObject) -> None:
+def test_any_trajectory_is_accepted_or_rejected(data: st.DataObject) -> None:
     times, rows = some(data.draw(st.integers(1, 6)))
     message = bytearray(messages.trajectory(
         STAMP, times, rows, frame=data.draw(st.sampled_from(['', 'base'])),

@@ -157,7 +157,7 @@ def test_a_trajectory_is_answered_with_one_set_of_parameters(fresh: Start) -> No
     check(planner.until_answered(3), [HOME], heavy)
 
 
-def test_what_is_in_work_ends_with_the_node(start: Start) -> None:
+def test_work_on_trajectories_ends_with_the_node(start: Start) -> None:
     node = start()
     node.until_active()
     planner = Planner(node)

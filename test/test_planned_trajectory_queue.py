@@ -71,7 +71,7 @@ def test_it_is_full_with_those_in_work_and_waiting() -> None:
     assert not timed.queue.full
 
 
-def test_what_is_dropped_is_counted_and_does_nothing_any_more() -> None:
+def test_dropped_trajectories_are_counted_and_not_continued() -> None:
     timed = Timed()
     assert timed.queue.drop() == 0
     for name in ('first', 'second'):

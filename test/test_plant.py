@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The plant: balances and closed forms, which it does not know, over the motions that it gives."""
+"""The plant: balances and closed forms, which it does not use, over its motions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ import pytest
 from referees import (
     energies, friction, printed_compiled_and_not, relative, rng, ROOT, rotation_about, size_of,
     smooth_motion)
-from simulated import FRICTIONLESS, MACHINE, MASSLESS, random_simulated, simulated, UNLIMITED
+from simulated import FRICTIONLESS, HEXAPOD, MASSLESS, random_simulated, simulated, UNLIMITED
 
 from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.plant_dynamics import STATE_TWIST
@@ -85,9 +85,9 @@ def worked(plant: Plant, periods: int, seed: int) -> tuple[float, float, float]:
 
 # Energy
 
-@pytest.mark.parametrize('machine', ['config', 'random'])
-def test_over_a_minute_without_friction_work_is_the_change_of_energy(machine: str) -> None:
-    parameters = (simulated(rate=1000.0, **{**FRICTIONLESS, **UNLIMITED}) if machine == 'config'
+@pytest.mark.parametrize('hexapod', ['config', 'random'])
+def test_over_a_minute_without_friction_work_is_the_change_of_energy(hexapod: str) -> None:
+    parameters = (simulated(rate=1000.0, **{**FRICTIONLESS, **UNLIMITED}) if hexapod == 'config'
                   else random_simulated(4, rate=1000.0, **FRICTIONLESS))
     change, work, exchanged = worked(Plant(parameters), 60_000, 5)
     assert abs(change - work) < 1e-6 * exchanged
@@ -111,7 +111,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step() -> None:
     assert np.all(np.abs(orders - 4.0) < 0.3)
 
 
-def test_friction_takes_what_is_lost() -> None:
+def test_the_energy_lost_is_the_work_of_friction() -> None:
     """In free motion the energy falls all the time, by what friction times rate amount to."""
     plant = Plant(random_simulated(7, rate=1000.0))
     set_moving(plant, [0.5, -0.3, 0.2, 0.4, 0.5, -0.6])
@@ -193,7 +193,7 @@ def test_a_free_body_of_any_shape_keeps_energy_and_angular_momentum() -> None:
 
 
 @pytest.mark.parametrize('seed', range(5))
-def test_the_accelerations_ask_for_the_forces_that_acted(seed: int) -> None:
+def test_the_accelerations_require_the_forces_that_acted(seed: int) -> None:
     random = rng(seed)
     plant = Plant(random_simulated(seed))
     set_moving(plant, random.uniform(-0.3, 0.3, 6))
@@ -208,7 +208,7 @@ def test_the_accelerations_ask_for_the_forces_that_acted(seed: int) -> None:
     assert state.forces == tuple(commands.tolist())
 
 
-def test_a_rotation_stays_one() -> None:
+def test_a_rotation_stays_a_rotation() -> None:
     plant, _ = top(1e-3, [30.0, -20.0, 25.0])
     for _ in range(5000):
         state = plant.advance(ZERO, ZERO)
@@ -219,7 +219,7 @@ def test_a_rotation_stays_one() -> None:
 
 # End stops and what saturates
 
-def test_end_stops_hold_a_machine_that_falls_on_them() -> None:
+def test_end_stops_hold_a_hexapod_that_falls_on_them() -> None:
     parameters = simulated()
     plant = Plant(parameters)
     platform = StewartPlatform(parameters)
@@ -231,7 +231,7 @@ def test_end_stops_hold_a_machine_that_falls_on_them() -> None:
     assert max(map(abs, state.twist)) < 1e-9
     carried = (150.0 + 6 * 6.0) / 6.0 + 30.0
     stiffness = carried * (2.0 * math.pi * 30.0) ** 2
-    # At rest the springs carry the machine, as its gravity vector has it without them.
+    # At rest the springs carry the hexapod, as its gravity vector has it without them.
     motion = motion_of(state)
     held = np.linalg.solve(platform.inverse_jacobian(motion).T,
                            platform.gravity_vector(motion))
@@ -241,7 +241,7 @@ def test_end_stops_hold_a_machine_that_falls_on_them() -> None:
     assert deepest < 0.02
 
 
-def test_end_stops_hold_against_actuators_that_push_out_and_then_let_go() -> None:
+def test_end_stops_hold_against_actuators_that_push_and_then_release() -> None:
     plant = Plant(simulated())
     for _ in range(2000):
         state = plant.advance((6000.0,) * 6, ZERO)
@@ -259,7 +259,7 @@ def test_end_stops_hold_against_actuators_that_push_out_and_then_let_go() -> Non
 
 
 @pytest.mark.parametrize('ratio', [0.0, 0.3, 1.0, 3.0])
-def test_end_stops_only_push_back_and_give_no_energy(ratio: float) -> None:
+def test_end_stops_only_push_back_and_add_no_energy(ratio: float) -> None:
     """Their force is what the balance of forces leaves: outward where short, never inward."""
     parameters = simulated(end_stops__damping_ratio=ratio, rate=1000.0, **FRICTIONLESS)
     plant, platform = Plant(parameters), StewartPlatform(parameters)
@@ -286,7 +286,7 @@ def test_actuators_saturate() -> None:
     assert other.advance((6000.0, -6000.0, 5000.0, 6000.0, -6000.0, 6000.0), ZERO) == state
 
 
-# Stiff machines
+# Stiff hexapods
 
 @pytest.mark.parametrize('changes', [
     {'actuator.coulomb_friction': 500.0}, {'actuator.viscous_friction': 1e5},
@@ -294,8 +294,8 @@ def test_actuators_saturate() -> None:
     {'end_stops.frequency': 500.0}, {'end_stops.damping_ratio': 20.0},
     {'actuator.coulomb_friction': 500.0, 'actuator.reflected_mass': 0.0, 'step': 2e-4}],
     ids=str)
-def test_a_stiff_machine_is_integrated_without_trembling(changes: dict[str, Any]) -> None:
-    """Pushed, let go and come to rest by friction alone: rates die away, without a sign of h."""
+def test_a_stiff_hexapod_is_integrated_without_oscillation(changes: dict[str, Any]) -> None:
+    """Pushed, released and at rest by friction alone: rates decay, whatever the step."""
     plant = Plant(simulated(**changes))
     assert plant.substeps > 1 or changes.get('step')
     up = StewartPlatform(plant.parameters).inverse_dynamics(motion_of(plant.state)).forces
@@ -313,8 +313,8 @@ def test_a_stiff_machine_is_integrated_without_trembling(changes: dict[str, Any]
 
 
 @pytest.mark.parametrize('seed', range(12))
-def test_of_a_stiff_machine_let_loose_the_energy_never_rises(seed: int) -> None:
-    """Friction from none to far too much, stops from soft to hard, with reflected mass or none."""
+def test_the_energy_of_a_released_stiff_hexapod_never_increases(seed: int) -> None:
+    """Friction from zero to far too much, stops from soft to hard, with reflected mass or none."""
     random = rng(seed)
     p = random_simulated(seed)
     lengths = StewartPlatform(p).inverse_kinematics(
@@ -378,9 +378,9 @@ def test_a_load_that_overflows_holds_it_at_rest() -> None:
 
 
 @pytest.mark.parametrize('massless', [False, True])
-def test_legs_that_lose_their_length_hold_it_at_rest(massless: bool) -> None:
+def test_legs_of_zero_length_hold_it_at_rest(massless: bool) -> None:
     """Base and platform joints are alike and it falls straight down, through itself."""
-    joints = MACHINE['geometry.base_joints']
+    joints = HEXAPOD['geometry.base_joints']
     plant = Plant(simulated(geometry__platform_joints=joints, **{
         **UNLIMITED, **FRICTIONLESS, **(MASSLESS if massless else {}),
         'platform.center_of_mass': [0.0, 0.0, 0.0],
@@ -392,7 +392,7 @@ def test_legs_that_lose_their_length_hold_it_at_rest(massless: bool) -> None:
     assert abs(state.pose[2]) < 0.05
 
 
-def test_through_a_singularity_it_falls_as_any_body_does() -> None:
+def test_through_a_singularity_it_falls_as_a_free_body_does() -> None:
     """Where det(J) is zero the legs hold no longer; nothing of the motion is singular."""
     plant = Plant(simulated(**UNLIMITED))
     dets = []
@@ -406,7 +406,7 @@ def test_through_a_singularity_it_falls_as_any_body_does() -> None:
 
 # Measured
 
-def test_noise_has_its_deviations_and_is_on_the_legs_alone() -> None:
+def test_noise_has_its_deviations_and_is_on_the_legs_only() -> None:
     plant = Plant(simulated(noise__length=1e-4, noise__rate=2e-3, noise__force=5.0))
     state = plant.state
     many = 2000
@@ -465,7 +465,7 @@ def test_compiled_and_not_gives_the_same_bits() -> None:
      'leg_1: length 0.739072 m is 0.210928 m below limits.length_min'),
     ({'initial_pose': [1e300, 0.0, 0.5, 0.0, 0.0, 0.0], **UNLIMITED}, 'one that overflows'),
     ({'initial_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], **UNLIMITED,
-      'geometry.platform_joints': MACHINE['geometry.base_joints']},
+      'geometry.platform_joints': HEXAPOD['geometry.base_joints']},
      'a leg would have no length'),
     ({'platform.mass': -1.0}, 'platform.mass: -1.0 kg: must be more than 0'),
     ({'noise.length': -1.0}, 'noise.length: -1.0 m: must be at least 0'),
@@ -478,9 +478,9 @@ def test_a_broken_rule_is_named(changes: dict[str, Any], said: str) -> None:
     assert '\n' not in str(info.value)
 
 
-def test_a_pose_is_missed() -> None:
+def test_a_missing_initial_pose_is_named() -> None:
     with pytest.raises(ParameterError, match='initial_pose: missing'):
-        SimulatorParameters(MACHINE)
+        SimulatorParameters(HEXAPOD)
 
 
 @pytest.mark.parametrize('rate', [1.0, 40.0, 500.0, 1000.0, 10_000.0])
@@ -490,8 +490,8 @@ def test_a_period_is_a_whole_number_of_steps(rate: float) -> None:
     assert plant._step <= 1e-3 * (1.0 + 1e-12)
 
 
-def test_the_files_of_the_package_go_together() -> None:
-    given = {**MACHINE, **read_yaml(ROOT / 'config' / 'simulator.yaml', 'stewart_simulator')}
+def test_the_files_of_the_package_fit_together() -> None:
+    given = {**HEXAPOD, **read_yaml(ROOT / 'config' / 'simulator.yaml', 'stewart_simulator')}
     plant = Plant(SimulatorParameters(given))
     assert plant.substeps == 1
     assert plant.steps == 2

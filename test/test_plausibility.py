@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The doubts about a machine's parameters: none of good machines, one for each slip."""
+"""Likely mistakes in parameters: no warning for valid hexapods, one for each mistake."""
 
 from __future__ import annotations
 
@@ -36,29 +36,29 @@ PLATFORM = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 
 
 def ring(radius: float, spread: float, turn: float = 0.0, height: float = 0.0) -> Array:
-    """Return six joints in pairs, each pair's so many degrees either way of 0, 120 and 240."""
+    """Return six joints in pairs, each pair by an angle to both sides of 0, 120, 240 degrees."""
     angles = np.deg2rad(turn + np.repeat([0.0, 120.0, 240.0], 2)
                         + np.tile([-spread, spread], 3))
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles),
                             np.full(6, height)])
 
 
-def machine(base: Array, platform: Array, mass: float, inertia: float,
+def hexapod(base: Array, platform: Array, mass: float, inertia: float,
             **others: Any) -> dict[str, Any]:
-    """Return the parameters of a machine, with one principal moment for all axes."""
+    """Return the parameters of a hexapod, with one principal moment for all axes."""
     return {'geometry.base_joints': base.ravel(), 'geometry.platform_joints': platform.ravel(),
             'platform.mass': mass, 'platform.inertia': [inertia, 0.0, 0.0, inertia, 0.0, inertia],
             **{name.replace('__', '.'): value for name, value in others.items()}}
 
 
-# Machines of every size that is built.
-MACHINES = {
+# Hexapods of every size that is built.
+HEXAPODS = {
     # MathWorks' example of a Stewart platform (Smith and Wendlandt, 2002)
-    'textbook': machine(
+    'textbook': hexapod(
         ring(3.0, 2.5), np.roll(ring(1.0, 10.0, 60.0), 1, axis=0), 1200.0, 300.0,
         geometry__zero_length=2.8),
     # joints on 1.65 and 1.6 m, actuators of 1.25 m stroke
-    'flight simulator': machine(
+    'flight simulator': hexapod(
         ring(1.65, 10.5), np.roll(ring(1.6, 3.6, 60.0), 1, axis=0), 4000.0, 9000.0,
         platform__center_of_mass=[0.1, 0.0, 1.2], limits__length_min=2.08,
         limits__length_max=3.33, limits__velocity_max=1.0, geometry__zero_length=2.08,
@@ -66,58 +66,58 @@ MACHINES = {
         legs__cylinder__inertia=40.0, legs__piston__mass=40.0,
         legs__piston__center_of_mass=0.6, legs__piston__inertia=10.0),
     # the same with both frames' z down, as in aerospace
-    'flight simulator, z down': machine(
+    'flight simulator, z down': hexapod(
         ring(1.65, 10.5), np.roll(ring(1.6, 3.6, 60.0), 1, axis=0), 4000.0, 9000.0,
         gravity=[0.0, 0.0, 9.80665], platform__center_of_mass=[0.1, 0.0, -1.2],
         limits__length_min=2.08, limits__length_max=3.33),
     # on a desk, under a mirror
-    'micro hexapod': machine(
+    'micro hexapod': hexapod(
         ring(0.12, 12.0), np.roll(ring(0.08, 10.0, 60.0), 1, axis=0), 0.5, 6e-4,
         limits__length_min=0.13, limits__length_max=0.155, geometry__zero_length=0.13,
         legs__cylinder__mass=0.15, legs__cylinder__center_of_mass=-0.02,
         legs__cylinder__inertia=3e-5),
     # under a fiber's end, on piezos of a tenth of a millimeter
-    'finger-sized hexapod': machine(
+    'finger-sized hexapod': hexapod(
         ring(0.02, 15.0), np.roll(ring(0.015, 15.0, 60.0), 1, axis=0), 0.01, 5e-7,
         limits__length_min=0.0199, limits__length_max=0.02),
     # the secondary mirror of a large telescope, hanging; its reference is the mirror's vertex
-    'telescope': machine(
+    'telescope': hexapod(
         ring(0.9, 8.0, height=0.4), np.roll(ring(0.7, 8.0, 60.0, height=2.5), 1, axis=0), 2500.0,
         2800.0, platform__center_of_mass=[0.0, 0.0, 1.9], gravity=[0.0, 5.0, 8.4]),
     # a cabin on six cables from towers on a circle of 300 m, which meet it in pairs
-    'cable robot': machine(
+    'cable robot': hexapod(
         ring(300.0, 30.0), np.roll(ring(6.5, 2.0, 60.0), 1, axis=0), 30000.0, 3e5,
         gravity=[0.0, 0.0, -9.8], limits__velocity_max=0.6),
     # its axis along x
-    'horizontal': machine(
+    'horizontal': hexapod(
         ring(1.0, 10.0)[:, [2, 0, 1]], np.roll(ring(0.7, 10.0, 60.0), 1, axis=0)[:, [2, 0, 1]],
         100.0, 20.0, limits__length_min=0.8, limits__length_max=1.6),
     # in orbit, with a heavy load on a thin mast
-    'weightless': machine(
+    'weightless': hexapod(
         ring(0.5, 20.0), np.roll(ring(0.4, 20.0, 60.0), 1, axis=0), 800.0, 2000.0,
         gravity=[0.0, 0.0, 0.0], platform__center_of_mass=[0.0, 0.0, 3.0]),
     # the platform's own mass left out
-    'without mass': machine(
+    'without mass': hexapod(
         ring(0.5, 20.0), np.roll(ring(0.4, 20.0, 60.0), 1, axis=0), 1e-3, 1e-4),
 }
 
 
-@pytest.mark.parametrize('name', MACHINES)
-def test_good_machines_give_no_warnings(name: str) -> None:
-    assert likely_mistakes(Parameters(MACHINES[name])) == ()
+@pytest.mark.parametrize('name', HEXAPODS)
+def test_good_hexapods_give_no_warnings(name: str) -> None:
+    assert likely_mistakes(Parameters(HEXAPODS[name])) == ()
 
 
-def test_the_machine_of_the_package_gives_none() -> None:
+def test_the_hexapod_of_the_package_gives_none() -> None:
     assert likely_mistakes(PLATFORM) == ()
     assert likely_mistakes(symmetric_parameters()) == ()
 
 
-def test_random_machines_give_none() -> None:
+def test_random_hexapods_give_none() -> None:
     for seed in range(100):
         assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
 
 
-# Slips: what is changed in the package's machine, and what of it is said, word for word
+# Mistakes: what is changed in the package's hexapod, and the warnings, word for word
 
 BASE, TOP = PLATFORM['geometry.base_joints'], PLATFORM['geometry.platform_joints']
 INERTIA = PLATFORM['platform.inertia']
@@ -128,7 +128,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         {'geometry.base_joints': 1e3 * BASE, 'geometry.platform_joints': 1e3 * TOP}, [
             'geometry.platform_joints: 600 m from their center, and platform.mass only 150 kg: '
             'in mm?']),
-    'all joints in mm of a machine as long as a street': (
+    'all joints in mm of a hexapod as long as a street': (
         {'geometry.base_joints': 3e3 * BASE, 'geometry.platform_joints': 3e3 * TOP}, [
             'geometry.base_joints: 2.7e+03 m from their center: larger than any hexapod '
             'known: in mm?',
@@ -145,7 +145,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         {'limits.length_min': 950.0, 'limits.length_max': 1650.0}, [
             'limits.length_min: 950 m, but the joints are 0.9 m from their center: in mm?',
             'limits.length_max: 1.65e+03 m, but']),
-    'limits of another machine': (
+    'limits of another hexapod': (
         {'limits.length_min': 0.05, 'limits.length_max': 0.1}, [
             'no level pose has all legs within them; the base joints are 0.9 m']),
     'a longest leg in dm': ({'limits.length_min': (), 'limits.length_max': 0.165}, [
@@ -174,7 +174,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         {'platform.center_of_mass': [0.0, 0.0, 1100.0]}, ['platform.center_of_mass: [0, 0, 1.1']),
     'a cylinder in mm': ({'legs.cylinder.center_of_mass': 350.0}, [
         'legs.cylinder.center_of_mass: 350 m from the base joint, but no leg is over 1.65 m']),
-    'a piston beyond the base': (
+    'a piston longer than the leg': (
         {'legs.piston.center_of_mass': [0.4, 0.4, 0.4, 0.4, 1.7, 0.4]}, [
             'legs.piston.center_of_mass: 1.7 m from the platform joint, but no leg is over 1.65']),
     'a piston with the other sign': ({'legs.piston.center_of_mass': -0.9}, [
@@ -206,7 +206,7 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
 
 
 @pytest.mark.parametrize('name', SLIPS)
-def test_a_slip_is_said(name: str) -> None:
+def test_a_mistake_is_reported(name: str) -> None:
     changes, texts = SLIPS[name]
     found = likely_mistakes(PLATFORM.replaced({
         name: np.ravel(value) if np.ndim(value) else value for name, value in changes.items()}))
@@ -215,8 +215,8 @@ def test_a_slip_is_said(name: str) -> None:
     assert all(mistake.isprintable() for mistake in found)
 
 
-def test_one_slip_is_said_once() -> None:
-    several = {'all joints in mm', 'all joints in mm of a machine as long as a street',
+def test_one_mistake_is_reported_once() -> None:
+    several = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
                'the base joints in mm', 'the platform joints in cm and limits', 'limits in mm'}
     for name in set(SLIPS) - several:
         changes = {key: np.ravel(value) if np.ndim(value) else value
@@ -245,10 +245,10 @@ def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:
 
 
 def test_a_home_that_is_turned_is_found_by_the_limits() -> None:
-    # A machine whose platform frame is turned against the base: the axes parallel, no leg fits.
+    # A hexapod whose platform frame is turned against the base: the axes parallel, no leg fits.
     there = ring(0.6, 12.0, 60.0)
     platform = np.roll(there, 1, axis=0) @ from_euler([0.0, 0.0, -np.pi / 2.0]).T
-    good = machine(ring(0.9, 12.0), platform, 150.0, 20.0, limits__length_min=1.15,
+    good = hexapod(ring(0.9, 12.0), platform, 150.0, 20.0, limits__length_min=1.15,
                    limits__length_max=1.25)
     assert likely_mistakes(Parameters(good)) == ()
     (mistake,) = likely_mistakes(Parameters(
@@ -258,12 +258,12 @@ def test_a_home_that_is_turned_is_found_by_the_limits() -> None:
 
 def test_home_is_where_the_mean_leg_is_halfway_between_its_limits() -> None:
     """First above the base, then below it."""
-    machine = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
-    positions, rotations = homes(machine)
+    hexapod = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+    positions, rotations = homes(hexapod)
     assert positions[0, 2] == -positions[1, 2] > 0.9
     assert np.allclose(positions[:, :2], 0.0, atol=1e-9)
     assert np.allclose(rotations, np.eye(3), atol=1e-12)
-    lengths = StewartPlatform(machine).inverse_kinematics(Pose(positions, rotations))
+    lengths = StewartPlatform(hexapod).inverse_kinematics(Pose(positions, rotations))
     assert np.allclose(np.mean(lengths, axis=1), 1.3, rtol=0.0, atol=1e-9)
 
 
@@ -293,7 +293,7 @@ def test_of_whatever_passes_the_rules_there_are_words(
         assert len(mistake) < 500
 
 
-def test_of_a_payload_what_is_said_is_what_is_said_of_the_machine() -> None:
+def test_the_check_of_a_payload_reports_what_the_whole_check_does() -> None:
     p = PLATFORM.replaced({'platform.inertia': [1e9, 0.0, 0.0, 1e9, 0.0, 1e9],
                            'limits.length_max': 0.165, 'limits.length_min': ()})
     said, of_payload = likely_mistakes(p), likely_mistakes(p, geometry=False)

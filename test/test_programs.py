@@ -32,7 +32,7 @@ PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
             'trajectory': ReferenceMotionParameters}
 HEAVY = ('numba', 'scipy', 'rclpy', 'rosbags')
 
-# Without ROS: none of what it brings can be imported. The last line says what was loaded.
+# Without ROS: none of its modules can be imported. The last line lists what was loaded.
 RUN = f"""\
 import sys
 if sys.argv.pop(1) == 'without ROS':
@@ -72,7 +72,7 @@ def test_help_shows_defaults() -> None:
 
 
 @pytest.mark.parametrize('program', PROGRAMS)
-def test_a_program_that_lacks_ros_says_so_in_one_line(program: str) -> None:
+def test_a_program_that_lacks_ros_reports_it_in_one_line(program: str) -> None:
     code, out, error = run(program, ros='without ROS')
     assert code == 1
     assert 'rclpy' not in out
@@ -81,7 +81,7 @@ def test_a_program_that_lacks_ros_says_so_in_one_line(program: str) -> None:
 
 
 @pytest.mark.parametrize('program', PROGRAMS)
-def test_a_bad_file_is_rejected_before_anything_is_loaded(program: str, tmp_path: Path) -> None:
+def test_a_bad_file_is_rejected_before_libraries_are_loaded(program: str, tmp_path: Path) -> None:
     file = tmp_path / 'bad.yaml'
     file.write_text('/**: {ros__parameters: {rat: 1.0}}\n')
     code, out, error = run(program, '--ros-args', '--params-file', str(file))

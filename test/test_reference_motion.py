@@ -38,8 +38,8 @@ BETWEEN = {
 MOTIONS = {
     'paper': {'motion.type': 'paper', **BETWEEN},
     'quintic': {'motion.type': 'quintic', **BETWEEN},
-    'paper to and fro': {'motion.type': 'paper', 'loop': True, **BETWEEN},
-    'quintic to and fro': {'motion.type': 'quintic', 'loop': True, **BETWEEN},
+    'paper back and forth': {'motion.type': 'paper', 'loop': True, **BETWEEN},
+    'quintic back and forth': {'motion.type': 'quintic', 'loop': True, **BETWEEN},
     'sine': {
         'motion.type': 'sine', 'motion.initial': INITIAL, 'motion.duration': 3.0,
         'motion.amplitude': [0.1, 0.2, 0.05, 0.3, 0.2, 0.5],
@@ -157,7 +157,7 @@ def test_hold_is_at_rest() -> None:
     assert motion.shape == (3,) and at_rest(motion) and pose_matches(motion, INITIAL)
 
 
-def test_times_that_are_none_are_refused() -> None:
+def test_times_that_are_not_finite_are_rejected() -> None:
     with pytest.raises(MotionError, match='must be finite'):
         motion_at(parameters('quintic'), [0.0, np.nan])
 
@@ -225,7 +225,7 @@ def warnings(platform: StewartPlatform, result: InverseDynamics) -> list[Singula
 
 
 @pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
-def test_files_suit_the_machine(path: Path, platform: StewartPlatform) -> None:
+def test_files_suit_the_hexapod(path: Path, platform: StewartPlatform) -> None:
     p = ReferenceMotionParameters.from_yaml(path)
     times = np.arange(0.0, 60.0, 0.01) if p['loop'] else sample_times(p) / 1e9
     result = platform.inverse_dynamics(motion_at(p, times))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a log is told of what happens over and over."""
+"""The log lines of repeated events."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from stewart_dynamics.runtime.repeated_events import SECONDS, Series
 
 
-def test_the_first_is_said_at_once_and_the_last_when_no_more_comes() -> None:
+def test_the_first_is_logged_at_once_and_the_last_when_the_series_ends() -> None:
     series = Series()
     assert series.add('a', 'one', 0.0) == 'one'
     assert series.add('a', 'two', 1.0) is None
@@ -33,19 +33,19 @@ def test_the_first_is_said_at_once_and_the_last_when_no_more_comes() -> None:
     assert series.add('a', 'anew', 101.0) == 'anew'
 
 
-def test_a_single_one_is_said_once() -> None:
+def test_a_single_one_is_logged_once() -> None:
     series = Series()
     assert series.add('a', 'one', 0.0) == 'one'
     assert series.over(100.0) == []
 
 
-def test_of_many_one_in_five_seconds_is_said_with_how_many_were_not() -> None:
+def test_of_many_one_in_five_seconds_is_logged_with_the_number_of_others() -> None:
     series = Series()
     lines = [(n, line) for n in range(101)
              if (line := series.add('a', f'number {n}', 0.1 * n)) is not None]
     assert lines == [(0, 'number 0'), (50, 'number 50 (and 49 before it)'),
                      (100, 'number 100 (and 49 before it)')]
-    # the last one has been said
+    # the last one has been logged
     assert series.over(100.0) == []
 
 
@@ -58,7 +58,7 @@ def test_kinds_do_not_hide_each_other() -> None:
     assert series.over(1.0 + SECONDS) == ['three (the last of 2)']
 
 
-def test_two_in_a_series_that_are_far_apart_are_both_said() -> None:
+def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
     series = Series()
     assert series.add('a', 'one', 0.0) == 'one'
     assert series.add('a', 'two', SECONDS) == 'two'
@@ -66,7 +66,7 @@ def test_two_in_a_series_that_are_far_apart_are_both_said() -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(st.lists(st.tuples(st.sampled_from('ab'), st.floats(0.0, 4.0)), min_size=1))
-def test_first_and_last_are_said_and_none_is_forgotten(events: list[tuple[str, float]]) -> None:
+def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, float]]) -> None:
     series, now = Series(), 0.0
     said: list[str] = []
     for n, (kind, pause) in enumerate(events):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the nodes say of their parameters, and what they do with changes of them."""
+"""Parameters of the nodes: descriptions, and changes."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ import math
 from pathlib import Path
 import sys
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -47,26 +48,26 @@ from stewart_dynamics.parameters import PARAMETERS
 
 SECONDS = 30.0
 
-# Asks a node's service, over ROS.
+# Calls a node's service over ROS.
 Ask = Callable[[str, Any], Any]
 
 
 @pytest.fixture
 def declared(domain: int, monkeypatch: pytest.MonkeyPatch,
              ) -> Iterator[Callable[..., Ask]]:
-    """Return a function that makes a node with declared parameters, and gives how to ask it."""
+    """Return a function that makes a node with declared parameters, and how to call it."""
     monkeypatch.setenv('ROS_DOMAIN_ID', f'{domain}')
     context = rclpy.Context()
     made: list[Any] = []  # the executor, then the nodes
 
     def make(kind: type[Node], parameters: type[ParameterSet], file: str,
-             *overrides: str) -> Ask:
+             *overrides: str, name: str = '') -> Ask:
         arguments = ['--ros-args', '--params-file', str(ROOT / 'config' / file)]
         arguments += [each for override in overrides for each in ('-p', override)]
         monkeypatch.setattr(sys, 'argv', [parameters.node, *arguments])
         rclpy.init(args=arguments, context=context)
         executor = SingleThreadedExecutor(context=context)
-        node = kind(parameters.node, context=context, allow_undeclared_parameters=True,
+        node = kind(name or parameters.node, context=context, allow_undeclared_parameters=True,
                     automatically_declare_parameters_from_overrides=True)
         made.extend((executor, node))
         declare_parameters(node, parameters)
@@ -141,7 +142,7 @@ def test_the_node_describes_each_parameter(declared: Any) -> None:
             'set also while active' if parameter.while_active else 'set only while unconfigured')
 
 
-def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
+def test_types_sizes_and_ranges_are_described(declared: Any) -> None:
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     mass, inertia, cylinder, force, joints, action, autostart, friction = described(
         ask, 'platform.mass', 'platform.inertia', 'legs.cylinder.mass', 'limits.force_max',
@@ -164,17 +165,63 @@ def test_types_sizes_and_ranges_are_told(declared: Any) -> None:
 
 
 def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
-    # It has none here: rclpy's would reject these two, in its words.
+    # It has none here: rclpy's would reject these two, with its own text.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     assert set_to(ask, 'platform.mass', -1.0) == (True, '')
     assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
 
 
-def test_a_value_that_ros_drops_without_a_word_is_rejected(declared: Any) -> None:
+def test_a_value_that_ros_drops_silently_is_rejected(declared: Any) -> None:
     # rclpy would go on with the file's 150.0.
     with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
         declared(LifecycleNode, Parameters, 'platform.yaml', 'other:platform.mass:=x',
                  'stewart_dynamics:platform.mass:=0,5')
+
+
+FORMS: dict[str, Any] = {'one number': 1000.0, 'a list of one': [2000.0],
+                         'a list': [3000.0, 4000.0, 5000.0, 6000.0, 7000.0, 8000.0]}
+
+
+@pytest.mark.parametrize('last', FORMS)
+@pytest.mark.parametrize('first', FORMS)
+def test_the_last_value_on_the_command_line_is_used(
+        first: str, last: str, domain: int, tmp_path: Path) -> None:
+    def source(value: Any, how: str) -> list[str]:
+        if how == '-p':
+            return ['-p', f'limits.force_max:={value}']
+        file = tmp_path / f'{len(list(tmp_path.iterdir()))}.yaml'
+        file.write_text(f'{how}:\n  ros__parameters:\n    limits: {{force_max: {value}}}\n')
+        return ['--params-file', str(file)]
+
+    for before, after in (('-p', '-p'), ('-p', '/**'), ('/**', '-p'), ('/**', '/**'),
+                          ('stewart_dynamics', '-p'), ('stewart_dynamics', '/**')):
+        arguments = ['--params-file', str(ROOT / 'config' / 'platform.yaml'),
+                     *source(FORMS[first], before), *source(FORMS[last], after)]
+        given, of_ros = force_max(arguments, domain)
+        wanted = tuple(FORMS[last]) if isinstance(FORMS[last], list) else FORMS[last]
+        assert (given, of_ros) == (wanted, wanted), f'{before}, then {after}'
+
+
+def force_max(arguments: list[str], domain: int) -> tuple[Any, Any]:
+    """Return limits.force_max of a node with a command line: what it uses, what ROS says."""
+    context = rclpy.Context()
+    with patch.object(sys, 'argv', ['stewart_dynamics', '--ros-args', *arguments]):
+        rclpy.init(args=sys.argv, context=context, domain_id=domain)
+        node = Node('stewart_dynamics', context=context, allow_undeclared_parameters=True,
+                    automatically_declare_parameters_from_overrides=True, enable_rosout=False,
+                    start_parameter_services=False)
+        try:
+            given = declare_parameters(node, Parameters).given['limits.force_max']
+            of_ros = node.get_parameter('limits.force_max').value
+            return given, of_ros if isinstance(of_ros, float) else tuple(of_ros)
+        finally:
+            node.destroy_node()
+            context.try_shutdown()
+
+
+def test_a_value_for_a_renamed_node_is_checked(declared: Any) -> None:
+    with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
+        declared(LifecycleNode, Parameters, 'platform.yaml', 'arm:platform.mass:=0,5', name='arm')
 
 
 def test_what_ros_declares_is_described_by_ros(declared: Any) -> None:
@@ -237,7 +284,7 @@ def test_a_value_equal_to_the_present_one_is_no_change(
     ask = declared(kind, parameters, file)
     same = [RosParameter(name, value=value).to_parameter_msg(),
             RosParameter('use_sim_time', value=False).to_parameter_msg(),
-            # Read-only, and of ROS's own.
+            # Read-only, and of ROS itself.
             RosParameter('start_type_description_service', value=True).to_parameter_msg(),
             # As `ros2 param load` sends them.
             RosParameter(name, value=f'{value:.5e}').to_parameter_msg()]
@@ -250,7 +297,7 @@ def test_a_value_equal_to_the_present_one_is_no_change(
 
 def test_a_dump_can_be_loaded_again(declared: Any) -> None:
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
-    # None is what `ros2 param load` makes of the null that `ros2 param dump` has written.
+    # `ros2 param load` sends None for the null that `ros2 param dump` has written.
     unset = RosParameter('external_wrench.force_max', value='None').to_parameter_msg()
     inertia = [1e-5, 0.0, 0.0, 1e-5, 0.0, 1e-5]
     texts = RosParameter('platform.inertia', value=f'{inertia}').to_parameter_msg()
@@ -280,7 +327,7 @@ def test_a_time_that_ros_cannot_hold_is_not_followed(
         context.try_shutdown()
 
 
-def test_null_in_a_file_is_not_given(declared: Any, tmp_path: Path) -> None:
+def test_null_in_a_file_is_a_parameter_not_given(declared: Any, tmp_path: Path) -> None:
     # As `ros2 param dump` writes what has no value.
     file = tmp_path / 'dump.yaml'
     text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
@@ -296,7 +343,7 @@ def test_null_in_a_file_is_not_given(declared: Any, tmp_path: Path) -> None:
     assert values[-1].string_value == 'base'
 
 
-def test_a_file_for_another_node_says_so(declared: Any, tmp_path: Path) -> None:
+def test_a_file_for_another_node_is_named(declared: Any, tmp_path: Path) -> None:
     file = tmp_path / 'other.yaml'
     text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
     file.write_text(text.replace('/**:', 'stewart_dynamic:'))

@@ -158,7 +158,7 @@ def test_the_policy_is_what_the_source_does(domain: int, tmp_path: Path) -> None
         peer.watched = program
         try:
             peer.until(lambda: name in peer.node.get_node_names(), 'the source is there')
-            # What it makes last: its services are there long before.
+            # It is created last: the services exist long before.
             peer.until(lambda number=number: any('/setpoint/' in topic for topic in done_by(
                 peer, name).get('publish', ())) and len(done_by(peer, name)['publish'])
                 == (5, 3)[number], 'its topics are known')
@@ -185,7 +185,7 @@ def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> N
         peer.watched = program
         try:
             peer.until(lambda: name in peer.node.get_node_names(), 'the simulator is there')
-            # What it makes last: a subscription, and /clock where it has one.
+            # They are created last: a subscription, and /clock where it has one.
             peer.until(lambda number=number: f'/{name}/wrench' in done_by(peer, name).get(
                 'subscribe', ()) and len(done_by(peer, name)['publish']) == (6, 7)[number],
                 'its topics are known')
@@ -201,7 +201,7 @@ def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> N
     assert {f'/{name}/{topic}' for topic in simulator_messages.INPUT_TYPES} < union['subscribe']
 
 
-# What would start with less security than is asked for does not start
+# Programs do not start with less security than requested
 
 def rejected(domain: int, folder: Path, name: str, *arguments: str | Path,
              **environment: str) -> str:
@@ -275,7 +275,7 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
 ])
 def test_a_sound_environment_is_let_be(environment: Callable[..., None],
                                        variables: dict[str, str], arguments: list[str]) -> None:
-    """Where all that is named is there, nothing is said; nor where no security is asked for."""
+    """Nothing is reported where all files exist, or where no security is requested."""
     environment(**variables)
     check_environment(arguments)
 
@@ -299,7 +299,7 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
 ])
 def test_what_would_be_open_is_rejected(environment: Callable[..., None], tmp_path: Path,
                                         changes: dict[str, str], text: str) -> None:
-    """Each is a mistake with which ROS or Fast DDS goes on without a word, open to others."""
+    """Each is a mistake that ROS or Fast DDS ignores, which leaves the program open to others."""
     environment(**KEYSTORE, **TLS)
     check_environment(['--enclave', '/mine'])
     environment(**changes)
@@ -316,13 +316,13 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
         check_environment([])
 
 
-# Processes that take part, or try to
+# Participants and intruders
 
 class Partner(Program):
-    """participant.py in a process of its own, and what it says last."""
+    """participant.py in a process of its own, and its last output."""
 
     def said(self) -> dict[str, Any]:
-        """Return what it says last, all keys empty before it says anything."""
+        """Return its last output; all keys are empty before the first."""
         # Fast DDS writes its log there as well.
         lines = [line for line in self.stdout.splitlines()
                  if line.startswith('{') and line.endswith('}')]
@@ -330,7 +330,7 @@ class Partner(Program):
             'sent': 0, 'heard': {}, 'diagnostics': {}, 'nodes': []}
 
     def heard(self, topic: str, mark: int = 0) -> int:
-        """Return how many messages of a topic, with this mark, it has heard."""
+        """Return how many messages of a topic, with this mark, it has received."""
         return int(self.said()['heard'].get(f'{topic} {mark}', 0))
 
 
@@ -379,7 +379,7 @@ class Crowd:
         self.until(lambda: all(each.said()['sent'] >= 40 for each in intruders), 'they have tried')
 
     def end(self, program: Program) -> None:
-        """End a program whose part is played."""
+        """End a program that is no longer needed."""
         self._programs.remove(program)
         program.kill()
 
@@ -427,7 +427,7 @@ def shares_memory(program: Program) -> bool:
 
 
 def flows(receiver: Partner, mark: int, more: int = 20) -> Callable[[], bool]:
-    """Return a condition: the receiver has heard so many more answers to setpoints of a mark."""
+    """Return a condition: the receiver has so many more answers to setpoints of a mark."""
     begun = receiver.heard('leg_states', mark)
     return lambda: receiver.heard('leg_states', mark) >= begun + more
 
@@ -443,7 +443,7 @@ def assert_only(receiver: Partner, mark: int) -> None:
 
 
 def assert_left_out(intruder: Partner) -> None:
-    """Check that an intruder that has tried has heard nothing and seen nobody."""
+    """Check that an intruder that has sent setpoints has received and discovered nothing."""
     said = intruder.said()
     assert said['heard'] == {}
     assert said['nodes'] == [name for name in said['nodes'] if name.startswith('participant_')]
@@ -453,7 +453,7 @@ def assert_left_out(intruder: Partner) -> None:
 # One host
 
 def _another_address() -> str:
-    """Return an address of this machine that others reach, empty where it has none."""
+    """Return an address of this computer that others reach, empty where it has none."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(('192.0.2.1', 9))  # sends nothing
@@ -568,7 +568,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
                       STEWART_KEYS=str(folder / 'source'))]
     crowd.until(lambda: all('Handshake failed' in each.stdout for each in turned_away),
                 'they are turned away')
-    # Not before: who dials and does not speak TLS keeps the next ones waiting.
+    # Not before: a peer that connects without TLS delays the next ones.
     unheard = [
         crowd.partner('plain_tcp', 5, file=of['node'],
                       FASTRTPS_DEFAULT_PROFILES_FILE=without(dials, 'tls')),
@@ -579,7 +579,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
         assert_left_out(intruder)
         crowd.end(intruder)
     assert_only(receiver, 1)
-    # The source has no business but with the node.
+    # The source communicates with the node only.
     assert not [name for name in source.said()['heard'] if name.startswith('setpoint')]
     assert source.said()['nodes'] == ['participant_1', 'stewart_dynamics']
     assert bound(node) == set()
@@ -630,7 +630,7 @@ def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None
 
 def test_a_key_that_cannot_be_read_is_said_in_one_line(
         domain: int, tmp_path: Path, keys: Callable[..., Path]) -> None:
-    """Fast DDS would go on, and turn everybody away without a word."""
+    """Fast DDS would go on and reject every peer without a log line."""
     folder = keys('source') / 'node'
     (folder / 'ca.pem').unlink()
     line = rejected(domain, tmp_path / 'node', 'stewart_dynamics', '--params-file', PLATFORM,
@@ -675,7 +675,7 @@ def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> No
 ])
 def test_what_no_keys_can_be_made_for_is_said(tmp_path: Path, peers: list[str],
                                               text: str) -> None:
-    """In one line, and nothing is left behind."""
+    """The error is one line, and no file is left."""
     done = subprocess.run([SECURITY / 'make_keys.sh', tmp_path / 'keys', *peers], check=False,
                           capture_output=True, text=True)
     assert done.returncode == 2

@@ -105,7 +105,7 @@ def test_of_more_than_the_backlog_the_newest_is_answered_and_the_others_are_drop
     assert fed.rejected == [(DROPPED, f'stamp {stamp} ns') for stamp in range(200, 200 + BACKLOG)]
 
 
-def test_a_restart_that_is_dropped_or_cannot_be_answered_is_handed_on() -> None:
+def test_a_restart_that_is_dropped_or_cannot_be_answered_holds_for_the_next() -> None:
     fed = Fed()
     fed.add(0, setpoint=HOME)
     fed.add(1, setpoint=HOME._replace(restart=True))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joining by stamp: every rule for bad input, and that each message is accounted for."""
+"""Joining by stamp: every rule for bad input, and that each message is answered or counted."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ from referees import rng, symmetric_parameters
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.runtime.batch_joining import WAITING
 from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
-from stewart_dynamics.runtime.joining import WAITING
 from stewart_dynamics.runtime.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
     WRONG_FRAME)
@@ -60,7 +60,7 @@ NAN, INF = math.nan, math.inf
 
 
 class Feed:
-    """Setpoints with given parameters; what it is given and what it says is kept."""
+    """Setpoints with given parameters; messages and callbacks are recorded."""
 
     def __init__(self, **given: object) -> None:
         self.said: list[tuple[Rejection, str]] = []
@@ -88,7 +88,7 @@ class Feed:
 
     @property
     def counts(self) -> dict[tuple[str, str], int]:
-        """What is rejected; the callback must have heard of each."""
+        """What is rejected; the callback must have got each."""
         assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
         return {tuple(rejection): n for rejection, n in self.setpoints.counts.items()}
 
@@ -170,7 +170,7 @@ def test_what_counts_as_used_is_the_stamp_of_the_setpoint(apart: int) -> None:
 
 
 @pytest.mark.parametrize('late', [TWIST, ACCEL])
-def test_stamps_beyond_the_tolerance_are_not_joined(late: str) -> None:
+def test_stamps_that_exceed_the_tolerance_are_not_joined(late: str) -> None:
     feed = Feed(sync_tolerance=0.002)
     for topic in TOPICS:
         if topic != late:
@@ -302,7 +302,7 @@ def test_a_wrench_is_read_without_setpoints() -> None:
     (NOT_FINITE, 'setpoint/pose rejected: not finite: nan'),
     (NOT_JOINED, 'setpoint/pose dropped: not all topics had its stamp: nan'),
     (DROPPED, 'setpoint/pose dropped: more came at once than can be answered: nan')])
-def test_what_is_dropped_is_not_called_rejected(reason: str, said: str) -> None:
+def test_a_dropped_sample_is_not_reported_as_rejected(reason: str, said: str) -> None:
     assert Rejection(POSE, reason).words('nan') == said
 
 
@@ -345,7 +345,7 @@ def test_a_stamp_that_one_topic_lacks_is_dropped() -> None:
 
 # Jumping back
 
-def test_a_jump_back_beyond_the_timeout_is_followed_and_said_once_each_time() -> None:
+def test_a_jump_back_that_exceeds_the_timeout_is_followed_and_logged_once_each_time() -> None:
     feed = Feed()
     for lap in range(3):
         for n in range(12):  # a bag that loops: 110 ms back each time
@@ -363,7 +363,7 @@ def test_a_jump_back_beyond_the_timeout_is_followed_and_said_once_each_time() ->
     assert not feed.counts
 
 
-def test_a_jump_back_of_a_nanosecond_beyond_the_timeout_is_a_restart() -> None:
+def test_a_jump_back_that_exceeds_the_timeout_by_a_nanosecond_is_a_restart() -> None:
     feed = Feed()
     assert feed.whole(SECOND)
     assert feed.whole(SECOND - 100 * MS - 1)
@@ -393,7 +393,7 @@ def test_a_restart_drops_what_waits_from_before_it() -> None:
     assert feed.whole(SECOND + 10 * MS)
 
 
-def test_a_jump_forward_is_nothing_special() -> None:
+def test_a_jump_forward_is_followed() -> None:
     feed = Feed()
     assert feed.whole(SECOND)
     assert feed.whole(1000 * SECOND)
@@ -428,7 +428,7 @@ def test_samples_without_stamps_are_joined_in_order_of_arrival(order: Sequence[s
 
 
 @pytest.mark.parametrize('order', ORDERS)
-def test_a_topic_that_speaks_earlier_is_not_joined_late(order: Sequence[str]) -> None:
+def test_a_topic_that_arrives_earlier_is_not_joined_late(order: Sequence[str]) -> None:
     feed = Feed()
     early, last = order[:2], order[2]
     for mark in (1.0, 2.0, 3.0):
@@ -482,7 +482,7 @@ def test_a_zero_stamp_among_others_is_a_time() -> None:
     assert not feed.notices[1:]
 
 
-def test_a_setpoint_after_a_jump_back_says_so() -> None:
+def test_a_setpoint_after_a_jump_back_is_a_restart() -> None:
     feed = Feed()
     setpoints = [feed.whole(stamp) for stamp in (SECOND, 2 * SECOND, SECOND, SECOND + MS)]
     assert [setpoint.restart for setpoint in setpoints if setpoint] == [False, False, True, False]
@@ -605,20 +605,20 @@ def _width(topic: str) -> int:
 
 
 def _marked(topic: str, stamp: int) -> tuple[float, ...]:
-    """Return numbers of which the first says the stamp."""
+    """Return numbers of which the first is the stamp."""
     return (float(stamp), *(HOME if topic in (POSE, COMBINED) else REST)[1:])
 
 
 samples = st.lists(st.tuples(
     st.sampled_from(TOPICS),
-    # steps of 10 ms around zero, many of them twice; a few jumps beyond the timeout
+    # steps of 10 ms around zero, many of them twice; a few jumps that exceed the timeout
     st.integers(-3, 25).map(lambda n: n * 10 * MS) | st.integers(-500, 500).map(
         lambda n: n * 7 * MS),
     st.sampled_from(['good'] * 12 + list(_FAULTS))), max_size=80)
 
 
 def _drained(feed: Feed, answers: list[Setpoint]) -> None:
-    """Bring what waits to an end: used, or dropped."""
+    """Use or drop what waits."""
     far = 2 ** 31 * SECOND - 1
     final = [answer for topic in TOPICS if (answer := feed.sample(topic, far))]
     assert len(final) == 1
@@ -627,7 +627,7 @@ def _drained(feed: Feed, answers: list[Setpoint]) -> None:
 
 @settings(derandomize=True, deadline=None, max_examples=250)
 @given(samples, st.sampled_from([0.0, 0.005, 0.02]))
-def test_every_message_is_accounted_for(
+def test_every_message_is_answered_or_counted(
         sequence: list[tuple[str, int, str]], tolerance: float) -> None:
     feed = Feed(sync_tolerance=tolerance)
     answers: list[Setpoint] = []
@@ -653,7 +653,7 @@ def test_every_message_is_accounted_for(
 
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(samples, st.sampled_from([0, 5, 20]))
-def test_only_stamps_within_the_tolerance_meet(
+def test_only_stamps_within_the_tolerance_are_joined(
         sequence: list[tuple[str, int, str]], tolerance: int) -> None:
     feed = Feed(sync_tolerance=tolerance * 1e-3)
     for topic, stamp, _ in sequence:
@@ -769,7 +769,7 @@ def test_many_of_one_topic_may_come_before_the_others() -> None:
     given = [(topic, data) for of in TOPICS for topic, data in stream(3 * WAITING // 2)
              if topic == of]
     for cuts in ((), (10, 700, 1600, 3100)):
-        # beyond WAITING the oldest are dropped
+        # of more than WAITING the oldest are dropped
         assert check_many(given, cuts) == WAITING
     assert check_many([(topic, data) for of in TOPICS for topic, data in stream(WAITING)
                        if topic == of], ()) == WAITING
@@ -798,7 +798,7 @@ FATES = ['as it is'] * 12 + [
 @settings(max_examples=150)
 @given(st.lists(st.sampled_from(FATES), max_size=90), st.lists(st.integers(0, 90), max_size=6),
        st.randoms(use_true_random=False), st.booleans())
-def test_many_of_whatever_kind_are_what_they_are_one_by_one(
+def test_many_of_any_kind_are_what_they_are_one_by_one(
         fates: list[str], cuts: list[int], random: Any, shuffled: bool) -> None:
     given = stream(30)[:len(fates)]
     if shuffled:

@@ -74,14 +74,13 @@ class Simulator:
         Parameters on the command line, ``name:=value``.
     files : sequence of Path
         Its parameter files; by default those of config/.
-    said : callable, optional
-        What this process says on stderr, where the simulator is to be in it, and not in a process
-        of its own.
+    inside : bool, optional
+        Whether it is to be in this process, and not in one of its own.
 
     """
 
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
-                 said: Callable[[], str] | None = None) -> None:
+                 inside: bool = False) -> None:
         self.peer = Peer(domain)
         self.raw = {topic: self.peer.listen(f'{SIMULATOR}/{topic}', kind)
                     for topic, kind in TYPES.items()}
@@ -93,7 +92,7 @@ class Simulator:
             part for override in overrides for part in ('-p', override))]
         self._stepped = STEPPED in overrides
         try:
-            self.program: Any = Inside(SimulatorNode, arguments, domain, said) if said else (
+            self.program: Any = Inside(SimulatorNode, arguments, domain) if inside else (
                 Program([executable('stewart_simulator'), *arguments], domain, folder))
         except StewartError:
             self.peer.close()
@@ -105,14 +104,14 @@ class Simulator:
         self.peer.until(condition, what)
 
     def until_there(self) -> None:
-        """Wait until it hears us and we hear it."""
+        """Wait until both directions are connected."""
         topics = {*TYPES, 'clock'} if self._stepped else set(TYPES)
         self.until(lambda: all(self.raw[topic] for topic in topics)
                    and self._commands.get_subscription_count()
                    and self._wrench.get_subscription_count(), 'the simulator is there')
 
     def until_said(self, level: str, text: str) -> str:
-        """Return the first line of its log that has a text in it, once it is said."""
+        """Return the first line of its log that has a text in it, once it is logged."""
         self.until(lambda: self.said(level, text), f'it says {text!r}')
         return self.said(level, text)[0]
 
@@ -121,7 +120,7 @@ class Simulator:
         return [line for line in log_lines(self.program.stderr, level) if text in line]
 
     def command(self, message: Any) -> None:
-        """Publish six forces, or any message, or bytes in the place of one."""
+        """Publish six forces, or any message, or bytes."""
         if not isinstance(message, bytes | Float64MultiArray):
             message = Float64MultiArray(data=[float(number) for number in message])
         self._commands.publish(message)
@@ -151,7 +150,7 @@ class Simulator:
         return stamp_of(self.raw['clock'][-1])
 
     def at_work(self) -> None:
-        """Check that it still publishes, and nothing but numbers."""
+        """Check that it still publishes, and only finite numbers."""
         if not self._stepped:
             many = len(self.raw['accel'])
             self.until(lambda: len(self.raw['accel']) > many + 10, 'it goes on')
@@ -203,10 +202,10 @@ def start(domain: int, tmp_path: Path) -> Iterator[Start]:
 
 
 @pytest.fixture
-def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that makes a simulator in this process; in the end it must be at work."""
     begun: list[Simulator] = []
-    make = partial(Simulator, domain, said=lambda: capfd.readouterr().err)
+    make = partial(Simulator, domain, inside=True)
     with one_after_the_other(make, tmp_path) as start:
         def started(*overrides: str, **options: Any) -> Simulator:
             begun.append(start(*overrides, **options))
@@ -237,7 +236,7 @@ def one_after_the_other(make: Callable[..., Simulator], folder: Path) -> Iterato
 
 @pytest.fixture
 def unlimited(tmp_path: Path) -> Path:
-    """Return the file of a machine without limits."""
+    """Return the file of a hexapod without limits."""
     text = PLATFORM.read_text(encoding='utf-8')
     before, _, rest = text.partition('    limits:\n')
     file = tmp_path / 'unlimited.yaml'
@@ -247,7 +246,7 @@ def unlimited(tmp_path: Path) -> Path:
 
 
 def holding() -> list[float]:
-    """Return the forces that hold the machine in its initial pose."""
+    """Return the forces that hold the hexapod in its initial pose."""
     plant = Plant(SimulatorParameters(GIVEN))
     platform = StewartPlatform(plant.parameters)
     pose = Pose(plant.state.pose[:3], np.eye(3))
@@ -272,7 +271,7 @@ def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None
         for n, command in enumerate(commands):
             if n == 20:
                 simulator.load((100.0, 0.0, -50.0, 0.0, 10.0, 0.0))
-                # Wrenches and commands come in any order: a rejected one tells that they came.
+                # Wrenches and commands come in any order: a rejected one shows that they came.
                 simulator.load((1.0,) * 6, frame='elsewhere')
                 simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
             simulator.step(command)
@@ -290,9 +289,9 @@ def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None
             assert seen[0][topic][n] == data
 
 
-def test_each_command_is_one_period_and_nothing_else_moves_time(begin: Start) -> None:
+def test_each_command_is_one_period_and_nothing_else_advances_time(begin: Start) -> None:
     simulator = begin(STEPPED)
-    # Until the first command it says again and again where it is.
+    # Until the first command it repeats its state.
     simulator.until(lambda: len(simulator.raw['clock']) >= 3, 'it says so again')
     assert set(simulator.stamps('clock')) == set(simulator.stamps()) == {FIRST}
     assert len(set(simulator.raw['leg_states'])) == 1
@@ -313,7 +312,7 @@ def test_each_command_is_one_period_and_nothing_else_moves_time(begin: Start) ->
             stamps = sorted(set(stamps))
         assert [each for each in stamps if each > FIRST] == list(
             range(FIRST + PERIOD, end + 1, PERIOD))
-    # Those who follow the clock do so best effort: it says again what is not answered, no more.
+    # Subscribers of the clock are best effort: it repeats what is not answered, nothing else.
     many = len(simulator.raw['clock'])
     simulator.until(lambda: len(simulator.raw['clock']) > many + 2, 'it says so again')
     assert simulator.stamps('clock')[-1] == simulator.stamps()[-1] == end
@@ -324,7 +323,7 @@ def test_each_command_is_one_period_and_nothing_else_moves_time(begin: Start) ->
 
 # In real time
 
-def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> None:
+def test_in_real_time_the_brakes_hold_it_until_the_first_command(begin: Start) -> None:
     simulator = begin('rate:=250.0')
     simulator.until(lambda: len(simulator.raw['accel']) > 100, 'it goes on')
     assert simulator.raw['clock'] == []
@@ -341,7 +340,7 @@ def test_in_real_time_the_brakes_hold_it_until_it_is_commanded(begin: Start) -> 
                     'the last ones have come')
     stamps = simulator.stamps()
     assert min(np.diff(stamps)) == 4_000_000
-    # A machine that is busy with other things may hold it up; that is all it may say.
+    # A busy computer may hold it up; nothing else may be logged.
     behind = simulator.said('WARN', 'fell behind by')
     assert simulator.said('WARN', '') == behind
     if not behind:
@@ -421,7 +420,7 @@ def test_what_cannot_be_computed_holds_it_at_rest(
         assert simulator.step([1e300] * 6) == FIRST + PERIOD
     else:
         simulator.command([1e300] * 6)
-    simulator.until_said('ERROR', 'held at rest for good')
+    simulator.until_said('ERROR', 'held at rest permanently')
     assert simulator.said('ERROR', 'motion cannot be computed')
     if mode == 'stepped':
         assert simulator.step(holding()) == FIRST + 2 * PERIOD
@@ -482,19 +481,18 @@ CANNOT = [
 ]
 
 
-def test_what_it_cannot_simulate_is_said_in_one_line(
-        domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: Start) -> None:
-    for overrides, said in CANNOT:
-        with pytest.raises(StewartError, match=re.escape(said)):
-            Simulator(domain, tmp_path / 'inside', *overrides,
-                      said=lambda: capfd.readouterr().err)
-    for overrides, said in (CANNOT[0], CANNOT[-1]):
+def test_what_it_cannot_simulate_is_reported_in_one_line(
+        domain: int, tmp_path: Path, start: Start) -> None:
+    for overrides, words in CANNOT:
+        with pytest.raises(StewartError, match=re.escape(words)):
+            Simulator(domain, tmp_path / 'inside', *overrides, inside=True)
+    for overrides, words in (CANNOT[0], CANNOT[-1]):
         program = start(*overrides).program
         assert program.wait() == 1, program.stderr
         lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
         assert len(lines) == 1, program.stderr
         assert lines[0].startswith('stewart_simulator: ')
-        assert said in lines[0]
+        assert words in lines[0]
 
 
 def test_a_parameter_is_only_read_at_the_start(begin: Start) -> None:
@@ -517,6 +515,6 @@ def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
         assert f'  {name} (double' in program.stdout
 
 
-def test_the_topics_are_those_of_the_messages() -> None:
+def test_topics_and_messages_have_the_same_types() -> None:
     assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
             for topic, kind in TYPES.items()} == OUTPUT_TYPES

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The warning of a singularity: crossings, hysteresis, foretelling."""
+"""The singularity warning: crossings, hysteresis, prediction."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def after(*samples: tuple[float, float, float], start: Singularity | None = None
 
 
 def turning(parameters: Parameters, axis: np.ndarray, rate: float, time: float) -> Motion:
-    """Return the platform in the machine's middle at a time of a steady turn."""
+    """Return the platform in the hexapod's middle at a time of a steady turn."""
     return Motion([0.0, 0.0, size_of(parameters)], rotation_about(axis, rate * time), None,
                   rate * axis)
 
@@ -77,7 +77,7 @@ def test_a_change_of_sign_between_two_samples_is_a_crossing() -> None:
         assert after((sign * 0.2, 0.0, 3.0), start=state).crossings == 2
 
 
-def test_a_machine_of_negative_determinant_is_as_good_as_any() -> None:
+def test_a_negative_determinant_alone_is_no_warning() -> None:
     state = after((-0.2, 0.0, 3.0), (-0.1, 0.0, 3.0))
     assert not state.warning
     assert state.crossings == 0
@@ -153,7 +153,7 @@ def test_the_predicted_time_nears_the_true_one_along_a_quarter_turn(rate: float)
     assert errors[-1] < 0.51 * errors[-2]
 
 
-def test_the_predicted_time_nears_the_true_one_on_machines_without_symmetry() -> None:
+def test_the_predicted_time_nears_the_true_one_on_hexapods_without_symmetry() -> None:
     random = rng()
     crossed = 0
     while crossed < 5:

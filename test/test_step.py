@@ -37,14 +37,14 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 REST = (0.0,) * 12
 STAMP = 12_000_000_034
 
-# The machine turned as far as it is singular, and its legs and platform in one plane.
+# The hexapod turned as far as it is singular, and its legs and platform in one plane.
 QUARTER = Setpoint(STAMP, (0.0, 0.0, 1.0, *QUARTER_TURN.ravel().tolist(), *REST))
 FLAT = Setpoint(STAMP, (0.0, 0.0, 0.0, *UPRIGHT, *REST))
 HOME = Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *REST))
 
 
 def rows(parameters: Parameters, many: int) -> list[tuple[Setpoint, Six]]:
-    """Return random setpoints and wrenches that suit a machine."""
+    """Return random setpoints and wrenches that suit a hexapod."""
     random = rng()
     motion = random_motion(parameters, random, many)
     wrenches = random_wrench(parameters, random, many).tolist()

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The library's calls: what only they do, and that any argument gives numbers or one line."""
+"""The library's calls: their arguments and results; any argument gives numbers or an error."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ EXAMPLE = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 
 @pytest.fixture(scope='module')
 def platform() -> StewartPlatform:
-    """Return a hexapod with nothing special about it."""
+    """Return a random hexapod."""
     return StewartPlatform(random_parameters(rng()))
 
 
@@ -74,7 +74,7 @@ def test_where_a_pose_is_taken_a_motion_will_do(platform: StewartPlatform) -> No
 @pytest.mark.parametrize('given', [
     None, {'position': 1}, [[0.0, 0.0, 1.0], np.eye(3)], np.zeros(24), 'pose', 1.0, 1 + 2j,
     Motion, (np.zeros(3), np.eye(3))], ids=str)
-def test_nothing_else_is_taken(platform: StewartPlatform, given: Any) -> None:
+def test_other_types_are_rejected(platform: StewartPlatform, given: Any) -> None:
     for call in (platform.inverse_kinematics, platform.inverse_jacobian, platform.mass_matrix,
                  platform.gravity_vector, platform.inverse_dynamics, platform.force_breakdown,
                  platform.coriolis_matrix, platform.inverse_jacobian_rate,
@@ -89,7 +89,7 @@ def test_nothing_else_is_taken(platform: StewartPlatform, given: Any) -> None:
         StewartPlatform(given)
 
 
-def test_a_pose_in_place_of_a_motion_is_answered_with_how_to_make_one(
+def test_the_error_about_a_pose_in_place_of_a_motion_says_how_to_make_one(
         platform: StewartPlatform) -> None:
     pose = Pose([0.0, 0.0, 1.0], np.eye(3))
     with pytest.raises(MotionError, match='must be a Motion; Motion.from_pose makes one at rest'):
@@ -184,7 +184,7 @@ def test_natural_modes_solve_the_eigenvalue_problem(platform: StewartPlatform) -
                           modes.frequencies[1, 2])
 
 
-def test_natural_modes_of_a_bare_platform_are_those_known() -> None:
+def test_natural_modes_of_a_platform_on_vertical_legs_are_the_closed_form() -> None:
     """On vertical legs over a symmetric platform, heave is sqrt(sum k / m) / (2 pi)."""
     ring = 0.6 * np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi / 3.0])
     platform = StewartPlatform(Parameters({
@@ -205,7 +205,7 @@ def test_natural_modes_of_a_bare_platform_are_those_known() -> None:
     ([1e6] * 5, 'leg_stiffness: shape (5,)'), (np.inf, 'must be finite'),
     ('stiff', 'not an array of real numbers'), (None, 'not an array of real numbers'),
     (np.full((4, 6), 1e6), 'pose (3,), leg_stiffness (4,)')])
-def test_a_stiffness_that_does_not_fit_is_rejected(
+def test_an_invalid_stiffness_is_rejected(
         platform: StewartPlatform, given: Any, text: str) -> None:
     poses = random_motion(platform.parameters, rng(), 3).pose
     for call in (platform.stiffness, platform.natural_modes):
@@ -234,7 +234,7 @@ def test_home_has_the_mean_leg_halfway_between_its_limits() -> None:
     ({'limits.length_min': (), 'limits.length_max': (), 'geometry.zero_length': 0.0},
      'or geometry.zero_length, must give a length'),
     ({'limits.length_min': 0.01, 'limits.length_max': 0.02}, 'no level pose has all legs')])
-def test_a_home_that_is_not_known_is_an_error(changes: dict[str, Any], text: str) -> None:
+def test_an_unknown_home_is_an_error(changes: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError, match=text):
         StewartPlatform(EXAMPLE.replaced(changes)).home_pose()
 
@@ -264,7 +264,7 @@ def test_a_platform_that_was_used_can_be_copied_and_pickled(platform: StewartPla
         assert np.array_equal(other.force_breakdown(motion), truth)
 
 
-# Whatever is given
+# Arbitrary input
 
 CALLS = {name: call for name, call in inspect.getmembers(StewartPlatform, inspect.isfunction)
          if not name.startswith('_') and name not in ('solve', 'check', 'home_pose')}

@@ -69,14 +69,13 @@ class Trajectory:
         Its parameter file.
     overrides : str
         Parameters on the command line, ``name:=value``.
-    said : callable, optional
-        What this process says on stderr, where the publisher is to be in it, and not in a process
-        of its own.
+    inside : bool, optional
+        Whether it is to be in this process, and not in one of its own.
 
     """
 
     def __init__(self, domain: int, folder: Path, file: Path, *overrides: str,
-                 said: Callable[[], str] | None = None) -> None:
+                 inside: bool = False) -> None:
         self.peer = Peer(domain)
         self._raw = {topic: self.peer.listen(f'/stewart_dynamics/{topic}', kind)
                      for topic, kind in INPUTS.items()}
@@ -85,7 +84,7 @@ class Trajectory:
                      *(part for override in overrides for part in ('-p', override))]
         done = Future()
         self.program: Any = Inside(
-            partial(TrajectoryNode, done), arguments, domain, said, done) if said else (
+            partial(TrajectoryNode, done), arguments, domain, done) if inside else (
                 Program([executable('stewart_trajectory'), *arguments], domain, folder))
 
     def received(self, topic: str) -> list[Any]:
@@ -123,9 +122,9 @@ def start(domain: int, tmp_path: Path) -> Iterator[Start]:
 
 
 @pytest.fixture
-def begin(domain: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Start]:
+def begin(domain: int, tmp_path: Path) -> Iterator[Start]:
     """Return a function that makes it in this process, with a parameter file's text."""
-    make = partial(Trajectory, domain, said=lambda: capfd.readouterr().err)
+    make = partial(Trajectory, domain, inside=True)
     with started(make, tmp_path) as begin:
         yield begin
 
@@ -181,7 +180,7 @@ def _expected(parameters: ReferenceMotionParameters, times: Any) -> NDArray[np.f
 
 @pytest.mark.parametrize('output, kind', [
     ('separate', 'paper'), ('separate', 'quintic'), ('separate', 'sine'), ('combined', 'paper')])
-def test_what_is_sent_is_the_motion_and_then_it_is_done(
+def test_the_motion_is_published_and_then_it_ends(
         begin: Start, tmp_path: Path, output: str, kind: str) -> None:
     trajectory = begin(MOTION.format(kind=kind, more=f'output: {output}'))
     parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
@@ -202,7 +201,7 @@ def test_what_is_sent_is_the_motion_and_then_it_is_done(
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
-def test_looped_it_goes_to_and_fro_until_it_is_told_to_stop(
+def test_looped_it_moves_back_and_forth_until_a_signal(
         start: Start, tmp_path: Path, number: signal.Signals) -> None:
     trajectory = start(MOTION.format(kind='quintic', more='loop: true'))
     trajectory.until(dict.fromkeys(SEPARATE, 650))  # twice 1.5 s at 200 Hz, and some
@@ -211,7 +210,7 @@ def test_looped_it_goes_to_and_fro_until_it_is_told_to_stop(
     assert trajectory.program.stdout == ''
     assert 'until stopped' in trajectory.program.stderr
     parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
-    # What was on its way when it ended may lack a topic.
+    # Messages in transit when it ended may lack a topic.
     whole = min(len(trajectory.received(topic)) for topic in SEPARATE)
     for topic in SEPARATE:
         del trajectory._raw[topic][whole:]
@@ -225,7 +224,7 @@ def test_looped_it_goes_to_and_fro_until_it_is_told_to_stop(
 
 def test_it_begins_without_subscribers_after_start_timeout(
         domain: int, tmp_path: Path, start: Start) -> None:
-    # They are on another node's topics: nobody hears these.
+    # They are on another node's topics: these have no subscribers.
     trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
                        'target:=nobody', 'motion.duration:=0.1')
     assert trajectory.program.wait() == 0
@@ -266,7 +265,7 @@ def test_in_simulated_time_what_is_due_comes_with_the_clock(begin: Start, tmp_pa
     assert_only_log_lines(trajectory.program.stderr)
 
 
-def test_it_begins_anew_where_the_clock_does(begin: Start, tmp_path: Path) -> None:
+def test_it_restarts_with_the_clock(begin: Start, tmp_path: Path) -> None:
     trajectory = begin(MOTION.format(kind='sine', more='loop: true'), 'use_sim_time:=true')
     trajectory.at(7 * SECOND, 1)
     trajectory.at(7 * SECOND + 3 * PERIOD, 4)
@@ -275,7 +274,7 @@ def test_it_begins_anew_where_the_clock_does(begin: Start, tmp_path: Path) -> No
     trajectory.at(7 * SECOND + 4 * PERIOD, 5)
     trajectory.at(SECOND, 6)
     trajectory.at(SECOND + PERIOD, 7)
-    # A simulation that starts anew begins where it began.
+    # When a simulation restarts, so does the motion.
     trajectory.at(SECOND, 8)
     trajectory.at(SECOND + PERIOD, 9)
     trajectory.program.kill()
@@ -316,7 +315,7 @@ BROKEN = {
 }
 
 
-def test_a_broken_rule_is_said_in_one_line(start: Start, tmp_path: Path) -> None:
+def test_a_broken_rule_is_reported_in_one_line(start: Start, tmp_path: Path) -> None:
     text = MOTION.format(kind='quintic', more='output: separate')
     file = tmp_path / 'trajectory.yaml'
     for good, bad, said in BROKEN.values():

@@ -65,7 +65,7 @@ class Recorded(NamedTuple):
     def of(cls, bag: Path) -> Recorded:
         """Process a bag by the joining and the step of node and replay."""
         parameters = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
-        setpoints = Setpoints(parameters, lambda refusal, details: None, print)
+        setpoints = Setpoints(parameters, lambda rejection, details: None, print)
         with closing(Recording(bag)) as recording:
             parts = [setpoints.take_many(messages) for messages, _ in recording.messages(
                 {f'{NODE}/{topic}': topic for topic in setpoints.topics})]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The check of array arguments: numbers, finite, of a shape that fits; else MotionError."""
+"""Checks of array arguments: real, finite, of the right shape; else MotionError."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from stewart_dynamics.errors import MotionError
 
 
 def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
-    """Return a finite array whose shape ends so; else MotionError names it."""
+    """Return a finite array whose shape ends with ``tail``; MotionError names any other."""
     try:
         given = np.asarray(value)
         if given.dtype.kind not in 'biuf':
             raise TypeError(f'its type is {given.dtype}')
         array = given.astype(float, copy=False)
-    # An object in a list may raise anything.
+    # Conversion of an arbitrary object may raise any exception.
     except Exception as exc:
         text = ' '.join(f'{exc}'.split())
         raise MotionError(f'{name}: {_shown(value)}: not an array of real numbers: '
@@ -45,12 +45,12 @@ def as_array(name: str, value: ArrayLike, tail: tuple[int, ...]) -> Array:
 
 
 def optional_array(name: str, value: ArrayLike | None, tail: tuple[int, ...]) -> Array:
-    """Return the same of an argument that may be left out, zeros for None."""
+    """Return the same for an optional argument: zeros for None."""
     return np.zeros(tail) if value is None else as_array(name, value, tail)
 
 
 def common_shape(**shapes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the leading shape that all of these broadcast to; else MotionError names them."""
+    """Return the leading shape to which all broadcast; MotionError names them if they do not."""
     try:
         return np.broadcast_shapes(*shapes.values())
     except ValueError as exc:
@@ -69,12 +69,12 @@ def check_finite(name: str, values: Array, leading: int) -> Array:
     if not finite.all():
         at = list(map(int, np.argwhere(~finite)[0]))
         raise MotionError(f'{name}{f" of sample {at}" if at else ""}: out of range: '
-                          'the numbers overflow')
+                          'numbers overflow')
     return values
 
 
 def _shown(value: object) -> str:
-    """Return an argument in a few words."""
+    """Return an argument as an error shows it: short."""
     if isinstance(value, str | bool | int | float | complex) and len(f'{value!r}') < 40:
         return f'{value!r}'
     return 'None' if value is None else f'a value of type {type(value).__name__}'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The compiled functions on batches: rows as they take them, large batches on all processors."""
+"""The compiled functions on batches; large batches are divided among all processors."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ import os
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import RESULT, WRENCH
 
-# A thread gets at least so many samples: a millisecond's work, far more than starting it costs.
+# Samples for one thread at least: a millisecond of work, far more than the start of a thread.
 _SAMPLES_FOR_A_THREAD = 4096
 _PARTS_OF_A_THREAD = 8
 _CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
@@ -52,19 +52,19 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     results = np.empty((len(motions), RESULT))
-    in_parts(len(motions), lambda part: kernel.solve(
+    in_parts(len(motions), lambda part: inverse_dynamics.solve(
         constants, motions[part], wrenches if len(wrenches) == 1 else wrenches[part],
         results[part]))
     return results
 
 
 def in_parts(many: int, do: Callable[[slice], object]) -> None:
-    """Call ``do`` for all of so many samples in parts, for large batches on all processors."""
+    """Call ``do`` with slices of ``many`` samples; large batches on all processors."""
     threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
     if threads < 2:
         do(slice(0, many))
         return
-    # More parts than threads: a thread that is held up leaves more to the others.
+    # More parts than threads: if one thread is slow, the others take more parts.
     edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(do, map(slice, edges[:-1], edges[1:])))

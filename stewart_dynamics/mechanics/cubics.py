@@ -56,7 +56,7 @@ class Cubics(NamedTuple):
         return low, high
 
     def middle_rate(self) -> Array:
-        """Return the middle control point of the rate: it and the rates at both ends bound it."""
+        """Return the middle control point of the rate; with both ends it bounds the rate."""
         return 3.0 * (self.end - self.start) - self.start_rate - self.end_rate
 
     def at(self, fraction: Array) -> Array:

@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters import Parameters
 
-# The numbers of the stops, six of each kind.
+# The stops as an array, six numbers of each kind.
 _SHORTEST, _LONGEST, _STIFFNESS, _DAMPING = consecutive(6, 6, 6, 6)
 STOPS = 24
 
@@ -41,14 +41,14 @@ def stiffness_and_damping(parameters: Parameters) -> tuple[Array, Array]:
     carried = ((parameters['platform.mass'] + np.sum(parameters['legs.piston.mass'])) / 6.0
                + parameters['actuator.reflected_mass'])
     if parameters[LENGTH_MIN] is None and parameters[LENGTH_MAX] is None:
-        carried = np.zeros(6)  # there are none
+        carried = np.zeros(6)  # no stops
     omega = 2.0 * np.pi * parameters['end_stops.frequency']
     return (carried * omega ** 2,
             carried * 2.0 * parameters['end_stops.damping_ratio'] * omega)
 
 
 def stops_of(parameters: Parameters) -> Array:
-    """Return the numbers of the stops (STOPS,) as ``stop_force`` takes them."""
+    """Return the stops as an array (STOPS,) for ``stop_force``."""
     stops = np.empty(STOPS)
     for where, limit, never in ((_SHORTEST, LENGTH_MIN, -math.inf),
                                 (_LONGEST, LENGTH_MAX, math.inf)):
@@ -60,7 +60,7 @@ def stops_of(parameters: Parameters) -> Array:
 @inlined
 def stop_force(stops: Array, leg: int, length: float, rate: float) -> float:
     """
-    Return the force of a leg's end stops [N], + pushes: they only push back.
+    Return the force of a leg's end stops [N], + pushes; a stop never pulls.
 
     A Kelvin-Voigt element, without the pull of its damper as the leg leaves the stop.
     """

@@ -16,8 +16,8 @@
 Force breakdown by source: gravity, inertia, velocity, friction and external wrench.
 
 The leg forces are linear in them: ``J_inv^T f = M X'' + C X' + G - wrench``, and friction adds
-to f along the leg. So the inverse dynamics gives each part alone, from a motion and a hexapod
-that have only its source.
+to f along the leg. So each part is the inverse dynamics of a motion and a
+hexapod reduced to its source.
 """
 
 from __future__ import annotations
@@ -74,16 +74,16 @@ class ForceBreakdown(NamedTuple):
         return f'<ForceBreakdown of shape {self.gravity.shape[:-1]}: {", ".join(self._fields)}>'
 
 
-# In words, in the order of ForceBreakdown.
+# Their names in texts, in the order of ForceBreakdown.
 SOURCES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench')
 
 _NO_GRAVITY = {'gravity': [0.0, 0.0, 0.0]}
 _NO_FRICTION = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
-# The inertia of the legs includes the actuators': they turn as a leg changes its length.
+# The reflected mass of the actuators is part of the inertia of the legs.
 _NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
             'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0}
 
-# Samples that are computed together: few enough for the processor's cache.
+# Samples computed at once: they fit into the processor's cache.
 _TOGETHER = 1024
 
 
@@ -148,7 +148,7 @@ class ForceBreakdownRows:
         rows[:, TWIST] = motions[:, TWIST]
         results = batch.solve(self._weightless, rows)
         by.velocity[:] = results[:, FORCES]
-        # The law itself: what it adds would drown in the other forces near a singularity.
+        # By the friction law: as a difference it would lose its digits near a singularity.
         own = np.empty((len(rows), 6))
         friction(results[:, RATES].copy(), self._viscous, self._coulomb, own)
         by.friction[:] = own

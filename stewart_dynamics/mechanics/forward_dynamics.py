@@ -15,10 +15,10 @@
 """
 Forward dynamics: how the platform accelerates under given leg forces.
 
-``X'' = M^-1 (J_inv^T (f - friction) + wrench - C X' - G)``, on the vectors of the inverse path:
-the load without acceleration comes from it, and M is made of sums over the legs,
+``X'' = M^-1 (J_inv^T (f - friction) + wrench - C X' - G)``, with the functions of the
+inverse dynamics for the load without acceleration, and with M as a sum over the legs,
 ``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with J_i = [1, -skew(a_i)], j_i
-the leg's row of J_inv and e_i what resists motion across the leg. M is positive definite for
+the leg's row of J_inv and e_i its effective mass across the leg. M is positive definite for
 every hexapod, so Cholesky solves it without a pivot (Golub and Van Loan, Matrix Computations,
 4th ed., 4.2).
 """
@@ -30,19 +30,20 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import (
     characteristic_length_of, leg_of, platform_of)
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.kernel import leg_dynamics, platform_dynamics
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION,
     ROTATION)
 from stewart_dynamics.mechanics.vectors import (
     add, Matrix3, read3, read9, rotate, scale, subtract, symmetric, Symmetric3, Vector3)
 
-# Scratch memory: the lower triangle of M, and what becomes the acceleration.
-_RIGHT = 36
-WORK = _RIGHT + 6
+# Shape of the scratch memory: the lower triangle of M, and below it the right-hand side, which
+# becomes the acceleration.
+_RIGHT = 6
+WORK = 7, 6
 
 _REST = (0.0, 0.0, 0.0)
 
@@ -75,20 +76,20 @@ def _add_body(work: Array, mass: float, moment: Vector3, inertia: Symmetric3,
     """Add the M of a rigid body with this moment of mass [kg m] and inertia about the origin."""
     x, y, z = scale(inverse_size, moment)
     for n in range(3):
-        work[7 * n] += mass
-    work[19] -= z
-    work[20] += y
-    work[24] += z
-    work[26] -= x
-    work[30] -= y
-    work[31] += x
+        work[n, n] += mass
+    work[3, 1] -= z
+    work[3, 2] += y
+    work[4, 0] += z
+    work[4, 2] -= x
+    work[5, 0] -= y
+    work[5, 1] += x
     i = inverse_size * inverse_size
-    work[21] += i * inertia[0]
-    work[27] += i * inertia[1]
-    work[28] += i * inertia[3]
-    work[33] += i * inertia[2]
-    work[34] += i * inertia[4]
-    work[35] += i * inertia[5]
+    work[3, 3] += i * inertia[0]
+    work[4, 3] += i * inertia[1]
+    work[4, 4] += i * inertia[3]
+    work[5, 3] += i * inertia[2]
+    work[5, 4] += i * inertia[4]
+    work[5, 5] += i * inertia[5]
 
 
 @inlined
@@ -96,22 +97,22 @@ def _solve(work: Array) -> None:
     """Solve the positive definite system in place: L L^T x = right."""
     for n in range(6):
         for k in range(n + 1):
-            rest = work[6 * n + k]
+            rest = work[n, k]
             for m in range(k):
-                rest -= work[6 * n + m] * work[6 * k + m]
+                rest -= work[n, m] * work[k, m]
             if n > k:
-                work[6 * n + k] = rest / work[7 * k]
-            else:  # zero where masses underflow: what comes of it is not finite
-                work[7 * n] = math.sqrt(rest) if rest > 0.0 else 0.0
-        rest = work[_RIGHT + n]
+                work[n, k] = rest / work[k, k]
+            else:  # zero where masses underflow: the result is not finite then
+                work[n, n] = math.sqrt(rest) if rest > 0.0 else 0.0
+        rest = work[_RIGHT, n]
         for m in range(n):
-            rest -= work[6 * n + m] * work[_RIGHT + m]
-        work[_RIGHT + n] = rest / work[7 * n]
+            rest -= work[n, m] * work[_RIGHT, m]
+        work[_RIGHT, n] = rest / work[n, n]
     for n in range(5, -1, -1):
-        rest = work[_RIGHT + n]
+        rest = work[_RIGHT, n]
         for m in range(n + 1, 6):
-            rest -= work[6 * m + n] * work[_RIGHT + m]
-        work[_RIGHT + n] = rest / work[7 * n]
+            rest -= work[m, n] * work[_RIGHT, m]
+        work[_RIGHT, n] = rest / work[n, n]
 
 
 @compiled
@@ -130,7 +131,7 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         Of the actuators [N], + pushes; their friction is subtracted here.
     wrench : (6,)
         Force [N] and moment [N m] on the platform at its origin, base axes.
-    work : (WORK,)
+    work : WORK
         Scratch memory.
 
     """
@@ -148,8 +149,7 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
     body_force, body_moment = platform_dynamics(constants, rotation, omega, _REST, _REST)
     force = subtract(read3(wrench, 0), body_force)
     torque = subtract(read3(wrench, 3), body_moment)
-    for n in range(WORK):
-        work[n] = 0.0
+    work[:] = 0.0
     for n in range(6):
         leg = leg_dynamics(constants, n, position, rotation, velocity, omega, _REST, _REST)
         mass += leg.inertia
@@ -161,18 +161,18 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         own = leg_of(constants, n)
         along = own.piston_mass + own.reflected_mass - leg.inertia
         for i in range(6):
-            work[_RIGHT + i] += push * leg.row[i]
+            work[_RIGHT, i] += push * leg.row[i]
             for k in range(i + 1):
-                work[6 * i + k] += along * leg.row[i] * leg.row[k]
+                work[i, k] += along * leg.row[i] * leg.row[k]
     _add_body(work, mass, moment, inertia, inverse_size)
     for n in range(3):
-        work[_RIGHT + n] += force[n]
-        work[_RIGHT + 3 + n] += inverse_size * torque[n]
+        work[_RIGHT, n] += force[n]
+        work[_RIGHT, 3 + n] += inverse_size * torque[n]
 
     _solve(work)
     for n in range(3):
-        motion[LINEAR_ACCELERATION.start + n] = work[_RIGHT + n]
-        motion[ANGULAR_ACCELERATION.start + n] = inverse_size * work[_RIGHT + 3 + n]
+        motion[LINEAR_ACCELERATION.start + n] = work[_RIGHT, n]
+        motion[ANGULAR_ACCELERATION.start + n] = inverse_size * work[_RIGHT, 3 + n]
 
 
 @entry_point

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-Forward kinematics: the pose that belongs to six leg lengths, and the twist to six leg rates.
+Forward kinematics: the pose of six leg lengths, and the twist of six leg rates.
 
 Up to forty poses have the same six lengths (Dietmaier, The Stewart-Gough platform of general
-geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess tells which
+geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess selects
 one: the last pose, or the one commanded. Newton's method on ``L(X) = L`` with the exact J_inv
-goes from it to the pose, and never to where det(J) has the other sign: another assembly is on
-the other side of a singularity.
+starts there and never steps to where det(J) has the other sign: another assembly is on the other
+side of a singularity.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from __future__ import annotations
 import math
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.matrix6 import inverse_and_determinant, Rows
 from stewart_dynamics.mechanics.rows import ANGULAR_VELOCITY, LINEAR_VELOCITY, POSITION, ROTATION
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
@@ -42,10 +42,10 @@ RESIDUAL = 1e-12
 # The outcome of a search.
 FOUND, NO_POSE, SINGULAR = range(3)
 
-# Newton's method takes 6 steps at most from nearly everywhere (benchmarks/README.md). A step to
-# the other side of a singularity is halved, and one that increases the sum of squares by this
-# factor (a first step from afar may overshoot and yet be the fastest). Where so small a part of a
-# step still does, and after so many steps, it did not converge.
+# Newton's method takes at most 6 steps from nearly everywhere (benchmarks/README.md). A step is
+# halved if it ends on the other side of a singularity, or increases the sum of squares by this
+# factor (a long first step may overshoot and still be the fastest). The method did not converge
+# if a step would have to be shorter than this part of it, or after this number of steps.
 _FARTHER = 16.0
 _LEAST_PART = 1e-3
 MOST_STEPS = 50
@@ -68,7 +68,7 @@ def _squares(rows: Rows) -> float:
 
 @inlined
 def _orthonormal(r: Matrix3) -> Matrix3:
-    """Return the rotation next to one that is off by little: R (3 - R^T R) / 2, Newton's step."""
+    """Return the rotation nearest to a matrix close to one: R (3 - R^T R) / 2, Newton's step."""
     x, y, z = (r[0], r[3], r[6]), (r[1], r[4], r[7]), (r[2], r[5], r[8])
     xx = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
     yy = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
@@ -90,7 +90,7 @@ def _turned(turn: Vector3, r: Matrix3) -> Matrix3:
     """
     Return R turned about ``turn`` by 2 atan(|turn| / 2): Cayley's map, a rotation exactly.
 
-    It is the turn by |turn| but for the third order, which does not slow Newton's method.
+    The angle is |turn| up to terms of third order, which do not slow Newton's method.
     """
     x, y, z = scale(0.5, turn)
     k = 2.0 / (1.0 + x * x + y * y + z * z)
@@ -127,13 +127,13 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
 
     """
     position = read3(motion, POSITION.start)
-    # Twice, for a guess may be off by 1e-6; rounding does not add up from pose to pose.
+    # Twice, as a guess may be 1e-6 off; rounding errors do not add up from pose to pose.
     rotation = _orthonormal(_orthonormal(read9(motion, ROTATION.start)))
     per_size = 1.0 / characteristic_length_of(constants)
     side = 0.0
-    # The last pose that was good to go on from, by how much it missed, and the step from there.
+    # The last pose accepted, its sum of squares and residual, and the step from there.
     from_position, from_rotation, before, residual = position, rotation, math.inf, math.inf
-    way, turn, part = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
+    step, turn, part = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0
     for steps in range(MOST_STEPS):
         l0, r0 = _row(constants, 0, position, rotation)
         l1, r1 = _row(constants, 1, position, rotation)
@@ -141,28 +141,28 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
         l3, r3 = _row(constants, 3, position, rotation)
         l4, r4 = _row(constants, 4, position, rotation)
         l5, r5 = _row(constants, 5, position, rotation)
-        miss = (lengths[0] - l0, lengths[1] - l1, lengths[2] - l2, lengths[3] - l3,
-                lengths[4] - l4, lengths[5] - l5)
-        missed = dot6(miss, miss)
+        error = (lengths[0] - l0, lengths[1] - l1, lengths[2] - l2, lengths[3] - l3,
+                 lengths[4] - l4, lengths[5] - l5)
+        squares = dot6(error, error)
         (i0, i1, i2, i3, i4, i5), determinant = inverse_and_determinant(r0, r1, r2, r3, r4, r5)
-        if missed < _FARTHER * before and side * determinant >= 0.0:
+        if squares < _FARTHER * before and side * determinant >= 0.0:
             condition = math.sqrt(_squares((r0, r1, r2, r3, r4, r5))
                                   * _squares((i0, i1, i2, i3, i4, i5)))
-            residual = max(abs(miss[0]), abs(miss[1]), abs(miss[2]), abs(miss[3]), abs(miss[4]),
-                           abs(miss[5]))
-            # by Frobenius norms, at most six times the condition number: a step goes anywhere then
+            residual = max(abs(error[0]), abs(error[1]), abs(error[2]), abs(error[3]),
+                           abs(error[4]), abs(error[5]))
+            # By Frobenius norms, at most six times the condition number.
             if not condition < UNSOLVABLE_CONDITION:
                 return SINGULAR, steps, residual
-            from_position, from_rotation, before, side = position, rotation, missed, determinant
-            way = dot6(i0, miss), dot6(i1, miss), dot6(i2, miss)
-            turn = scale(per_size, (dot6(i3, miss), dot6(i4, miss), dot6(i5, miss)))
+            from_position, from_rotation, before, side = position, rotation, squares, determinant
+            step = dot6(i0, error), dot6(i1, error), dot6(i2, error)
+            turn = scale(per_size, (dot6(i3, error), dot6(i4, error), dot6(i5, error)))
             part = 1.0
         elif residual > RESIDUAL:
             part *= 0.5
             if part < _LEAST_PART:
                 return NO_POSE, steps, residual
-        # With the last step, where it is near enough: what it then misses is rounding.
-        position = add(from_position, scale(part, way))
+        # If the residual is small enough this is the last step, to within rounding.
+        position = add(from_position, scale(part, step))
         rotation = _turned(scale(part, turn), from_rotation)
         if residual <= RESIDUAL:
             for n in range(3):
@@ -175,7 +175,7 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
 
 @compiled
 def twist(constants: Array, rates: Array, motion: Array) -> None:
-    """Write the twist of a row of motion (MOTION,) that leg rates (6,) [m/s] belong to."""
+    """Write into a row of motion (MOTION,) the twist of leg rates (6,) [m/s]."""
     position = read3(motion, POSITION.start)
     rotation = read9(motion, ROTATION.start)
     inverse, _ = inverse_and_determinant(
@@ -199,6 +199,6 @@ def poses(constants: Array, lengths: Array, motions: Array, codes: Integers, ste
 
 @entry_point
 def twists(constants: Array, rates: Array, motions: Array) -> None:
-    """Write the twists of motions (N, MOTION) that leg rates (N, 6) belong to."""
+    """Write into motions (N, MOTION) the twists of leg rates (N, 6)."""
     for n in range(len(motions)):
         twist(constants, rates[n], motions[n])

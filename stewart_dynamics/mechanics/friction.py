@@ -30,10 +30,15 @@ COULOMB_RATE = 1e-3
 
 @inlined
 def with_friction(force: float, rate: float, viscous: float, coulomb: float) -> float:
-    """Return the force of an actuator [N] that overcomes its friction at a rate [m/s] as well."""
+    """Return a force [N] plus the force that overcomes the friction at a rate [m/s]."""
     slip = rate / COULOMB_RATE
     return (force + viscous * rate
             + coulomb * (-1.0 if slip < -1.0 else 1.0 if slip > 1.0 else slip))
+
+
+def coulomb_damping(coulomb: Array) -> Array:
+    """Return the slope of Coulomb friction [N] at standstill, where it acts as damping [N s/m]."""
+    return coulomb / COULOMB_RATE
 
 
 @entry_point

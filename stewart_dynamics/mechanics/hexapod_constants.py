@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The constants of a hexapod as one array, as all compiled functions take them.
+The constants of a hexapod as one array, for all compiled functions.
 
-First those of the platform, then 13 for each leg. Masses and distances of a leg are
-combined here as far as they do not change with its length.
+First those of the platform, then 13 for each leg. Products of masses and distances of a leg that
+do not change with its length are computed here.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def gravity_of(constants: Array) -> Vector3:
 
 @inlined
 def characteristic_length_of(constants: Array) -> float:
-    """Return the length that makes moments and forces alike [m]."""
+    """Return the length by which moments are divided [m]."""
     length: float = constants[_CHARACTERISTIC_LENGTH]
     return length
 

@@ -35,10 +35,10 @@ from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.parameters import Parameters
 
-# Lengths divided by the larger radius: legs have 1 to 10 of it, in mm 1000 times that.
+# Largest length, in larger radii: legs have 1 to 10, legs given in mm 1000 times that.
 _LENGTH_RATIO = 100.0
 
-# Where nothing tells how high the platform is: these parts of the larger radius.
+# Heights that are tried if the parameters do not give one, in larger radii.
 HEIGHTS = (0.3, 0.6, 1.0, 1.7, 3.0)
 _YAWS = np.deg2rad(np.arange(0.0, 360.0, 10.0))
 
@@ -62,23 +62,23 @@ class Shape(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """What the limits of the legs' lengths leave of the level poses."""
+    """The level poses within the limits of length."""
 
     yaw: float | None
-    """The angle nearest to 0 at which all legs are within them at some height; None: none."""
+    """The angle nearest to 0 at which all legs are within them at some height; else None."""
     longest: float
-    """The longest leg that is to be expected [m]."""
+    """The longest leg to be expected [m]."""
 
 
 class Home(NamedTuple):
-    """How high the platform may be at home."""
+    """The height of the platform at home."""
 
     heights: Array
     """Above the base joints' center, negative below it, the most likely first (N,) [m]."""
     yaw: float
     """Turn about the normal [rad]."""
     length: float | None
-    """Of the mean leg [m]; None where the parameters do not tell."""
+    """Of the mean leg [m]; None if the parameters do not give it."""
 
     @property
     def text(self) -> str:
@@ -91,10 +91,13 @@ class Home(NamedTuple):
 
 def home_pose(parameters: Parameters) -> Pose:
     """
-    Return the home pose, on that side of the base to which the normal's largest part is positive.
+    Return the home pose, on that side of the base where the normal's largest part is positive.
 
-    Raises ParameterError where nothing tells how high it is: neither both limits of length nor
-    a zero length that level legs can have.
+    Raises
+    ------
+    ParameterError
+        Neither both limits of length nor a zero length that level legs can have give its height.
+
     """
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
@@ -113,11 +116,11 @@ def home_pose(parameters: Parameters) -> Pose:
 
 def homes(parameters: Parameters) -> tuple[Array, Array]:
     """
-    Return where the platform may be at home, the most likely first.
+    Return possible home poses, the most likely first.
 
-    Positions (N, 3) [m] and rotations (N, 3, 3). The normal of the base joints' plane does not
-    tell above from below, so half of them are on its other side; where the parameters do not
-    tell the height, there are several.
+    Positions (N, 3) [m] and rotations (N, 3, 3). The normal of the base joints' plane may point up
+    or down, so half of them are on its other side; if the parameters do not give the height, there
+    are several.
     """
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
@@ -166,7 +169,7 @@ def reach_of(p: Parameters, shape: Shape) -> Reach:
     across = np.linalg.norm(offset[..., :2], axis=-1)
     reached = np.zeros(len(_YAWS), dtype=bool)
     for side in (1.0, -1.0):  # above the base, and below it
-        # A leg's height is that of the platform and its own share of it.
+        # The height of a leg is that of the platform plus the platform joint's own.
         least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - side * along
         most = np.where(high >= across, np.sqrt(np.abs(high ** 2 - across ** 2)), -np.inf)
         reached |= least.max(axis=-1) <= (most - side * along).min(axis=-1)
@@ -178,7 +181,7 @@ def reach_of(p: Parameters, shape: Shape) -> Reach:
 
 
 def home_of(p: Parameters, shape: Shape, reach: Reach) -> Home:
-    """Return the heights at which the platform may be at home."""
+    """Return the possible heights of the platform at home."""
     yaw = reach.yaw or 0.0
     low, high = p['limits.length_min'], p['limits.length_max']
     length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
@@ -191,7 +194,7 @@ def home_of(p: Parameters, shape: Shape, reach: Reach) -> Home:
 
 
 def _height(shape: Shape, side: float, yaw: float, length: float) -> float:
-    """Return how far above or below the base the mean leg has a length."""
+    """Return the height above or below the base at which the mean leg has a length."""
     low, high = 0.0, length + shape.base_radius + shape.platform_radius
     for _ in range(60):
         middle = 0.5 * (low + high)

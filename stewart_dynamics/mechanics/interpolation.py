@@ -182,10 +182,10 @@ def _cross(a: Array, b: Array) -> Array:
 def _coefficients(turn: Array) -> tuple[Array, Array, Array, Array]:
     """Return a, b, a', b' of rotation vectors (N, 3), each (N, 1): see the module."""
     square = (turn * turn).sum(axis=1, keepdims=True)
-    # Where a branch is not used, its argument is any that gives finite numbers.
+    # Arguments of the unused branch are clipped to where it is finite.
     powers = np.ones((len(turn), _TERMS))
     powers[:, 1:] = -np.minimum(square, 1.0)
-    # Ten times as fast as the operator of powers.
+    # Ten times as fast as **.
     values = np.cumprod(powers, axis=1) @ _SERIES
     if float(square.max(initial=0.0)) > 1.0:
         far = np.maximum(square, 1.0)

@@ -12,68 +12,224 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the inverse dynamics of a platform returns."""
+"""
+The inverse dynamics of many samples: leg lengths, rates and forces, det(J), condition number.
+
+Compiled by numba where it is installed; one implementation for one sample and for millions, and
+each sample's bits are the same in either case. Numbers in brackets are the paper's equations:
+
+1. ``body_dynamics.leg_dynamics``: the leg's length, rate and row of J_inv (1)-(3), and the force
+   ``F_i = M_i x_i'' + C_i x_i' + G_i`` that moves the leg at its platform joint (section 5).
+2. ``body_dynamics.platform_dynamics``: the wrench that moves the platform (5), (6).
+3. ``_dynamics``: six forces along the legs balance the sum, ``J_inv^T f = wrench``; the inverse of
+   J_inv gives det(J), its rate, and the forces under a unit load as well.
+4. ``_tile_eigenvalues``: the condition number, from the largest eigenvalues of J J^T and of its
+   inverse.
+
+``solve`` computes ``LANES`` samples side by side in each of these steps, so that one vector
+instruction computes several; hence tuples instead of arrays, no branches, and inlined functions.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+
+import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
+from stewart_dynamics.mechanics.hexapod_constants import characteristic_length_of
+from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.matrix6 import (
+    gram, inverse_and_determinant, laguerre_step, Rows, Tridiagonal, tridiagonal)
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity import time_to_crossing
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES,
+    LENGTHS, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSITION, RATES, RESULT, ROTATION,
+    UNIT_LOAD_FORCES, WRENCH)
+from stewart_dynamics.mechanics.vectors import add, dot6, Matrix3, scale, subtract, Vector3
+
+# Samples are computed in tiles, number by number: entry n of lane k is at n * LANES + k, so that
+# the compiler puts neighbouring samples into one register.
+LANES = 32
+_WRENCH = MOTION * LANES
+_RESULT = _WRENCH + WRENCH * LANES
+_EIGENVALUE = _RESULT + RESULT * LANES  # of two matrices: J J^T and its inverse
+_TRIDIAGONAL = _EIGENVALUE + 2 * LANES
+_TILE = _TRIDIAGONAL + 22 * LANES
+# Laguerre's iteration takes 4 to 7 steps, with a fourfold eigenvalue up to 42.
+_MOST_STEPS = 64
 
 
-class InverseDynamics(NamedTuple):
+@inlined
+def _put6(
+        tile: Array, at: int, a: float, b: float, c: float, d: float, e: float, f: float,
+) -> None:
+    tile[at] = a
+    tile[at + LANES] = b
+    tile[at + 2 * LANES] = c
+    tile[at + 3 * LANES] = d
+    tile[at + 4 * LANES] = e
+    tile[at + 5 * LANES] = f
+
+
+@inlined
+def _vector3(tile: Array, at: int) -> Vector3:
+    return tile[at], tile[at + LANES], tile[at + 2 * LANES]
+
+
+@inlined
+def _matrix3(tile: Array, at: int) -> Matrix3:
+    return (tile[at], tile[at + LANES], tile[at + 2 * LANES], tile[at + 3 * LANES],
+            tile[at + 4 * LANES], tile[at + 5 * LANES], tile[at + 6 * LANES],
+            tile[at + 7 * LANES], tile[at + 8 * LANES])
+
+
+@inlined
+def _put_scaled(tile: Array, at: int, t: Tridiagonal, trace: float) -> None:
+    """Store the tridiagonal matrix with its eigenvalues brought between zero and one."""
+    k = 1.0 / trace if trace > 0.0 else 0.0
+    _put6(tile, at, k * t[0], k * t[1], k * t[2], k * t[3], k * t[4], k * t[5])
+    kk = k * k
+    tile[at + 6 * LANES] = kk * t[6]
+    tile[at + 7 * LANES] = kk * t[7]
+    tile[at + 8 * LANES] = kk * t[8]
+    tile[at + 9 * LANES] = kk * t[9]
+    tile[at + 10 * LANES] = kk * t[10]
+
+
+@inlined
+def _tridiagonal(tile: Array, at: int) -> Tridiagonal:
+    return (tile[at], tile[at + LANES], tile[at + 2 * LANES], tile[at + 3 * LANES],
+            tile[at + 4 * LANES], tile[at + 5 * LANES], tile[at + 6 * LANES],
+            tile[at + 7 * LANES], tile[at + 8 * LANES], tile[at + 9 * LANES],
+            tile[at + 10 * LANES])
+
+
+@inlined
+def _put_unit_load_forces(tile: Array, k: int, rows: Rows, inverse: Rows) -> None:
+    """Store the forces under a unit load, and the matrices that give the condition number."""
+    at = k + _RESULT
+    g, h = gram(*rows), gram(*inverse)
+    g_trace = g[0][0] + g[1][0] + g[2][0] + g[3][0] + g[4][0] + g[5][0]
+    h_trace = h[0][0] + h[1][0] + h[2][0] + h[3][0] + h[4][0] + h[5][0]
+    _put6(tile, at + UNIT_LOAD_FORCES.start * LANES, math.sqrt(h[0][0]), math.sqrt(h[1][0]),
+          math.sqrt(h[2][0]), math.sqrt(h[3][0]), math.sqrt(h[4][0]), math.sqrt(h[5][0]))
+    tile[at + CONDITION * LANES] = math.sqrt(g_trace) * math.sqrt(h_trace)
+    _put_scaled(tile, k + _TRIDIAGONAL, tridiagonal(g), g_trace)
+    _put_scaled(tile, k + _TRIDIAGONAL + 11 * LANES, tridiagonal(h), h_trace)
+    # Scaled by its trace, no eigenvalue is larger than 1 but for rounding.
+    tile[k + _EIGENVALUE] = 1.0 + 1e-14
+    tile[k + _EIGENVALUE + LANES] = 1.0 + 1e-14
+
+
+@inlined
+def _dynamics(constants: Array, tile: Array, k: int) -> None:
+    """Compute the sample in lane k, except for the eigenvalues of its condition number."""
+    size = characteristic_length_of(constants)
+    inverse_size = 1.0 / size
+    position = _vector3(tile, k + POSITION.start * LANES)
+    rotation = _matrix3(tile, k + ROTATION.start * LANES)
+    velocity = _vector3(tile, k + LINEAR_VELOCITY.start * LANES)
+    omega = _vector3(tile, k + ANGULAR_VELOCITY.start * LANES)
+    acceleration = _vector3(tile, k + LINEAR_ACCELERATION.start * LANES)
+    alpha = _vector3(tile, k + ANGULAR_ACCELERATION.start * LANES)
+
+    force, moment = platform_dynamics(constants, rotation, omega, acceleration, alpha)
+    force = subtract(force, _vector3(tile, k + _WRENCH))
+    moment = subtract(moment, _vector3(tile, k + _WRENCH + 3 * LANES))
+    l0 = leg_dynamics(constants, 0, position, rotation, velocity, omega, acceleration, alpha)
+    l1 = leg_dynamics(constants, 1, position, rotation, velocity, omega, acceleration, alpha)
+    l2 = leg_dynamics(constants, 2, position, rotation, velocity, omega, acceleration, alpha)
+    l3 = leg_dynamics(constants, 3, position, rotation, velocity, omega, acceleration, alpha)
+    l4 = leg_dynamics(constants, 4, position, rotation, velocity, omega, acceleration, alpha)
+    l5 = leg_dynamics(constants, 5, position, rotation, velocity, omega, acceleration, alpha)
+    force = add(add(add(add(add(add(force, l0.force), l1.force), l2.force), l3.force), l4.force),
+                l5.force)
+    moment = scale(inverse_size, add(add(add(add(add(add(
+        moment, l0.moment), l1.moment), l2.moment), l3.moment), l4.moment), l5.moment))
+    wrench = force[0], force[1], force[2], moment[0], moment[1], moment[2]
+
+    # With J the scaled J_inv, row n of (J^T)^-1 maps the wrench to the force of leg n, its
+    # length is the largest force of that leg under a unit load, and
+    # d(det)/dt = det tr(J^-1 J') is the sum of its products with the rows of J'.
+    r0, r1, r2, r3, r4, r5 = l0.row, l1.row, l2.row, l3.row, l4.row, l5.row
+    (b0, b1, b2, b3, b4, b5), det = inverse_and_determinant(
+        (r0[0], r1[0], r2[0], r3[0], r4[0], r5[0]), (r0[1], r1[1], r2[1], r3[1], r4[1], r5[1]),
+        (r0[2], r1[2], r2[2], r3[2], r4[2], r5[2]), (r0[3], r1[3], r2[3], r3[3], r4[3], r5[3]),
+        (r0[4], r1[4], r2[4], r3[4], r4[4], r5[4]), (r0[5], r1[5], r2[5], r3[5], r4[5], r5[5]))
+    det *= size * size * size
+    at = k + _RESULT
+    _put6(tile, at + LENGTHS.start * LANES, l0.length, l1.length, l2.length, l3.length,
+          l4.length, l5.length)
+    _put6(tile, at + RATES.start * LANES, l0.rate, l1.rate, l2.rate, l3.rate, l4.rate, l5.rate)
+    _put6(tile, at + FORCES.start * LANES, dot6(b0, wrench) + l0.actuator,
+          dot6(b1, wrench) + l1.actuator, dot6(b2, wrench) + l2.actuator,
+          dot6(b3, wrench) + l3.actuator, dot6(b4, wrench) + l4.actuator,
+          dot6(b5, wrench) + l5.actuator)
+    tile[at + DETERMINANT * LANES] = det
+    tile[at + DETERMINANT_RATE * LANES] = det * (
+        dot6(b0, l0.row_rate) + dot6(b1, l1.row_rate) + dot6(b2, l2.row_rate)
+        + dot6(b3, l3.row_rate) + dot6(b4, l4.row_rate) + dot6(b5, l5.row_rate))
+    _put_unit_load_forces(tile, k, (r0, r1, r2, r3, r4, r5), (b0, b1, b2, b3, b4, b5))
+
+
+@compiled
+def _tile_dynamics(constants: Array, tile: Array, lanes: int) -> None:
+    for k in range(min(lanes, LANES)):
+        _dynamics(constants, tile, k)
+
+
+@compiled
+def _tile_eigenvalues(tile: Array, lanes: int) -> None:
+    """Iterate on both largest eigenvalues of all lanes until no step changes any of them."""
+    for _ in range(_MOST_STEPS):
+        changed = 0
+        for k in range(min(lanes, LANES)):
+            at = k + _EIGENVALUE
+            x, y = tile[at], tile[at + LANES]
+            nearer_x = laguerre_step(x, _tridiagonal(tile, k + _TRIDIAGONAL))
+            nearer_y = laguerre_step(y, _tridiagonal(tile, k + _TRIDIAGONAL + 11 * LANES))
+            changed += 1 if nearer_x < x or nearer_y < y else 0
+            tile[at] = nearer_x
+            tile[at + LANES] = nearer_y
+        if changed == 0:
+            break
+    for k in range(min(lanes, LANES)):
+        at = k + _EIGENVALUE
+        tile[k + _RESULT + CONDITION * LANES] *= math.sqrt(tile[at]) * math.sqrt(tile[at + LANES])
+
+
+@entry_point
+def solve(constants: Array, motions: Array, wrenches: Array, results: Array) -> None:
     """
-    What the six legs do in a motion; (...) is the motion's leading shape.
+    Compute the result of every motion.
 
-    Attributes
+    Parameters
     ----------
-    lengths : (..., 6)
-        [m]
-    rates : (..., 6)
-        Time derivatives of the lengths [m/s], + extends.
-    forces : (..., 6)
-        Of the actuators [N], + pushes.
-    unit_load_forces : (..., 6)
-        Largest force of each leg under a unit load on the platform: any force F and moment M
-        with F^2 + (M / l)^2 = 1, l the characteristic length.
-    determinant : (...)
-        det(J) := det(J_inv) [m^3].
-    determinant_rate : (...)
-        d(det(J))/dt [m^3/s].
-    condition_number : (...)
-        Ratio of the largest to the smallest singular value of J_inv, at least 1; the right
-        three columns of J_inv are divided by the characteristic length first.
-    time_to_crossing : (...)
-        Time after which det(J) is zero at its present rate [s]; inf: never.
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
+    motions : (N, MOTION)
+        Rows of position, rotation, twist and acceleration, SI units, base axes.
+    wrenches : (N, WRENCH) or (1, WRENCH)
+        Force [N] and moment [N m] on the platform at its origin, base axes; one row for all.
+    results : (N, RESULT)
+        Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
+        d(det)/dt [m^3/s] and the condition number.
 
     """
-
-    lengths: Array
-    rates: Array
-    forces: Array
-    unit_load_forces: Array
-    determinant: Array
-    determinant_rate: Array
-    condition_number: Array
-
-    @property
-    def time_to_crossing(self) -> Array:
-        """Time after which det(J) is zero at its present rate, (...) [s]; inf: never."""
-        return time_to_crossing(self.determinant, self.determinant_rate)
-
-    @classmethod
-    def of_rows(cls, results: Array) -> InverseDynamics:
-        """Return what rows of results (..., RESULT) hold."""
-        return cls(
-            results[..., LENGTHS], results[..., RATES], results[..., FORCES],
-            results[..., UNIT_LOAD_FORCES],
-            # [()] makes a number of an array without a shape
-            results[..., DETERMINANT][()], results[..., DETERMINANT_RATE][()],
-            results[..., CONDITION][()])
-
-    def __repr__(self) -> str:
-        """Return the shape, not the arrays."""
-        return f'<InverseDynamics of shape {self.lengths.shape[:-1]}: {", ".join(self._fields)}>'
+    tile = np.empty(_TILE)
+    many = len(motions)
+    one_wrench = len(wrenches) == 1
+    for first in range(0, many, LANES):
+        lanes = min(LANES, many - first)
+        for k in range(lanes):
+            for n in range(MOTION):
+                tile[n * LANES + k] = motions[first + k, n]
+            row = 0 if one_wrench else first + k
+            for n in range(WRENCH):
+                tile[_WRENCH + n * LANES + k] = wrenches[row, n]
+        _tile_dynamics(constants, tile, lanes)
+        _tile_eigenvalues(tile, lanes)
+        for k in range(lanes):
+            for n in range(RESULT):
+                results[first + k, n] = tile[_RESULT + n * LANES + k]

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-How the compiled functions are compiled: by numba where it is installed, else not at all.
+Compilation: by numba where it is installed; otherwise the functions run uncompiled.
 
 The functions are plain Python either way and give the same bits: no fast-math flag is set,
 so the compiler may neither reorder a sum nor fuse a product into it, and a sample computed

@@ -18,8 +18,8 @@ The Lagrange equations as the paper assembles them: the readable reference.
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
 base axes. Numbers in brackets are equations of Alwan and Sarhan, Dynamic Analysis of Gough
 Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng. Sci. 26(10),
-2018, in their correct form: docs/misprints.md lists what is printed instead. ``kernel`` computes
-the same forces without a matrix and is validated against these. Every function takes any
+2018, in their correct form: docs/misprints.md lists what is printed instead. ``inverse_dynamics``
+computes the same forces without a matrix and is validated against these. Every function takes any
 leading shape of samples.
 """
 
@@ -55,7 +55,11 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
     """
     Return lengths, directions and arms at a pose: (1), (2).
 
-    Raises MotionError where a leg has no length, or one that overflows.
+    Raises
+    ------
+    MotionError
+        A length is 0 or overflows.
+
     """
     with np.errstate(all='ignore'):
         at = unchecked_legs(parameters, position, rotation)
@@ -68,7 +72,7 @@ def legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
 
 
 def unchecked_legs(parameters: Parameters, position: Array, rotation: Array) -> Legs:
-    """Return the same; directions are not finite where a leg has no length."""
+    """Return the same; directions are not finite where a length is 0."""
     arms = np.einsum('...jk,ik->...ij', rotation, parameters['geometry.platform_joints'])
     vectors = position[..., None, :] + arms - parameters['geometry.base_joints']
     lengths = np.linalg.norm(vectors, axis=-1)
@@ -110,7 +114,7 @@ class _LegTerms(NamedTuple):
     along: Array  # s s^T (..., 6, 3, 3)
     across: Array  # 1 - s s^T = -skew(s)^2
     piston_distance: Array  # c2 = L - S2 (..., 6)
-    inertia: Array  # I_e / L^2 + m_ce: what resists motion across the leg [kg]
+    inertia: Array  # I_e / L^2 + m_ce: effective mass across the leg [kg]
 
 
 def _leg_terms(parameters: Parameters, at: Legs) -> _LegTerms:
@@ -141,9 +145,9 @@ def leg_coriolis(
     """
     Return C_i (..., 6, 3, 3) [kg/s] under the platform joints' velocities x_i'.
 
-    The paper's is ``-(2/L) m_co L' skew(s)^2 - (m2 S2/L^2) s x_i'^T skew(s)^2``. With
-    ``christoffel`` it is made of the Christoffel symbols of M_i in x_i: the same force
-    C_i x_i', and M_i' - 2 C_i skew.
+    That of the paper is ``-(2/L) m_co L' skew(s)^2 - (m2 S2/L^2) s x_i'^T skew(s)^2``. With
+    ``christoffel`` it consists of the Christoffel symbols of M_i in x_i: the same force
+    C_i x_i', and M_i' - 2 C_i is skew.
     """
     terms = _leg_terms(parameters, at)
     piston_mass = parameters['legs.piston.mass']

@@ -25,14 +25,17 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Six
 from stewart_dynamics.mechanics.jit import inlined
-from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, RATES
+from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, RATES
 from stewart_dynamics.parameters import Parameters
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = LIMITS = (
     'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 
-# A value exceeds a limit by more than this part of it: rounding is no motion.
+# A value exceeds a limit only by more than this part of it: rounding errors are below.
 TOLERANCE = 1e-9
+
+# Thresholds in a row, in the order of LIMITS.
+_SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 
 _QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
                VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N')}
@@ -70,7 +73,7 @@ class Limits:
     bounds : dict of str to (6,)
         Of each limit that is given [m, m/s, N].
     thresholds : (4, 6)
-        Of each of LIMITS, what a value must pass to exceed it; infinite where it is not given.
+        Of each of LIMITS, above (or below) which it is exceeded; infinite where it is not given.
     force_max : (6,)
         To which forces are clipped [N]; infinite where it is not given.
 
@@ -93,7 +96,7 @@ class Limits:
         return exceeding
 
     def exceeded(self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Exceedance, ...]:
-        """Return all limits that one sample exceeds; forces may be unknown."""
+        """Return all limits that one sample exceeds; unknown forces (None) exceed none."""
         found = []
         for limit, bounds, thresholds in self._of_samples:
             values = (rates if limit == VELOCITY_MAX else forces if limit == FORCE_MAX
@@ -107,7 +110,7 @@ class Limits:
 
 
 def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
-    """Return whether a number, or where an array, passes the threshold of a limit."""
+    """Return whether a value, or where an array, is past the threshold of a limit."""
     return value < threshold if limit == LENGTH_MIN else abs(value) > threshold
 
 
@@ -116,9 +119,9 @@ def any_exceeded(thresholds: Array, result: Array) -> bool:
     """Return whether a row of a result exceeds one of the thresholds (24,); nan never does."""
     exceeded = False
     for leg in range(6):
-        if (result[LENGTHS.start + leg] < thresholds[leg]
-                or result[LENGTHS.start + leg] > thresholds[6 + leg]
-                or abs(result[RATES.start + leg]) > thresholds[12 + leg]
-                or abs(result[FORCES.start + leg]) > thresholds[18 + leg]):
+        if (result[LENGTHS.start + leg] < thresholds[_SHORTEST.start + leg]
+                or result[LENGTHS.start + leg] > thresholds[_LONGEST.start + leg]
+                or abs(result[RATES.start + leg]) > thresholds[_FASTEST.start + leg]
+                or abs(result[FORCES.start + leg]) > thresholds[_STRONGEST.start + leg]):
             exceeded = True
     return exceeded

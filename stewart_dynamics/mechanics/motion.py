@@ -98,7 +98,7 @@ class Motion(Samples):
             linear_acceleration: ArrayLike | None = None,
             angular_acceleration: ArrayLike | None = None,
     ) -> Motion:
-        """Return the motion through a pose, at rest by default; the rest is as in Motion."""
+        """Return the motion at a pose, by default at rest; other arguments are as in Motion."""
         if not isinstance(pose, Pose | Motion):
             raise wrong_type('pose', pose, 'a Pose or a Motion')
         return cls(pose.position, pose.rotation, linear_velocity, angular_velocity,

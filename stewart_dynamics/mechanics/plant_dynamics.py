@@ -29,29 +29,31 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.end_stops import stop_force
 from stewart_dynamics.mechanics.forward_dynamics import acceleration, WORK
 from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.kernel import leg_line
 from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.mechanics.rows import ACCELERATION, consecutive, MOTION, ROTATION, TWIST
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, consecutive, MOTION, POSITION, ROTATION, TWIST)
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, Matrix3, read3, scale, Vector3)
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
 STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
-STATE = 13
-# What is written beside it: lengths, rates, forces of the actuators, acceleration, and whether it
-# could be integrated.
+STATE = STATE_TWIST.stop
+_LINEAR, _ANGULAR = STATE_TWIST.start, STATE_TWIST.start + 3
+# The result: lengths, rates, forces of the actuators, acceleration, and whether all steps could be
+# computed.
 RESULT_LENGTHS, RESULT_RATES, RESULT_FORCES, RESULT_ACCELERATION = consecutive(6, 6, 6, 6)
-RESULT_SOUND = 24
-RESULT = 25
+RESULT_SOUND = RESULT_ACCELERATION.stop
+RESULT = RESULT_SOUND + 1
 # Six commands, and the wrench on the platform.
 COMMANDS, WRENCH = consecutive(6, 6)
-LOADS = 12
+LOADS = WRENCH.stop
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
-# this part of its leg's length: what happens within the step would not be seen.
+# this part of its leg's length: a larger move would not be resolved.
 LARGEST_MOVE = 0.5
 
 _matrix = inlined(from_quaternion)
@@ -68,17 +70,17 @@ def _rotation(state: Array) -> Matrix3:
 
 @inlined
 def _twist(state: Array) -> tuple[Vector3, Vector3]:
-    return read3(state, STATE_TWIST.start), read3(state, STATE_TWIST.start + 3)
+    return read3(state, _LINEAR), read3(state, _ANGULAR)
 
 
 @compiled
 def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: Array,
            forces: Array, work: Array, slope: Array) -> None:
-    """Write a state's time derivative under its loads; motion, forces and work are memory."""
-    position, rotation = read3(state, 0), _rotation(state)
+    """Write a state's time derivative under its loads; motion, forces, work: scratch memory."""
+    position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
     velocity, omega = _twist(state)
     for n in range(3):
-        motion[n] = state[n]
+        motion[POSITION.start + n] = position[n]
     for n in range(9):
         motion[ROTATION.start + n] = rotation[n]
     for n in range(6):
@@ -86,13 +88,13 @@ def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: A
     for leg in range(6):
         a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
-        forces[leg] = loads[leg] + stop_force(stops, leg, length, rate)
-    acceleration(constants, motion, forces, loads[6:], work)
+        forces[leg] = loads[COMMANDS.start + leg] + stop_force(stops, leg, length, rate)
+    acceleration(constants, motion, forces, loads[WRENCH.start:], work)
     at = STATE_QUATERNION.start
     vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))
     for n in range(3):
-        slope[n] = velocity[n]
+        slope[STATE_POSITION.start + n] = velocity[n]
         slope[at + n] = 0.5 * turning[n]
     slope[at + 3] = -0.5 * dot(omega, vector)
     for n in range(6):
@@ -107,14 +109,14 @@ def _write_legs(constants: Array, state: Array, result: Array) -> float:
     Return the largest of the angular speed and the speeds of the platform joints relative to
     their legs' lengths [1/s]; infinite where a leg has no length.
     """
-    position, rotation = read3(state, 0), _rotation(state)
+    position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
     velocity, omega = _twist(state)
     fastest = math.sqrt(dot(omega, omega))
     for leg in range(6):
         a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
         joint_velocity = add(velocity, cross(omega, a))
         moving = inverse_length * math.sqrt(dot(joint_velocity, joint_velocity))
-        result[leg] = length
+        result[RESULT_LENGTHS.start + leg] = length
         result[RESULT_RATES.start + leg] = dot(s, joint_velocity)
         fastest = max(fastest, moving) if 0.0 < length < math.inf else math.inf
     return fastest
@@ -124,7 +126,7 @@ def _write_legs(constants: Array, state: Array, result: Array) -> float:
 def _next_state(constants: Array, stops: Array, loads: Array, state: Array, h: float,
                 motion: Array, forces: Array, work: Array, slope: Array, mean: Array,
                 after: Array) -> bool:
-    """Write the state one step later, and return whether it is finite; the rest is memory."""
+    """Write the state one step later; return whether it is finite. The rest: scratch memory."""
     _slope(constants, stops, state, loads, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] = slope[n]
@@ -154,7 +156,7 @@ def _next_state(constants: Array, stops: Array, loads: Array, state: Array, h: f
 def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
             result: Array, steps: int, h: float) -> None:
     """
-    Take steps of h [s] and write the state and, beside it, the result.
+    Take steps of h [s] and write the state and the result.
 
     Parameters
     ----------
@@ -179,8 +181,8 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
     after, slope, mean = np.empty(STATE), np.empty(STATE), np.empty(STATE)
     for leg in range(6):
         most = largest_forces[leg]
-        loads[leg] = min(max(loads[leg], -most), most)
-        result[RESULT_FORCES.start + leg] = loads[leg]
+        force = min(max(loads[COMMANDS.start + leg], -most), most)
+        loads[COMMANDS.start + leg] = result[RESULT_FORCES.start + leg] = force
     sound = h * _write_legs(constants, state, result) <= LARGEST_MOVE
     for _step in range(steps):
         finite = _next_state(

@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 
 
 def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '') -> None:
-    """Raise MotionError where an argument is neither a Pose nor a Motion as it must be."""
+    """Raise MotionError if an argument is not of one of these types."""
     if isinstance(value, kinds):
         return
     name = name or ('pose' if Pose in kinds else 'motion')
@@ -38,7 +38,7 @@ def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '')
 
 
 def loaded(motion: Motion, wrench: ArrayLike | None) -> tuple[Array, Array, tuple[int, ...]]:
-    """Return rows of motion, rows of wrenches or one for all, and their leading shape."""
+    """Return rows of motion, rows of wrenches (one if it is for all), and the leading shape."""
     check_kind(motion, Motion)
     if wrench is None:
         return motion.rows.reshape(-1, MOTION), np.zeros((1, WRENCH)), motion.shape
@@ -68,7 +68,7 @@ def leg_stiffnesses(value: ArrayLike) -> Array:
 
 
 def copies(array: Array, shape: tuple[int, ...]) -> Array:
-    """Return rows (N, ...) of their own of an array that is broadcast to a leading shape."""
+    """Return a copy as rows (N, ...) of an array that is broadcast to a leading shape."""
     last = array.shape[-1]
     if array.shape[:-1] != shape:
         array = np.broadcast_to(array, (*shape, last))
@@ -76,14 +76,14 @@ def copies(array: Array, shape: tuple[int, ...]) -> Array:
 
 
 def place(at: int, shape: tuple[int, ...]) -> str:
-    """Return the index of a sample as its user counts."""
+    """Return the index of a sample in the leading shape, as text."""
     if len(shape) < 2:
         return str(at)
     return str(list(map(int, np.unravel_index(at, shape))))
 
 
 def find_unsolvable(rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Flags:
-    """Return where J_inv is singular (N,); raise SingularityError where it may not be."""
+    """Return where J_inv cannot be solved (N,); SingularityError with ``singular`` 'raise'."""
     if singular not in ('raise', 'nan'):
         raise wrong_type('singular', singular, "'raise' or 'nan'")
     condition = results[:, CONDITION]

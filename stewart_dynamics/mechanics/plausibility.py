@@ -16,8 +16,8 @@
 """
 Likely mistakes in parameters that break no rule: a wrong unit, a geometry that is singular.
 
-The bounds hold for every hexapod known, from one on a fingertip to a telescope's cabin on cables
-of 300 m, with a margin on both sides; exceeding one is a warning, not an error.
+All known hexapods are within the bounds with a margin, from one on a fingertip to the cabin of a
+telescope on cables of 300 m; a value outside is a warning, not an error.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ _SMALL_RADIUS = 5.0  # [m]
 _THINNEST = 0.01  # [kg/m^3]
 
 # A body's radius of gyration divided by the radius of its joints: 0.1 to 3 for all hexapods known.
-# kg cm^2 for kg m^2 makes it 100 times as large, kg mm^2 1000 times, g mm^2 3e4 times.
+# With kg cm^2 for kg m^2 it is 100 times as large, with kg mm^2 1000 times, g mm^2 3e4 times.
 _LARGEST_GYRATION = 30.0
 _SMALLEST_GYRATION = 1.0 / 200.0
 # The same of a leg's part divided by the longest leg: 0.3 for a rod as long as the leg.
 _LARGEST_LEG_GYRATION = 3.0
 
-# How far principal moments rounded to two or three digits may break the triangle inequality.
+# Violation of the triangle inequality by principal moments rounded to two or three digits.
 _ROUNDING = 0.02
 
-# A mast of ten times the platform's radius has its center of mass within.
+# The largest distance of the center of mass, in larger radii: a mast of ten times the radius.
 _FARTHEST_CENTER = 10.0
 
 _LARGEST_GRAVITY = 100.0  # [m/s^2]; Jupiter has 25
@@ -65,7 +65,7 @@ _TILT = math.radians(15.0)
 
 def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
-    Return what is likely a mistake, each in one line: parameter, value, what is suspected.
+    Return likely mistakes, each in one line: parameter, value, what is suspected.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         Check legs and poses as well, which takes ten times as long as the rest.
 
     """
-    # Numbers near the largest double overflow here: that is not a likely mistake of its own.
+    # An overflow of numbers near the largest double is not reported by itself.
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
         found = [*_sizes(parameters, shape), *_inertia(parameters, shape),
@@ -147,7 +147,7 @@ def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
         yield (f'{limits}: no level pose has all legs within them; the base joints are '
                f'{shape.base_radius:.3g} m from their center, the platform joints '
                f'{shape.platform_radius:.3g} m: different units?')
-        return  # which of them is wrong cannot be told: the rest would be reported for both
+        return  # any of them may be wrong, so that the other checks would report it again
     longest = reach.longest
     for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
         name = f'legs.{part}.center_of_mass'

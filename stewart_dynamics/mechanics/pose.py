@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A pose: where the platform is, one sample or many."""
+"""Poses of the platform, one sample or many."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Self = TypeVar('Self', bound='Samples')
 
 class Samples:
     """
-    Poses, or motions, of any leading shape: the indexing, comparing and showing of both.
+    Poses or motions of any leading shape: indexing, comparison and representation of both.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Samples:
 
     @classmethod
     def of_rows(cls: type[Self], rows: Array) -> Self:
-        """Return what rows (..., n) of checked numbers hold; they are not copied."""
+        """Return the samples of rows (..., n), which are neither checked nor copied."""
         samples = cls.__new__(cls)
         samples.rows, samples.shape = rows, rows.shape[:-1]
         return samples
@@ -95,7 +95,7 @@ class Samples:
         """Return whether shape and all numbers are equal."""
         return type(other) is type(self) and np.array_equal(self.rows, other.rows)
 
-    # Its arrays can be written to.
+    # The arrays are mutable.
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:

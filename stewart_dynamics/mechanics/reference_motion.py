@@ -31,14 +31,14 @@ def sample_times(parameters: ReferenceMotionParameters) -> Integers:
     """
     Return the times of the motion in one direction (N,) [ns], from 0 on at the rate.
 
-    The last is at the duration or, where no sample falls on it, the next one after it, so that a
-    motion that ends at rest is complete.
+    The last is at the duration or, if that is between two samples, the next one after it, so that
+    a motion that ends at rest is complete.
     """
     return sample_time(parameters, np.arange(sample_count(parameters)))
 
 
 def sample_count(parameters: ReferenceMotionParameters) -> int:
-    """Return how many times ``sample_times`` has."""
+    """Return the number of times in ``sample_times``."""
     exact: float = parameters['motion.duration'] * parameters['rate']
     near = round(exact)
     is_near = math.isclose(exact, near, rel_tol=1e-12, abs_tol=1e-9)
@@ -70,7 +70,7 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
     - hold: at rest in initial.
 
     paper and quintic are at rest in initial before their start and in final after their end;
-    looped they run to and fro, each direction in the duration.
+    looped they run back and forth, each direction in the duration.
     """
     time = np.asarray(times, dtype=float)
     kind, initial = parameters['motion.type'], parameters['motion.initial']
@@ -86,13 +86,13 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
     s, ds, dds = (each[..., None] for each in _progress(parameters, time))
     final = parameters['motion.final']
     if kind == 'paper':
-        way = final - initial
-        return _euler_motion(initial + s * way, ds * way, dds * way)
+        change = final - initial
+        return _euler_motion(initial + s * change, ds * change, dds * change)
     start, end = rotations.from_euler(initial[3:]), rotations.from_euler(final[3:])
     turn = _rotation_vector(end @ start.T)
-    way = final[:3] - initial[:3]
-    return Motion(initial[:3] + s * way, _rotation_about(turn, s[..., 0]) @ start,
-                  ds * way, ds * turn, dds * way, dds * turn)
+    change = final[:3] - initial[:3]
+    return Motion(initial[:3] + s * change, _rotation_about(turn, s[..., 0]) @ start,
+                  ds * change, ds * turn, dds * change, dds * turn)
 
 
 def _euler_motion(pose: Array, rate: Array, acceleration: Array) -> Motion:

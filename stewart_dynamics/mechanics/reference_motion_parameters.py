@@ -15,7 +15,7 @@
 """
 The parameters of a reference motion, and of the node stewart_trajectory that publishes it.
 
-Apart from the motion itself, so that ``--help`` and the check of a file need no compiler.
+Separate from the motion itself, so that ``--help`` and the check of a file need no compiler.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from stewart_dynamics.parameter_set import Parameter, ParameterSet
 _POSE = 'X Y Z alpha beta gamma'
 
 REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
-    Parameter('target', 'string', 'node that gets the setpoints, on <target>/setpoint/...',
+    Parameter('target', 'string', 'node that receives the setpoints, on <target>/setpoint/...',
               default='stewart_dynamics'),
     Parameter('base_frame', 'string', 'frame of the setpoints', default='base'),
     Parameter('output', 'string', 'pose, twist and accel on three topics, or combined in one '
@@ -38,8 +38,8 @@ REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name:
     Parameter('start_timeout', 'double', 'the motion starts half a second after all its topics '
               'have subscribers, at the latest after this time', 's', 5.0, minimum=0.0,
               maximum=86400.0),
-    Parameter('loop', 'bool', 'repeat until stopped: paper and quintic to and fro, sine and hold '
-              'without end', default=False),
+    Parameter('loop', 'bool', 'repeat until stopped: paper and quintic back and forth; sine and '
+              'hold without end', default=False),
     Parameter('motion.type', 'string', 'paper: from initial to final, each coordinate as a half '
               'cosine; quintic: on the straight line and about one axis; sine: about initial; '
               'hold: at initial', default='paper', choices=('paper', 'quintic', 'sine', 'hold')),
@@ -64,7 +64,7 @@ class ReferenceMotionParameters(ParameterSet):
     node = 'stewart_trajectory'
 
     def _check_together(self, source: str) -> None:
-        """Check what one parameter demands of another."""
+        """Check the rules between parameters."""
         if self['motion.type'] in ('paper', 'quintic') and self['motion.final'] is None:
             raise ParameterError(f'{source}: motion.final: missing, motion.type '
                                  f'{self["motion.type"]} needs it')

@@ -68,7 +68,7 @@ def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
 
 Number = TypeVar('Number', float, Array)
 
-# The length of a quaternion that is given may be this far from one; it is divided by it.
+# The length of a given quaternion may differ from one by this; the quaternion is normalized.
 QUATERNION_TOLERANCE = 1e-3
 
 
@@ -99,8 +99,8 @@ def to_quaternion(rotation: ArrayLike) -> Array:
     """
     Return unit quaternions x y z w (..., 4) of rotation matrices (..., 3, 3), w >= 0.
 
-    Each takes the largest of its four numbers from the diagonal (Shepperd,
-    J. Guidance and Control 1(3), 1978, doi:10.2514/3.55767b), so that none is lost in rounding.
+    Each is computed from the largest of its four numbers (Shepperd,
+    J. Guidance and Control 1(3), 1978, doi:10.2514/3.55767b), so that no digits are lost.
     """
     r = np.asarray(rotation, dtype=float)
     r00, r11, r22 = r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]
@@ -121,7 +121,7 @@ def to_quaternion(rotation: ArrayLike) -> Array:
 
 
 def quaternion_of(rotation: Sequence[float]) -> tuple[float, float, float, float]:
-    """Return what ``to_quaternion`` does of one matrix's nine numbers, far sooner."""
+    """Return the result of ``to_quaternion`` for the nine numbers of one matrix, much faster."""
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation
     xy, xz, yz = r01 + r10, r02 + r20, r12 + r21
     xw, yw, zw = r21 - r12, r02 - r20, r10 - r01

@@ -14,9 +14,9 @@
 
 
 """
-One sample as a row of numbers: the place of each quantity in it.
+The layout of a sample as a row of numbers.
 
-Motions, wrenches and results pass through all layers as rows of float64, SI units, base axes;
+All layers pass motions, wrenches and results as rows of float64, SI units, base axes;
 ``rows[..., FORCES]`` is a quantity of all samples.
 """
 
@@ -42,6 +42,6 @@ RESULT = 27
 
 
 def consecutive(*sizes: int) -> tuple[slice, ...]:
-    """Return the places of parts of these sizes that stand one behind the other."""
+    """Return the slices of consecutive parts of these sizes."""
     ends = [sum(sizes[:n + 1]) for n in range(len(sizes))]
     return tuple(slice(end - size, end) for end, size in zip(ends, sizes, strict=True))

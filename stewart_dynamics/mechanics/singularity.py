@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-How near a singularity a motion is, and the warning of it.
+The singularity warning: thresholds, hysteresis, and prediction of crossings.
 
-Near det(J) = 0 leg forces grow as 1 / det. A crossing may fall between two samples, so a
-change of sign counts as one; and since d(det)/dt is known, it is predicted.
+Near det(J) = 0 leg forces grow as 1 / det. A crossing may be between two samples, so a change of
+sign counts as one; it is predicted from d(det)/dt.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.jit import inlined
 from stewart_dynamics.parameters import Parameters
 
-# From here on a solution of J_inv^T f = wrench keeps fewer than four of its sixteen digits:
-# forces are neither computed nor published.
+# At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of
+# sixteen: forces are neither computed nor published.
 UNSOLVABLE_CONDITION = 1e12
 
 # Hysteresis: a warning or stop ends below this part of the condition number at which it began,
@@ -52,7 +52,7 @@ class Cause(IntEnum):
 
     @property
     def text(self) -> str:
-        """The cause in words."""
+        """The cause as text."""
         return _TEXTS[self]
 
 
@@ -72,7 +72,7 @@ WARN_CONDITION, STOP_CONDITION, WARN_TIME, THRESHOLDS = range(4)
 
 
 def time_to_crossing(determinant: ArrayLike, determinant_rate: ArrayLike) -> NDArray[Any]:
-    """Return after what time det(J) is zero at its present rate [s]; inf where never."""
+    """Return the time after which det(J) is zero at its present rate [s]; inf if never."""
     det, rate = np.asarray(determinant, dtype=float), np.asarray(determinant_rate, dtype=float)
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         time = -det / rate
@@ -90,7 +90,7 @@ def thresholds(parameters: Parameters) -> Array:
 
 @inlined
 def forget(state: Array) -> None:
-    """Forget the samples so far: the next one is the first, but for the count of crossings."""
+    """Reset the state but for the count of crossings: the next sample is the first."""
     state[CAUSE] = Cause.NONE.value
     state[STOPPED] = 0.0
     state[LAST] = 0.0
@@ -149,13 +149,13 @@ class Singularity(NamedTuple):
 
     @classmethod
     def of(cls, numbers: Iterable[float]) -> Singularity:
-        """Return the state that STATE numbers hold."""
+        """Return the state of an array (STATE,)."""
         cause, stopped, determinant, time, crossings = numbers
         return cls(_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The state as STATE numbers."""
+        """The state as numbers, in the order of an array (STATE,)."""
         return self.cause, self.stopped, self.determinant, self.time_to_crossing, self.crossings
 
     def after(self, parameters: Parameters, determinant: float, determinant_rate: float,

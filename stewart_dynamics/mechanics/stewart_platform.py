@@ -28,10 +28,9 @@ from stewart_dynamics.mechanics import (
     batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility, stiffness)
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
-from stewart_dynamics.mechanics.force_breakdown import (
-    ForceBreakdown, ForceBreakdownRows, SOURCES)
+from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
-from stewart_dynamics.mechanics.inverse_dynamics import InverseDynamics
+from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.platform_arguments import (
     check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
@@ -79,11 +78,11 @@ class StewartPlatform:
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> StewartPlatform:
-        """Return the hexapod of a parameter file; ParameterError says what is wrong in it."""
+        """Return the hexapod of a parameter file; ParameterError names what is wrong in it."""
         return cls(Parameters.from_yaml(path))
 
     def __repr__(self) -> str:
-        """Return what tells hexapods apart: mass and sizes."""
+        """Return mass and sizes."""
         p = self.parameters
         base, platform = (
             float(np.mean(np.linalg.norm(p[name] - p[name].mean(axis=0), axis=1)))
@@ -105,12 +104,12 @@ class StewartPlatform:
             External wrench on the platform at its origin: force [N] and moment [N m], base
             axes; zero by default.
         singular : 'raise' or 'nan'
-            What to do where J_inv cannot be solved: raise, or return nan as forces there.
+            Where J_inv cannot be solved: raise, or return nan as forces.
 
         Raises
         ------
         SingularityError
-            J_inv cannot be solved in a sample: it names the sample.
+            J_inv cannot be solved in a sample; names the sample.
 
         """
         rows, wrenches, shape = loaded(motion, wrench)
@@ -146,10 +145,10 @@ class StewartPlatform:
     def forward_dynamics(
             self, motion: Motion, forces: ArrayLike, wrench: ArrayLike | None = None) -> Motion:
         """
-        Return a motion with the accelerations that leg forces give it.
+        Return a motion with the accelerations that follow from leg forces.
 
-        ``inverse_dynamics`` of the result gives the forces again. No pose is singular here:
-        J_inv is not inverted.
+        ``inverse_dynamics`` of the result gives these forces. Singular poses are allowed: J_inv is
+        not inverted.
 
         Parameters
         ----------
@@ -199,7 +198,7 @@ class StewartPlatform:
         PoseError
             It did not converge: no pose on the guess's side of singularities has the lengths.
         SingularityError
-            The guess is singular, or a pose on the way from it.
+            The guess is singular, or a pose in the iteration.
 
         """
         wanted = as_array('lengths', lengths, (6,))
@@ -226,7 +225,11 @@ class StewartPlatform:
         """
         Return the twist [v; w] (..., 6) of leg rates (..., 6) [m/s] at a pose, base axes.
 
-        Raises SingularityError where J_inv cannot be solved.
+        Raises
+        ------
+        SingularityError
+            J_inv cannot be solved.
+
         """
         check_kind(pose, Pose, Motion)
         given = as_array('rates', rates, (6,))
@@ -323,8 +326,13 @@ class StewartPlatform:
         """
         Return the home pose: parallel axes, the mean leg halfway between its limits.
 
-        See ``mechanics.home_pose``. Raises ParameterError where the parameters do not tell how
-        high the platform is.
+        See ``mechanics.home_pose``.
+
+        Raises
+        ------
+        ParameterError
+            The parameters do not give the height of the platform.
+
         """
         return home_pose.home_pose(self.parameters)
 

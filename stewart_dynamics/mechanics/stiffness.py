@@ -16,9 +16,9 @@
 Stiffness of the platform on its legs, and its natural modes.
 
 Legs of stiffness k_i hold a small displacement ``dX = [dx; dtheta]`` (base axes) with the wrench
-``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2); what the
-present leg forces add by turning with the legs is left out. Undamped small vibrations obey
-``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
+``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2); the
+contribution of the present leg forces, which rotate with the legs, is neglected. Undamped small
+vibrations obey ``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
 """
 
 from __future__ import annotations
@@ -71,7 +71,11 @@ def natural_modes(mass: Array, inverse_jacobian: Array, leg_stiffness: Array) ->
     ``A = L^-1 J_inv^T diag(sqrt(k))``: its singular values are omega, never negative, and keep
     their digits near a singularity (Golub and Van Loan, Matrix Computations, 4th ed., 8.7).
 
-    Raises MotionError where M is not positive definite.
+    Raises
+    ------
+    MotionError
+        M is not positive definite.
+
     """
     try:
         factor = np.linalg.cholesky(mass)

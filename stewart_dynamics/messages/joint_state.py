@@ -110,7 +110,7 @@ def _fields(data: bytes) -> _Fields:
 
 
 class _Known(NamedTuple):
-    """A layout and what it says: which numbers are wanted, or why such messages are rejected."""
+    """A layout: which of its numbers are wanted, or why such messages are rejected."""
 
     layout: Layout
     columns: list[int]
@@ -237,7 +237,7 @@ class JointStateReader:
         return known
 
     def _judge(self, data: bytes, fields: _Fields) -> _Known:
-        """Return what the layout of a message says."""
+        """Return what is known of messages with the layout of this one."""
         names, many = fields.names, len(fields.names)
         wanted = {field: fields.numbers[n] for n, field in enumerate(FIELDS)
                   if field in self._fields}

@@ -28,7 +28,7 @@ from stewart_dynamics.nodes.topics import DIAGNOSTICS, Topics
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.report import OK, Status
 
-# What controllers read; the diagnostics say how many do.
+# The topics for controllers; diagnostics give the number of their subscribers.
 _READ = ('leg_states', 'leg_forces')
 
 
@@ -39,11 +39,11 @@ class DiagnosticsPublisher:
     Parameters
     ----------
     node : Node
-        Whose they are.
+        The node that is reported on.
     topics : Topics
-        The node's topics, among them that of the reports.
+        Its topics, including that of the reports.
     log : RepeatedLog
-        Gets what is logged.
+        Receives the log lines.
 
     """
 
@@ -51,11 +51,11 @@ class DiagnosticsPublisher:
         self._node = node
         self._topics = topics
         self._log = log
-        # The first one takes milliseconds: rclpy loads what it needs.
+        # The first one takes milliseconds: rclpy loads the type support.
         serialize_message(self._message([Status('', OK, '', (('', ''),))]))
 
     def publish(self, diagnostics: DynamicsDiagnostics) -> None:
-        """Look who publishes and who listens; publish and log a report."""
+        """Count publishers and subscribers; publish and log a report."""
         node = self._node
         diagnostics.setpoints.found(
             self._topics.writers(),

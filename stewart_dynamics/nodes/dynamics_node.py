@@ -68,7 +68,7 @@ class _Models(NamedTuple):
         return cls(Step(parameters), ExternalWrench(parameters))
 
     def compile_ahead(self) -> None:
-        """Make the first calls, which compile: no message shall wait for that."""
+        """Make the first calls, which compile, so that no message waits for that."""
         self.step(Setpoint(0, (0.0,) * MOTION), None)
         compile_ahead(self.step.parameters)
         with suppress(StewartError):  # no pose has such lengths
@@ -128,7 +128,7 @@ class DynamicsNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to answer, as if nothing had come before."""
+        """Begin to answer; earlier messages do not matter."""
         parameters, models = self._settings, self._models
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
         self._measured_legs = MeasuredLegs(
@@ -162,8 +162,8 @@ class DynamicsNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def destroy_node(self) -> None:
-        """Log what is not logged yet, and end."""
-        # The node's own logger would complain that /rosout is gone where a signal has ended ROS.
+        """Log the last line of each series, and end."""
+        # The node's own logger warns that /rosout does not exist after a signal has ended ROS.
         self._log.logger = get_logger(f'{self.get_name()}.last')
         self._log.write_last()
         super().destroy_node()
@@ -184,9 +184,9 @@ class DynamicsNode(LifecycleNode):
         self._exclusive = self._settings['setpoint.exclusive']
         self._answer_task = until_shutdown(self, self._answer)
         self._configured = True
-        # What is there now stays: the collector would look at all of it again and again, for
+        # These objects stay: the collector would go through all of them again and again, for
         # 50 ms and more, while a setpoint waits.
-        gc.unfreeze()  # what an earlier configuration has left
+        gc.unfreeze()  # the objects of an earlier configuration
         gc.collect()
         gc.freeze()
 

@@ -38,8 +38,8 @@ from stewart_dynamics.runtime.step import Output
 
 Color = tuple[float, float, float, float]
 
-# Okabe and Ito's blue, vermillion and yellow, which the colour-blind can tell apart. A leg without
-# load is nearly white, so that the darker one is the more loaded one, whichever way.
+# Okabe and Ito's blue, vermillion and yellow, distinct for the colour-blind. A leg without load is
+# nearly white: the darker a leg, the larger its force, whether it pushes or pulls.
 PUSH: Color = (0.835, 0.369, 0.0, 1.0)
 PULL: Color = (0.0, 0.447, 0.698, 1.0)
 NO_LOAD: Color = (0.95, 0.95, 0.95, 1.0)
@@ -148,9 +148,9 @@ class Markers:
         Parameters
         ----------
         motion : sequence of float
-            That of the setpoint, laid out as ``inverse_dynamics`` says.
+            That of the setpoint, laid out as for ``inverse_dynamics``.
         output : Output
-            What the setpoint gives.
+            The result for the setpoint.
 
         """
         body = self._body

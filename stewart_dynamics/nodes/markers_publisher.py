@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""When the markers are published: at most at ``visualization_rate``, while somebody subscribes."""
+"""Publishes the markers, at most at ``visualization_rate``, while there are subscribers."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class MarkersPublisher:
         self._unpublished = setpoint, output
 
     def publish_due(self, now: float) -> None:
-        """Publish the markers of the last answer if they are due and somebody subscribes."""
+        """Publish the markers of the last answer if they are due and there is a subscriber."""
         if self._unpublished is None or self._publisher is None or now < self._due:
             return
         setpoint, output = self._unpublished
-        # Who subscribes only later gets no markers of what was long ago.
+        # A later subscriber gets no markers of an old setpoint.
         self._unpublished = None
         self._due = now + self._period
         if self._publisher.get_subscription_count():

@@ -24,8 +24,8 @@ from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 # So many are in work or wait.
 LENGTH = 5
 
-# Between two pieces of the work [s]. A node that computed all the time would be held up by an
-# operating system that other programs ask for time as well, and its setpoints with it.
+# Between two pieces of the work [s]. While other programs need the processor as well, the
+# operating system would suspend a node that computes all the time, and its setpoints would wait.
 PAUSE = 0.001
 
 

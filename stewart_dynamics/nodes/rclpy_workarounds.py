@@ -15,8 +15,8 @@
 """
 Workarounds for rclpy 7.1 (ROS 2 Jazzy): each for one defect, with its upstream issue.
 
-Where there is no upstream issue, the docstring says what rclpy does, and the test that is named
-there tells when the workaround can go: it passes without it then.
+Where there is no upstream issue, the docstring describes what rclpy does, and names a test: when
+it passes without the workaround, the workaround can be removed.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _NUMBERS = (
     RosParameter.Type.NOT_SET, RosParameter.Type.DOUBLE, RosParameter.Type.DOUBLE_ARRAY)
 
 
-def answer_impossible_transitions(node: LifecycleNode, say: Callable[[str], None]) -> None:
+def answer_impossible_transitions(node: LifecycleNode, log: Callable[[str], None]) -> None:
     """
     Answer a request for a transition that the present state does not have: no success.
 
@@ -59,8 +59,8 @@ def answer_impossible_transitions(node: LifecycleNode, say: Callable[[str], None
     ----------
     node : LifecycleNode
         The node whose service ``change_state`` answers so.
-    say : callable
-        Gets the text for the log.
+    log : callable
+        Called with the text.
 
     """
     service = node._service_change_state
@@ -70,7 +70,7 @@ def answer_impossible_transitions(node: LifecycleNode, say: Callable[[str], None
         try:
             return change_state(request, response)
         except RCLError as exc:
-            say(f'transition rejected: {exc}')
+            log(f'transition rejected: {exc}')
             response.success = False
             return response
 
@@ -89,13 +89,13 @@ def set_parameters_together(node: Node) -> None:
     - ``ros2 param load`` sends 1e-05 as a text (https://github.com/ros2/rclpy/issues/1672), and
       the text None where ``ros2 param dump`` has written null for a parameter without a value
       (https://github.com/ros2/ros2cli/issues/965).
-    - A read-only parameter in the request, as a dump has them, spoils the whole request even
-      where its value is the present one.
+    - A read-only parameter in the request, as a dump has them, makes rclpy reject the whole
+      request even if its value is the present one.
     """
     def set_together(messages: Sequence[Any]) -> SetParametersResult:
         try:
             received = [_received(node, message) for message in messages]
-            changes = [each for each in received if not _is_present(node, each)]
+            changes = [each for each in received if not is_present(node, each)]
             return node.set_parameters_atomically(changes)
         except (ParameterException, RuntimeError, TypeError, ValueError) as exc:
             return SetParametersResult(successful=False, reason=str(exc))
@@ -135,7 +135,7 @@ def _received(node: Node, message: Any) -> RosParameter:
     return parameter
 
 
-def _is_present(node: Node, parameter: RosParameter) -> bool:
+def is_present(node: Node, parameter: RosParameter) -> bool:
     """Return whether a parameter has this type and value already."""
     if not node.has_parameter(parameter.name):
         return False
@@ -156,8 +156,8 @@ def describe_by(
     its own words, and takes the bounds of a range as inclusive, so that ``more than 0`` cannot be
     described; it also writes the type of a value into the descriptor before it rejects the value
     (https://github.com/ros2/rclpy/blob/7.1.5/rclpy/rclpy/node.py, ``_apply_descriptor``). It can
-    go when test_a_value_out_of_range_is_left_to_the_node_s_own_check passes with descriptors that
-    are given to ``declare_parameter``.
+    be removed when test_a_value_out_of_range_is_left_to_the_node_s_own_check passes with
+    descriptors that are given to ``declare_parameter``.
     """
     def answer(request: Any, response: Any) -> Any:
         response = describe_by_node(request, response)
@@ -178,7 +178,7 @@ def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., N
     Return a callback that ends without an error where ROS is shut down while it runs.
 
     A signal shuts ROS down from another thread while a callback runs, and whatever the callback
-    then asks of ROS raises RCLError (https://github.com/ros2/rclpy/issues/1287, and its effect:
+    then calls of ROS raises RCLError (https://github.com/ros2/rclpy/issues/1287, and its effect:
     https://github.com/ros-visualization/interactive_markers/issues/88).
     """
     def guarded(*arguments: Any) -> None:
@@ -200,8 +200,8 @@ def take_waiting_messages(
     The single-threaded executor runs a task before the messages that have come meanwhile
     (rclpy/executors.py, ``_wait_for_ready_callbacks``): a node that has fallen behind would answer
     one after the other, however late. The events executor takes them first; nothing is done then.
-    It can go when that executor is the only one (https://github.com/ros2/rclpy/pull/1391, in
-    Jazzy since 7.1.4).
+    It can be removed when that executor is the only one
+    (https://github.com/ros2/rclpy/pull/1391, in Jazzy since 7.1.4).
 
     Parameters
     ----------
@@ -230,10 +230,10 @@ def take_waiting_messages(
 
 
 class _TimeSource(TimeSource):
-    """What follows /clock for a node, and rejects a time that ROS cannot hold."""
+    """Follows /clock for a node, and rejects a time that ROS cannot hold."""
 
     def clock_callback(self, msg: Any) -> None:
-        """Follow a message, or say why not."""
+        """Follow a message, or log why not."""
         try:
             if msg.clock.nanosec >= _NANOSECONDS:
                 raise ValueError(f'nanosec is {msg.clock.nanosec}, must be less than 1e9')
@@ -245,7 +245,7 @@ class _TimeSource(TimeSource):
 
 def reject_impossible_times() -> None:
     """
-    Reject times on /clock that are none; call it before a node is made.
+    Reject impossible times on /clock; call it before a node is made.
 
     A time before zero raises ValueError out of spin, which ends the program; ``nanosec`` of 1e9
     and more gives a time that does not fit into the stamp of a message. Until

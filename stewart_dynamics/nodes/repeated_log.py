@@ -32,7 +32,7 @@ class RepeatedLog:
     Parameters
     ----------
     logger : rclpy logger
-        What gets them. Another one may take its place at any time: ``logger``.
+        It may be replaced at any time: ``logger``.
 
     """
 

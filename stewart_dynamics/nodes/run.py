@@ -38,13 +38,14 @@ from rclpy.utilities import remove_ros_args
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.nodes.programs import parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
-    describe_by, make_executor, reject_impossible_times, set_parameters_together, shut_down, spin)
+    describe_by, is_present, make_executor, reject_impossible_times, set_parameters_together,
+    shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries
-from stewart_dynamics.parameter_files import is_of_ros, other_nodes
+from stewart_dynamics.parameter_files import is_of_ros, other_nodes, parameters_of
 from stewart_dynamics.parameter_set import Parameter, ParameterSet
-from stewart_dynamics.parameters_yaml import NULL
+from stewart_dynamics.parameters_yaml import read_document, read_value
 
-# Errors that the user can mend: said in one line. All else is a defect of this package.
+# Errors that the user can correct: reported in one line. All others are defects of this package.
 _OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
 
 _TYPES = {
@@ -55,12 +56,26 @@ _TYPES = {
 Kind = TypeVar('Kind', bound=ParameterSet)
 
 
-def _overrides(arguments: Sequence[str], node: str) -> list[tuple[str, str]]:
-    """Return names and texts of the values that a command line sets, for this node or all."""
-    rules = [rule.partition(':=') for option, rule in zip(arguments, arguments[1:], strict=False)
-             if option in ('-p', '--param')]
-    return [(name.rpartition(':')[2], text) for name, _, text in rules
-            if name.rpartition(':')[0] in ('', node)]
+def _given(arguments: Sequence[str], node: str, kind: type[ParameterSet]) -> dict[str, Any]:
+    """
+    Return the values that a command line gives a node, in files and by ``-p``: the last of each.
+
+    ROS may use another one. rcl keeps both a number and a list that ``-p`` sets in its place, and
+    rclpy takes the number; values for ``/**`` and those for the node's name are applied in the
+    order in which these two first appear; a ``-p`` of another type than in a file is dropped.
+    """
+    values: dict[str, Any] = {}
+    for option, argument in zip(arguments, arguments[1:], strict=False):
+        if option == '--params-file':
+            values.update(parameters_of(read_document(argument), node, argument))
+        elif option in ('-p', '--param'):
+            target, _, text = argument.partition(':=')
+            section, _, name = target.rpartition(':')
+            if section in ('', node.lstrip('/')):
+                kind.check_value(name, text, 'command line')
+                values[name] = read_value(text, name)
+    return {name: value for name, value in values.items()
+            if value is not None and not is_of_ros(name)}
 
 
 def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
@@ -68,21 +83,17 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     Return the node's parameters, checked, and declare all of the table.
 
     The node must have been made with ``automatically_declare_parameters_from_overrides``. Types
-    and ranges are left to the table's own check, whose texts say more than ROS's. A node without
-    a lifecycle accepts no changes. Raises ParameterError, for an unknown name as well.
+    and ranges are left to the table's own check, whose texts are more precise than those of ROS.
+    A node without a lifecycle accepts no changes.
+
+    Raises ParameterError where a rule is broken or a name unknown.
     """
     files = parameter_files(sys.argv)
     sources = list(files)
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
-    # ROS drops a value without a word that is of another type than that in a file.
-    for name, text in _overrides(sys.argv, kind.node):
-        kind.check_value(name, text, 'command line')
-    declared: dict[str, Any] = node.get_parameters_by_prefix('')
-    # A null of a file, as `ros2 param dump` writes it, is a text for rcl.
-    given = {name: parameter.value for name, parameter in declared.items()
-             if not is_of_ros(name) and parameter.value not in NULL}
+    given = _given(sys.argv, node.get_fully_qualified_name(), kind)
     try:
         parameters = kind(given, source, exact_types=True)
     except ParameterError as exc:
@@ -91,6 +102,9 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
         unchecked = ParameterDescriptor(dynamic_typing=True)
         if name in given:
             node.set_descriptor(name, unchecked)
+            value = RosParameter(name, value=given[name])
+            if not is_present(node, value):
+                node.set_parameters([value])
             continue
         if node.has_parameter(name):
             node.undeclare_parameter(name)
@@ -107,7 +121,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
 
 
 def _of_other_nodes(files: Sequence[str], node: str) -> ParameterError | None:
-    """Return what is wrong where no file has a section for the node."""
+    """Return the error where no file has a section for the node."""
     others = [other_nodes(file, node) for file in files]
     if not others or not all(others):
         return None
@@ -159,7 +173,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
     Parameters
     ----------
     make_node : callable
-        Called after rclpy.init; a StewartError that it raises is said in one line, exit code 1.
+        Called after rclpy.init; a StewartError that it raises is printed in one line, exit code 1.
     kind : type of ParameterSet
         Its parameters; their files have been checked by ``programs``.
     done : Future, optional

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Rejects an environment in which ROS and Fast DDS would start less secure than it asks for.
+Rejects an environment in which ROS and Fast DDS would start less secure than it requires.
 
-Where a keystore, a profile or a setting is missing or misspelt, both start without a message, open
-to anybody. Each setting is explained in security/README.md.
+Where a keystore, a profile or a setting is missing or misspelt, both start without a message, and
+without security. Each setting is explained in security/README.md.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from xml.etree import ElementTree
 from stewart_dynamics.errors import StewartError
 
 _PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
-_VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # as Fast DDS knows them
+_VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # in the syntax of Fast DDS
 _COMMENT = re.compile('<!--.*?-->', re.DOTALL)
 _KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
 _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTILINE)
@@ -42,7 +42,7 @@ def check_environment(arguments: Sequence[str]) -> str:
     """
     Return the text of a warning, nothing where there is none.
 
-    Raises StewartError, naming the variable, where security that is asked for would be missing.
+    Raises StewartError, naming the variable, where security that is required would be missing.
     """
     permissive = _check_dds_security(arguments)
     rmw = os.environ.get('RMW_IMPLEMENTATION') or 'rmw_fastrtps_cpp'
@@ -53,9 +53,9 @@ def check_environment(arguments: Sequence[str]) -> str:
 
 @contextmanager
 def without_security_libraries() -> Iterator[None]:
-    """Say in one line that the node cannot be made because Fast DDS has no DDS Security."""
+    """Raise StewartError where the node cannot be made because Fast DDS has no DDS Security."""
     with warnings.catch_warnings():
-        # rclpy's own: two lines about what it could not clean up
+        # of rclpy: two lines about what it could not clean up
         warnings.filterwarnings('ignore', 'Failed to fini', RuntimeWarning)
         try:
             yield
@@ -122,8 +122,8 @@ def _check_profile(path: Path) -> None:
     if {'tls', 'listening_ports'} <= kinds:
         name = os.environ.get('OPENSSL_CONF', '')
         if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):
-            raise StewartError(f"OPENSSL_CONF: '{name}': has no VerifyMode = Require: anybody "
-                               'could connect to the port of the profile')
+            raise StewartError(f"OPENSSL_CONF: '{name}': has no VerifyMode = Require: every "
+                               'process could connect to the port of the profile')
 
 
 def _read(path: Path, what: str) -> str:

@@ -33,11 +33,11 @@ class SetpointQueue:
     Parameters
     ----------
     step : Step
-        Gives an answer. Another one may take its place at any time: ``step``.
+        Computes the answers. It may be replaced at any time: ``step``.
     publish : callable
         Publishes an answer: setpoint, output, when the setpoint came [s].
     reject : callable
-        Gets the reason and the details for a setpoint that is not answered.
+        Called with reason and details of a setpoint that is not answered.
     take_waiting : callable
         Adds the setpoints that wait in the middleware.
     answered : callable

@@ -72,7 +72,7 @@ class TrajectoryNode(Node):
         self._frame = self._settings['base_frame']
         self._index = 0
         self._block: Any = None
-        self._row()  # what cannot be computed is said before anything moves
+        self._row()  # an error in it is raised before anything moves
         target = self._settings['target']
         qos = QoSProfile(depth=1000)
         if self._settings['output'] == 'combined':
@@ -141,7 +141,7 @@ class TrajectoryNode(Node):
         """Begin when it is time, which comes sooner once all topics have subscribers."""
         if not self._subscribed and all(p.get_subscription_count() for p in self._outputs):
             self._subscribed = True
-            # A subscriber may know the publisher later than the publisher knows it.
+            # A subscriber may discover the publisher later than the publisher discovers it.
             if now < -_SETTLE:
                 self._start += now + _SETTLE
                 now = -_SETTLE

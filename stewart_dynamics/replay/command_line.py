@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, Options
+from stewart_dynamics.replay.unexpected_errors import unexpected
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters import Parameters
@@ -52,6 +53,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _run(given, _options(given))
     except (StewartError, OSError) as exc:
         _complain(exc)
+        return BAD_INPUT
+    except Exception as exc:  # exit codes and one line also for errors that no rule covers
+        _complain(unexpected(exc))
         return BAD_INPUT
     except KeyboardInterrupt as exc:
         _complain(f'interrupted: {exc}' if str(exc) else 'interrupted')

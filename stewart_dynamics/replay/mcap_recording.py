@@ -16,30 +16,23 @@
 """
 One MCAP file, whole, cut short or damaged: its valid messages in the order of time.
 
-Files are read by the package ``mcap`` (https://mcap.dev/spec). Its own decompression does not
-limit the size of a chunk, and its reader creates an object per message; here a chunk is
-decompressed at most to its declared size, and the messages in it are found by a compiled scan.
+Files are read by the package ``mcap`` (https://mcap.dev/spec). Its reader creates an object per
+message; here the messages in a chunk are found by a compiled scan.
 """
 
 from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Iterator, Mapping
-from io import BytesIO
 import math
 from pathlib import Path
-import zlib
 
-import lz4.frame
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Chunk
 import numpy as np
-import zstandard
 
 from stewart_dynamics.errors import BagError, one_line
-from stewart_dynamics.replay.mcap_layout import (
-    HEAD, INCONSISTENT, LARGEST_CHUNK, MAGIC, McapLayout, Piece)
+from stewart_dynamics.replay.mcap_chunk import decompressed
+from stewart_dynamics.replay.mcap_layout import HEAD, LARGEST_CHUNK, MAGIC, McapLayout, Piece
 from stewart_dynamics.replay.mcap_scan import CHANNEL, scanned, SIZE, START, TIME
 from stewart_dynamics.replay.message_blocks import Block, lean, merged, split
 
@@ -169,26 +162,6 @@ class McapRecording:
         head = self._layout.read_at(piece.offset, HEAD)
         if head != bytes([Opcode.CHUNK]) + piece.length.to_bytes(8, 'little'):
             raise ValueError('no chunk begins there')
-        stream = ReadDataStream(BytesIO(self._file.read(piece.length)))
-        chunk = Chunk.read(stream)
-        size, data = chunk.uncompressed_size, bytes(chunk.data)
-        if stream.count != piece.length:
-            raise ValueError(INCONSISTENT)
-        if size > LARGEST_CHUNK:
-            raise ValueError(f'{size} bytes, at most {LARGEST_CHUNK} are read')
-        if chunk.compression == 'zstd':
-            # No more than the declared size is allocated.
-            if zstandard.frame_content_size(data) not in (-1, size):
-                raise ValueError('its sizes are inconsistent')
-            data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-        elif chunk.compression == 'lz4':
-            data = bytes(lz4.frame.LZ4FrameDecompressor().decompress(
-                data, max_length=size + 1))
-        elif chunk.compression:
-            raise ValueError(f'compressed as {chunk.compression!r}, must be zstd or lz4')
-        if len(data) != size:
-            raise ValueError(f'{len(data)} bytes, must be {size}')
-        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-            raise ValueError('its checksum is wrong')
-        self.unchecked = self.unchecked or not (chunk.uncompressed_crc or size == 0)
-        return data
+        content, checked = decompressed(self._file.read(piece.length))
+        self.unchecked = self.unchecked or not checked
+        return content

@@ -37,8 +37,8 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay import report_plots as channels
-from stewart_dynamics.replay.curves import Curves, Frames
-from stewart_dynamics.replay.pages import page
+from stewart_dynamics.replay.html_pages import page
+from stewart_dynamics.replay.plot_curves import Curves, Frames
 from stewart_dynamics.replay.report_plots import COLORS, measured_plots, motion_plots
 from stewart_dynamics.replay.report_verdicts import (
     date, exceeded_limits, smallest_margins, units, verdicts)

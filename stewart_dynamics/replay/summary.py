@@ -32,7 +32,7 @@ from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.limits import (
     FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.gathering import (
+from stewart_dynamics.replay.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
 from stewart_dynamics.runtime.step import Batch, Outputs
 

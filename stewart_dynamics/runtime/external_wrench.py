@@ -16,7 +16,7 @@
 The external wrench: the load on the platform that measured lengths, rates and forces show.
 
 The hexapod obeys ``M X'' + C X' + G = J_inv^T f + w + w_ext`` with the measured leg forces f, the
-load w that ``~/wrench`` says, which is known, and the external wrench w_ext. The inverse dynamics
+known load w on ``~/wrench`` and the external wrench w_ext. The inverse dynamics
 give the forces f_model of the same motion without it, so
 
     w_ext = J_inv^T (f_model - f)
@@ -51,7 +51,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.mechanics import forward_kinematics, kernel
+from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.home_pose import homes
 from stewart_dynamics.mechanics.jit import entry_point, inlined
@@ -63,7 +64,7 @@ from stewart_dynamics.parameters import Parameters
 # Under the node's name.
 EXTERNAL_WRENCH = 'external_wrench'
 
-# What became of a measurement, beside what forward_kinematics says of its pose.
+# The outcome of a measurement, besides the codes of forward_kinematics.
 _OUT_OF_RANGE = 3
 
 # One measurement as numbers, since an array costs time to pass: what is given, what is written.
@@ -122,14 +123,14 @@ class Estimate(NamedTuple):
 
 
 @inlined
-def _add_external_wrench(machine: Array, motion: Array, model_forces: Array,
+def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
                          measured_forces: Array, weight: float, wrench: Array) -> None:
     """Add w_ext = J_inv^T (f_model - f_measured), times a weight, without making J_inv."""
     position = motion[0], motion[1], motion[2]
     rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
                 motion[10], motion[11])
     for leg in range(6):
-        a, _length, _inverse_length, s = kernel.leg_line(machine, leg, position, rotation)
+        a, _length, _inverse_length, s = leg_line(constants, leg, position, rotation)
         m = cross(a, s)
         force = weight * (model_forces[leg] - measured_forces[leg])
         for n in range(3):
@@ -138,12 +139,12 @@ def _add_external_wrench(machine: Array, motion: Array, model_forces: Array,
 
 
 @entry_point
-def _many(machine: Array, motions: Array, model_forces: Array, measured_forces: Array,
+def _many(constants: Array, motions: Array, model_forces: Array, measured_forces: Array,
           wrenches: Array) -> None:
     for n in range(len(motions)):
         wrenches[n] = 0.0
         _add_external_wrench(
-            machine, motions[n], model_forces[n], measured_forces[n], 1.0, wrenches[n])
+            constants, motions[n], model_forces[n], measured_forces[n], 1.0, wrenches[n])
 
 
 def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: Array,
@@ -176,16 +177,16 @@ def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: A
 @entry_point
 def _one(numbers: Array) -> None:
     """Write what one measurement gives."""
-    machine, written = numbers[_PLATFORM], numbers[_WRITTEN]
+    constants, written = numbers[_PLATFORM], numbers[_WRITTEN]
     before, motion, wrench, differences = (
         numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
     motion[:] = before
     code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
-        machine, numbers[_LENGTHS], motion)
+        constants, numbers[_LENGTHS], motion)
     written[_CODE.start] = code
     if code != forward_kinematics.FOUND:
         return
-    forward_kinematics.twist(machine, numbers[_RATES], motion)
+    forward_kinematics.twist(constants, numbers[_RATES], motion)
     dt = numbers[_INTERVAL.start]
     for n in range(6):
         motion[18 + n] = (motion[12 + n] - before[12 + n]) / dt if dt > 0.0 else 0.0
@@ -195,10 +196,10 @@ def _one(numbers: Array) -> None:
     if dt > 0.0:
         motions = numbers[_MOTIONS].reshape(2, MOTION)
         forces, results = numbers[_FORCES], np.empty((2, RESULT))
-        kernel.solve(machine, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
+        inverse_dynamics.solve(constants, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
         for end in range(2):  # the mean of both ends
             model_forces = results[end, FORCES]
-            _add_external_wrench(machine, motions[end], model_forces, forces, 0.5, wrench)
+            _add_external_wrench(constants, motions[end], model_forces, forces, 0.5, wrench)
             for n in range(6):
                 differences[n] += 0.5 * (forces[n] - model_forces[n])
         for n in range(6):
@@ -242,9 +243,9 @@ class ExternalWrench:
             A finite one.
         before : Estimate, optional
             The last one. Where it is of a later stamp, or further back than
-            ``setpoint.timeout``, only its pose is looked at, and the filter starts anew.
+            ``setpoint.timeout``, only its pose is used, and the filter restarts.
         known : six numbers
-            The load that ``~/wrench`` says [N, N m].
+            The load on ``~/wrench`` [N, N m].
         target : sequence of float, optional
             The last setpoint, as a row of motion.
 
@@ -298,7 +299,7 @@ class ExternalWrench:
 
     @cached_property
     def _homes(self) -> list[list[float]]:
-        # Milliseconds, for what is seldom asked for.
+        # It takes milliseconds and is seldom needed.
         return [[*position.tolist(), *rotation.ravel().tolist(), *NO_WRENCH, *NO_WRENCH]
                 for position, rotation in zip(*homes(self._parameters), strict=True)]
 

@@ -51,11 +51,11 @@ class MeasuredLegs:
     parameters : Parameters
         Names, zero lengths and timeout.
     step : ExternalWrench
-        Another one may take its place at any time: ``step``.
+        It may be replaced at any time: ``step``.
     rejected : callable
-        Told of each rejection and its details.
+        Called with each rejection and its details.
     noticed : callable
-        Told what a user should hear once: a restart.
+        Called with texts for the log: a restart.
 
     """
 

@@ -53,7 +53,7 @@ _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 
 
 class Outcome(NamedTuple):
-    """What has become of a trajectory."""
+    """The outcome of the check of a trajectory."""
 
     message: str
     """In words: accepted or rejected, and why."""
@@ -179,7 +179,7 @@ def _written(parameters: Parameters, message: PlatformTrajectory, result: Planne
 
 
 def _values(parameters: Parameters, result: PlannedTrajectory) -> tuple[tuple[str, str], ...]:
-    """Return what diagnostics say beside the message."""
+    """Return the keys and values for diagnostics."""
     values = [('points', str(result.points)), ('duration (s)', f'{result.duration:.9g}')]
     joints = parameters['joints']
     if result.accepted and result.force_leg is not None:

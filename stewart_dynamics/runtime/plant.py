@@ -17,7 +17,7 @@ The plant: the hexapod as it moves under leg forces.
 
 Gravity, friction, end stops, actuators that saturate: what ``stewart_simulator`` puts in the
 place of hardware. Equal commands give equal bits. See ``mechanics.plant_dynamics`` for the
-integration, ``mechanics.end_stops`` and ``mechanics.integration_step``.
+integration, ``mechanics.end_stops`` and ``mechanics.integration_step_size``.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import numpy as np
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.end_stops import stops_of
-from stewart_dynamics.mechanics.integration_step import substeps
+from stewart_dynamics.mechanics.integration_step_size import substeps
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.plant_dynamics import (
     advance, LARGEST_MOVE, LOADS, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
@@ -64,8 +64,8 @@ class Plant:
     The hexapod of given parameters, in motion from its initial pose; brakes hold it there first.
 
     Where a step cannot be computed, because numbers overflow or a leg is so short that one step
-    could reverse it, the hexapod is held at rest in the last pose that could be, for good:
-    ``fault`` says so.
+    could reverse it, the hexapod is held at rest in the last pose that could be, permanently:
+    ``fault`` states it.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Plant:
         self.substeps = substeps(parameters)
         """Steps that are taken within one of the parameter's length."""
         self.fault = ''
-        """Why it is held at rest for good; empty while it is not."""
+        """Why it is held at rest permanently; empty while it is not."""
         period = 1.0 / parameters['rate']
         self.steps = round(period / parameters['step']) * self.substeps
         """Steps in a period."""
@@ -147,7 +147,7 @@ class Plant:
         lengths = result[RESULT_LENGTHS]
         if not result[RESULT_SOUND]:
             self.fault = (
-                f'held at rest for good: after the position {list(state[STATE_POSITION])} m the '
+                f'held at rest permanently: after position {list(state[STATE_POSITION])} m the '
                 'motion cannot be computed: numbers overflow, or within a step of '
                 f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
                 'joint moves by more than that part of its leg; shortest leg '

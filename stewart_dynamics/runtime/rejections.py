@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Why messages are rejected or dropped: the reasons, what is said of each, and the counting."""
+"""Why messages are rejected or dropped: the reasons, their texts, and the counts."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Rejection(NamedTuple):
     reason: str
 
     def words(self, details: str) -> str:
-        """Return what a log says of a message."""
+        """Return the log line for a message."""
         how = '' if self.reason.startswith(_DROPPED) else 'rejected: '
         return f'{self.topic} {how}{self.reason}: {details}'
 
@@ -58,7 +58,7 @@ class Rejections:
     Parameters
     ----------
     rejected : callable
-        Told of each, beside the counting, with the details of the message.
+        Called with each rejection and the details of the message.
 
     """
 
@@ -67,17 +67,17 @@ class Rejections:
         self._rejected = rejected
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
-        """Count messages, and tell of them."""
+        """Count and report messages."""
         rejection = Rejection(topic, reason)
         self.counts[rejection] += number
         self._rejected(rejection, details)
 
 
 def frame_details(frame: bytes, base_frame: bytes) -> str:
-    """Return what is said of a WRONG_FRAME."""
+    """Return the details of a WRONG_FRAME."""
     return f'{frame[:60].decode(errors="replace")!r}, must be {base_frame.decode()!r} or empty'
 
 
 def length_details(length: float) -> str:
-    """Return what is said of the length of a quaternion that is NOT_UNIT."""
+    """Return the details of a quaternion that is NOT_UNIT."""
     return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'

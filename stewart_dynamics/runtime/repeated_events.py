@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What a log says of what happens over and over: the first, one in five seconds, and the last.
+Log lines of repeated events: the first, one in five seconds, and the last.
 
-It knows no ROS and no clock: it is told the time and returns the lines.
+It uses no ROS and no clock: callers pass the time.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-# A series is over when nothing of its kind came for so long, and said again after so long.
+# A series ends when no event of its kind came for so long; while it lasts, one is logged so often.
 SECONDS = 5.0
 
 
@@ -32,39 +32,39 @@ class _One:
     """A series that is not over."""
 
     text: str
-    said: float
+    logged: float
     seen: float
-    unsaid: int = 0
+    unlogged: int = 0
     number: int = 1
 
 
 class Series:
-    """Tells series of alike events apart by their kind; times are seconds of a steady clock."""
+    """The series of events, by their kind; times are seconds of a steady clock."""
 
     def __init__(self) -> None:
         self._of_kind: dict[Hashable, _One] = {}
 
     def add(self, kind: Hashable, text: str, now: float) -> str | None:
-        """Return what to say of one more event, None for nothing yet."""
+        """Return the line to log for one more event, None where there is none yet."""
         one = self._of_kind.get(kind)
         if one is None:
             self._of_kind[kind] = _One(text, now, now)
             return text
         one.text, one.seen = text, now
         one.number += 1
-        if now - one.said < SECONDS:
-            one.unsaid += 1
+        if now - one.logged < SECONDS:
+            one.unlogged += 1
             return None
-        before = f' (and {one.unsaid} before it)' if one.unsaid else ''
-        one.said, one.unsaid = now, 0
+        before = f' (and {one.unlogged} before it)' if one.unlogged else ''
+        one.logged, one.unlogged = now, 0
         return text + before
 
     def over(self, now: float) -> list[str]:
-        """Return what to say of the series that are over by now: the last of each, if unsaid."""
+        """Return the lines of the series that are over: the last event of each, if not logged."""
         lines = []
         for kind, one in list(self._of_kind.items()):
             if now - one.seen >= SECONDS:
                 del self._of_kind[kind]
-                if one.unsaid:
+                if one.unlogged:
                     lines.append(f'{one.text} (the last of {one.number})')
         return lines

@@ -51,7 +51,7 @@ class SampleReader:
     base_frame : str
         The frame that messages must have, or none.
     rejections : Rejections
-        Told of what is rejected.
+        Counts what is rejected.
 
     """
 

@@ -16,9 +16,9 @@
 From messages on the setpoint topics to joined setpoints; what is rejected is counted.
 
 Node and replay feed it the same bytes in the same order, so both reject and join alike: the node
-one message at a time, the replay many at once. ``take`` says what becomes of a message;
-``take_many`` does the same to many of which none is out of the ordinary, and hands them to
-``take`` where one is.
+one message at a time, the replay many at once. ``take`` handles one message;
+``take_many`` does the same for many of which none is out of the ordinary, and calls ``take`` for
+each of them where one is.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers, Six, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.batch_joining import join_many, Samples, WAITING, Waiting
 from stewart_dynamics.runtime.input_topics import SOURCES, WRENCH
-from stewart_dynamics.runtime.joining import join_many, Samples, WAITING, Waiting
 from stewart_dynamics.runtime.rejections import NOT_JOINED, Rejection, Rejections, TOO_OLD, TWICE
 from stewart_dynamics.runtime.samples import SampleReader
 from stewart_dynamics.runtime.step import Batch, Setpoint
@@ -84,9 +84,9 @@ class Setpoints:
     parameters : Parameters
         Which topics, frame, tolerance and timeout.
     rejected : callable
-        Told of each rejection and its details, beside the counting.
+        Called with each rejection and its details; they are counted as well.
     noticed : callable
-        Told what a user should hear once: a restart, stamps that are all zero.
+        Called with texts for the log: a restart, stamps that are all zero.
 
     """
 
@@ -104,7 +104,7 @@ class Setpoints:
         self._last: dict[str, int] = {}
         self._waiting: dict[str, Waiting] = {topic: {} for topic in self.topics}
         self._unstamped: dict[str, tuple[float, ...] | None] = {}
-        self._unstamped_said = False
+        self._unstamped_logged = False
         self._unstamped_first = ''
         self._stamped: set[str] = set()
 
@@ -115,7 +115,7 @@ class Setpoints:
 
     @property
     def wrench(self) -> Six:
-        """The known load on the platform, as ``~/wrench`` said it last [N, N m]."""
+        """The known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
         return self._wrench_input.wrench
 
     def take_wrench(self, data: bytes) -> None:
@@ -138,7 +138,7 @@ class Setpoints:
         """
         sample = self._readers[topic].read(data)
         if sample is None:
-            if self._unstamped_said and topic not in self._stamped:
+            if self._unstamped_logged and topic not in self._stamped:
                 self._join_unstamped(topic, None, now)  # it keeps its place in the order
             return None
         stamp, values = sample
@@ -192,7 +192,7 @@ class Setpoints:
         self._drop_unstamped()
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
-        """Count, and tell of, what is not used."""
+        """Count and report what is not used."""
         self._rejections.reject(topic, reason, details, number)
 
     def _in_time(self, topic: str, stamp: int) -> bool:
@@ -270,8 +270,8 @@ class Setpoints:
         What is incomplete when the next one begins is dropped, all of it: else a lost sample
         would join the following ones wrongly for ever.
         """
-        if not self._unstamped_said:
-            self._unstamped_said = True
+        if not self._unstamped_logged:
+            self._unstamped_logged = True
             self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
                           'of arrival and stamped with the clock')
         if topic in self._unstamped or topic == self._unstamped_first:
@@ -305,7 +305,7 @@ class Setpoints:
 
         Ordinary are sound messages of one layout for each topic, whose stamps only rise.
         """
-        if self._tolerance or self._unstamped_said:
+        if self._tolerance or self._unstamped_logged:
             return None
         samples: dict[str, Samples] = dict.fromkeys(self.topics, _NO_SAMPLES)
         wrenches = _NO_SAMPLES

@@ -15,7 +15,7 @@
 """
 The one step from a setpoint to legs, forces and the warning; node and replay both take it.
 
-It knows neither messages nor bags, keeps no state, and gives the same bits for the same input,
+It uses neither messages nor bags, keeps no state, and gives the same bits for the same input,
 whether setpoints come one at a time or by the thousand.
 """
 
@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
@@ -49,11 +49,11 @@ class Setpoint(NamedTuple):
     stamp: int
     """[ns]"""
     motion: tuple[float, ...]
-    """A row of motion, laid out as ``inverse_dynamics`` says."""
+    """A row of motion, laid out as for ``inverse_dynamics``."""
     wrench: Six = NO_WRENCH
     """Load on the platform at its origin, base axes [N, N m]."""
     restart: bool = False
-    """Time has jumped back before it: what came before says nothing of it."""
+    """Time has jumped back before it: earlier setpoints do not matter for it."""
 
 
 class Output(NamedTuple):
@@ -81,7 +81,7 @@ class Batch(NamedTuple):
     stamps: Stamps
     """(N,) [ns]"""
     motions: Array
-    """Rows of motion (N, 24), laid out as ``inverse_dynamics`` says."""
+    """Rows of motion (N, 24), laid out as for ``inverse_dynamics``."""
     wrenches: Array
     """(N, 6) [N, N m], or one row for all."""
     restarts: Flags
@@ -102,7 +102,7 @@ class Outputs(NamedTuple):
     stamps: Stamps
     """(N,) [ns]"""
     results: Array
-    """Rows of results (N, 27), laid out as ``inverse_dynamics`` says; no forces are nan."""
+    """Rows of results (N, 27), laid out as for ``inverse_dynamics``; no forces are nan."""
     forces: Array
     """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
     states: Array
@@ -210,7 +210,7 @@ def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array,
     state, limits = before.copy(), settings[_LIMITS]
     restart = False
     for n in range(len(results)):
-        # One that cannot be answered hands it on.
+        # Where this one cannot be answered, the next one is the restart.
         restart = restart or restarts[n]
         is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
         answered[n], exceeding[n] = _watch(
@@ -225,8 +225,9 @@ def _one(numbers: Array) -> None:
     settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
     state[:] = numbers[_BEFORE]
-    kernel.solve(numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
-                 numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
+    inverse_dynamics.solve(
+        numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
+        numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
     written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
         settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0, state,
         numbers[_RESTART.start] > 0.0, result, written[_FORCES])

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The known load on the platform: what ``~/wrench`` said last."""
+"""The known load on the platform: the last message on ``~/wrench``."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers, NO_WRENCH, Six
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.batch_joining import Samples
 from stewart_dynamics.runtime.input_topics import WRENCH
-from stewart_dynamics.runtime.joining import Samples
 from stewart_dynamics.runtime.rejections import Rejections
 from stewart_dynamics.runtime.samples import SampleReader
 
@@ -35,7 +35,7 @@ class WrenchInput:
     parameters : Parameters
         For ``base_frame``.
     rejections : Rejections
-        Told of what is rejected.
+        Counts what is rejected.
 
     """
 

@@ -16,6 +16,6 @@
 What the dynamics node reports of itself: parts of one protocol, see ``report``.
 
 ``setpoints``, ``singularity``, ``limits``, ``timing``, ``planned_trajectory`` and
-``external_wrench`` have one status each; ``dynamics`` puts them together. They know no ROS and
-no clock: they are told what happens and when, in seconds of a steady clock.
+``external_wrench`` have one status each; ``dynamics`` puts them together. They use no ROS and
+no clock: callers pass events and their times, in seconds of a steady clock.
 """

@@ -111,7 +111,7 @@ class Held:
         return max(self._state.level, *self._seen) if self._seen else self._state.level
 
     def at(self, now: float) -> Level:
-        """Return what has the highest level; of a state that is past it says since when."""
+        """Return what has the highest level; that of a past state contains its age."""
         self._forget(now)
         worst = max(self._seen, default=OK)
         if worst <= self._state.level:

@@ -173,7 +173,7 @@ class SetpointDiagnostics:
         """
         Return the warning that messages arrive but none completes a setpoint.
 
-        Nothing else: rejections are logged one by one, and that nobody sends setpoints is no
+        Nothing else: rejections are logged one by one, and without setpoints there is no
         fault.
         """
         last = max(self._heard.values())

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.replay.gathering import FIRST, longest_step
+from stewart_dynamics.replay.block_statistics import FIRST, longest_step
 
 # About the width of a plot in pixels. Even, since neighbors are merged.
 BUCKETS = 1024

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-How short the steps of an integration must be where friction or end stops are stiff.
+The longest step of an integration where friction or end stops are stiff.
 
-They are the fastest by far of what happens there. With them a hexapod is
+Their modes are the fastest by far. With them a hexapod is
 ``M x'' + J^T D J x' + J^T K J x = 0``, with M its mass matrix, D the damping of the legs (viscous
 friction, the slope of the Coulomb friction at standstill, the dampers of the stops) and K the
 springs of the stops. A mode exp(s t) obeys s^2 + d s + k = 0 with Rayleigh quotients d and k,
@@ -32,25 +32,29 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.end_stops import stiffness_and_damping
-from stewart_dynamics.mechanics.friction import COULOMB_RATE
+from stewart_dynamics.mechanics.friction import coulomb_damping
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
 # The Runge-Kutta method is stable for all modes s with |h s| below 2.6 that do not grow by
-# themselves; within 1 their error is small as well, and there is room for what is not linear.
+# themselves; up to 1 their error is small as well, with a margin for nonlinear terms.
 _REACH = 1.0
 _MOST_SUBSTEPS = 1000
 
 
 def substeps(parameters: Parameters) -> int:
     """
-    Return in how many parts a step of the parameters must be divided.
+    Return into how many parts the step of the parameters must be divided.
 
-    Raises ParameterError, with the name of the parameter, where these would be too many.
+    Raises
+    ------
+    ParameterError
+        These would be too many; names the parameter.
+
     """
     step = parameters['step']
     with np.errstate(all='ignore'):
         viscous = parameters['actuator.viscous_friction']
-        coulomb = parameters['actuator.coulomb_friction'] / COULOMB_RATE
+        coulomb = coulomb_damping(parameters['actuator.coulomb_friction'])
         stiffness, damping = stiffness_and_damping(parameters)
         fastest = max(largest_eigenvalue(parameters, viscous + coulomb + damping),
                       math.sqrt(largest_eigenvalue(parameters, stiffness)))
@@ -78,16 +82,16 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
     Return a bound, in every pose, of the largest eigenvalue of J^T diag(of_legs) J against M.
 
     A force along leg i moves the platform's joint along the leg by no more than
-    1 / m + |p_i - c|^2 / I_min, of the platform alone, times the force; the sum of these times
-    what the legs have is the trace of a matrix that has these eigenvalues. The reflected masses
-    in series bound it again; the masses of the legs would only make it smaller.
+    1 / m + |p_i - c|^2 / I_min, of the platform alone, times the force; the sum of these
+    products is the trace of a matrix with these eigenvalues. The reflected masses in series give
+    another bound; the masses of the legs would only make it smaller.
 
     Parameters
     ----------
     parameters : Parameters
         Geometry, platform and reflected masses.
     of_legs : (6,)
-        What each leg has: damping [N s/m] or stiffness [N/m].
+        Damping [N s/m] or stiffness [N/m] of each leg.
 
     """
     arms = parameters['geometry.platform_joints'] - parameters['platform.center_of_mass']

@@ -25,8 +25,8 @@ from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 
 # Samples of a topic that wait for those of the others; the oldest is dropped when one more
-# comes. As many as may wait in the node's middleware: it hands over one topic's after the
-# other's.
+# comes. As many as may wait in the node's middleware, which delivers the messages of one topic
+# after those of another.
 WAITING = 1000
 
 Waiting = dict[int, tuple[float, ...]]

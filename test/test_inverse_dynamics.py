@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The runtime path against other libraries, other formulas, and itself in other forms."""
+"""Inverse dynamics against Pinocchio, other formulas, and itself uncompiled and in batches."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ from stewart_dynamics import (
     InverseDynamics, Motion, MotionError, Parameters, Pose, SingularityError, StewartError,
     StewartPlatform)
 from stewart_dynamics.mechanics import batch, lagrange
+from stewart_dynamics.mechanics.inverse_dynamics import LANES, solve
 from stewart_dynamics.mechanics.jit import COMPILED
-from stewart_dynamics.mechanics.kernel import LANES, solve
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, MOTION, RESULT
 
 Array = NDArray[np.float64]
 
 PACKAGE = Path(stewart_dynamics.__file__).parent
-MACHINES = 12
+HEXAPODS = 12
 STATES = 15
 
 
@@ -72,7 +72,7 @@ def turned(angles: Any, turn_rate: float = 0.0, height: float = 1.0) -> Motion:
 
 
 def samples_of_all_kinds(many: int) -> tuple[StewartPlatform, Array]:
-    """Return a symmetric machine and motions: ordinary, symmetric, near and on a singularity."""
+    """Return a symmetric hexapod and motions: ordinary, symmetric, near and on a singularity."""
     random = rng()
     platform = StewartPlatform(symmetric_parameters())
     rows = random_motion(platform.parameters, random, many).rows.copy()
@@ -94,12 +94,12 @@ def run(code: str, path: Path = PACKAGE.parent, first: Path | None = None,
     return done.stdout
 
 
-# The physics
+# Physics
 
 def test_forces_are_those_of_pinocchio() -> None:
     pytest.importorskip('pinocchio')
     random = rng()
-    for _ in range(MACHINES):
+    for _ in range(HEXAPODS):
         parameters = random_parameters(random)
         platform = StewartPlatform(parameters)
         referee = PinocchioReferee(parameters, random)
@@ -111,7 +111,7 @@ def test_forces_are_those_of_pinocchio() -> None:
             assert relative(forces[n], truth) < 1e-12
 
 
-def test_forces_near_a_singularity_are_those_of_pinocchio_to_what_its_condition_leaves() -> None:
+def test_forces_near_a_singularity_are_those_of_pinocchio() -> None:
     pytest.importorskip('pinocchio')
     platform = StewartPlatform(symmetric_parameters())
     referee = PinocchioReferee(platform.parameters, rng())
@@ -124,7 +124,7 @@ def test_forces_near_a_singularity_are_those_of_pinocchio_to_what_its_condition_
 
 def test_forces_are_those_of_the_lagrange_matrices() -> None:
     random = rng()
-    for _ in range(MACHINES):
+    for _ in range(HEXAPODS):
         p = random_parameters(random)
         platform = StewartPlatform(p)
         motion = random_motion(p, random, STATES)
@@ -192,7 +192,7 @@ def test_lengths_are_the_distances_of_the_joints_and_rates_their_derivatives() -
 
 def test_rates_are_j_inv_times_the_twist() -> None:
     random = rng()
-    for _ in range(MACHINES):
+    for _ in range(HEXAPODS):
         p = random_parameters(random)
         platform = StewartPlatform(p)
         motion = random_motion(p, random, STATES)
@@ -204,7 +204,7 @@ def test_rates_are_j_inv_times_the_twist() -> None:
 
 def test_forces_at_rest_balance_the_gravity_vector() -> None:
     random = rng()
-    for _ in range(MACHINES):
+    for _ in range(HEXAPODS):
         p = random_parameters(random)
         platform = StewartPlatform(p)
         moving = random_motion(p, random, STATES)
@@ -236,7 +236,7 @@ def test_power_of_the_legs_and_the_wrench_is_the_change_of_energy_and_the_fricti
         assert relative(supplied - lost, derivative(energy, step)) < 1e-7
 
 
-def test_a_wrench_is_held_by_the_forces_that_balance_it() -> None:
+def test_a_wrench_changes_the_forces_by_those_that_balance_it() -> None:
     random = rng()
     p = random_parameters(random)
     platform = StewartPlatform(p)
@@ -251,11 +251,11 @@ def test_a_wrench_is_held_by_the_forces_that_balance_it() -> None:
         sample(motion, 3), wrench[0]).forces)
 
 
-# The neighbourhood of singularities
+# Near singularities
 
 def test_determinant_and_its_rate_are_those_of_j_inv() -> None:
     random = rng()
-    for _ in range(MACHINES):
+    for _ in range(HEXAPODS):
         p = random_parameters(random)
         platform = StewartPlatform(p)
         motion = random_motion(p, random, STATES)
@@ -271,7 +271,7 @@ def test_determinant_and_its_rate_are_those_of_j_inv() -> None:
         assert relative(result.determinant_rate, derivative(det_after, 1e-3)) < 1e-8
 
 
-def test_determinant_rate_holds_up_to_a_singularity() -> None:
+def test_determinant_rate_is_exact_near_a_singularity() -> None:
     platform = StewartPlatform(symmetric_parameters())
 
     def det(angle: float) -> Array:
@@ -288,7 +288,7 @@ def test_determinant_rate_holds_up_to_a_singularity() -> None:
 
 def test_condition_number_and_unit_load_forces_are_those_of_numpy() -> None:
     random = rng()
-    for _ in range(MACHINES):
+    for _ in range(HEXAPODS):
         p = random_parameters(random)
         platform = StewartPlatform(p)
         motion = random_motion(p, random, STATES)
@@ -317,7 +317,7 @@ def test_unit_load_force_is_reached_by_a_load_and_exceeded_by_none() -> None:
 
 
 @pytest.mark.parametrize('height', [0.3, 0.5, 1.0, 1.5, 4.0])
-def test_condition_number_holds_in_symmetric_poses_with_double_singular_values(
+def test_condition_number_in_symmetric_poses_with_double_singular_values(
         height: float) -> None:
     platform = StewartPlatform(symmetric_parameters())
     motion = turned(np.linspace(-1.4, 1.4, 57), height=height)
@@ -329,7 +329,7 @@ def test_condition_number_holds_in_symmetric_poses_with_double_singular_values(
 
 
 @pytest.mark.parametrize('decade', range(1, 12))
-def test_condition_number_and_determinant_hold_near_a_singularity(decade: int) -> None:
+def test_condition_number_and_determinant_near_a_singularity(decade: int) -> None:
     platform = StewartPlatform(symmetric_parameters())
     motion = turned(np.pi / 2 - np.array([-1.0, 1.0]) * 10.0 ** -decade)
     result = platform.solve(motion.rows)
@@ -356,7 +356,7 @@ def test_forces_stay_finite_through_a_singularity_and_grow_as_one_over_the_dista
 
 
 @pytest.mark.parametrize('legs', ['parallel', 'in one plane', 'one joint', 'one of no length'])
-def test_results_are_finite_where_many_legs_fail_at_once(legs: str) -> None:
+def test_results_are_finite_where_several_singular_values_are_zero(legs: str) -> None:
     p = symmetric_parameters()
     base, top = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
     if legs == 'parallel':
@@ -376,7 +376,7 @@ def test_results_are_finite_where_many_legs_fail_at_once(legs: str) -> None:
         platform.inverse_dynamics(motion)
 
 
-def test_determinant_rate_holds_where_a_pivot_is_exactly_zero() -> None:
+def test_determinant_rate_where_a_pivot_is_exactly_zero() -> None:
     p = symmetric_parameters()
     base, moving = p['geometry.base_joints'].copy(), p['geometry.platform_joints'].copy()
     # legs 1 and 2 on one vertical line
@@ -402,7 +402,7 @@ def test_determinant_rate_holds_where_a_pivot_is_exactly_zero() -> None:
     assert found[DETERMINANT + 1] == pytest.approx(truth, rel=1e-8)
 
 
-def test_no_layout_of_arrays_is_compiled_for_anew() -> None:
+def test_arrays_of_any_layout_use_the_same_compiled_code() -> None:
     platform = StewartPlatform(symmetric_parameters())
     rows = samples_of_all_kinds(40)[1]
     motion = Motion([[0.0, 0.0, 1.0]] * 5, np.eye(3))
@@ -425,7 +425,7 @@ def test_a_singular_sample_is_named() -> None:
     assert '[0.0, 0.0, 1.0] m' in str(caught.value)
 
 
-# One sample, many samples, any form of them
+# Batches
 
 def test_a_sample_of_a_batch_of_any_size_is_the_sample_alone_bit_for_bit() -> None:
     platform, rows = samples_of_all_kinds(3 * LANES + 5)
@@ -482,7 +482,7 @@ def test_any_leading_shape_gives_the_same_samples() -> None:
         assert function(flat[0]).shape == of_batch.shape[1:]
 
 
-def test_no_samples_give_no_results() -> None:
+def test_an_empty_batch_gives_an_empty_result() -> None:
     platform = StewartPlatform(symmetric_parameters())
     result = platform.inverse_dynamics(Motion(np.zeros((0, 3)), np.zeros((0, 3, 3))))
     assert result.forces.shape == (0, 6)
@@ -524,7 +524,7 @@ def test_a_leg_without_a_length_is_rejected(position: Any) -> None:
         platform.coriolis_matrix(Motion(position, np.eye(3), np.ones(3), np.ones(3)))
 
 
-def test_a_pose_that_overflows_has_no_lengths() -> None:
+def test_a_pose_whose_numbers_overflow_is_rejected() -> None:
     with pytest.raises(MotionError, match='overflow'):
         StewartPlatform(symmetric_parameters()).inverse_kinematics(
             Pose([1e200, 0.0, 1.0], np.eye(3)))
@@ -538,9 +538,9 @@ def test_where_machine_code_cannot_be_kept_it_is_compiled_at_every_start(
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
 from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 print(compiled.HINT)
-print(kernel.solve.py_func.__name__)
+print(inverse_dynamics.solve.py_func.__name__)
 """
     printed = run(code, path=tmp_path).splitlines()
     if COMPILED:
@@ -560,18 +560,18 @@ def test_a_platform_can_be_copied_and_sent_to_another_process() -> None:
     assert platform.parameters != platform.parameters.replaced({'platform.mass': 1.5})
 
 
-# Compiled and not
+# Compiled and uncompiled
 
 UNCOMPILED = """
 import numpy as np
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import RESULT
 assert not COMPILED
 given = np.load({source!r})
 results = np.empty((len(given['rows']), RESULT))
 with np.errstate(all='ignore'):
-    kernel.solve(given['constants'], given['rows'], given['wrenches'], results)
+    inverse_dynamics.solve(given['constants'], given['rows'], given['wrenches'], results)
 np.save({target!r}, results)
 """
 
@@ -583,17 +583,17 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit(
         pytest.skip('nothing is compiled here')
     platform, rows = samples_of_all_kinds(40)
     other = StewartPlatform(random_parameters(rng()))
-    for n, machine in enumerate((platform, other)):
-        wrenches = random_wrench(machine.parameters, rng(), len(rows))
+    for n, hexapod in enumerate((platform, other)):
+        wrenches = random_wrench(hexapod.parameters, rng(), len(rows))
         source, target = str(tmp_path / f'{n}.npz'), str(tmp_path / f'{n}.npy')
-        np.savez(source, constants=machine.constants, rows=rows, wrenches=wrenches)
+        np.savez(source, constants=hexapod.constants, rows=rows, wrenches=wrenches)
         code = UNCOMPILED.format(source=source, target=target)
         if without == 'jit':
             run(code, NUMBA_DISABLE_JIT='1')
         else:
             (tmp_path / 'numba.py').write_text("raise ImportError('no numba here')\n")
             run(code, first=tmp_path)
-        assert np.array_equal(np.load(target), machine.solve(rows, wrenches))
+        assert np.array_equal(np.load(target), hexapod.solve(rows, wrenches))
 
 
 def test_the_package_needs_neither_ros_nor_bags() -> None:
@@ -611,10 +611,10 @@ def test_kept_machine_code_is_not_used_after_a_change_of_a_module_it_was_made_of
     shutil.copytree(PACKAGE, tmp_path / 'stewart_dynamics')
     code = f"""
 import numpy as np
-from stewart_dynamics.mechanics import kernel
+from stewart_dynamics.mechanics import inverse_dynamics
 results = np.empty((1, {RESULT}))
-kernel.solve(*np.load({str(tmp_path / "given.npy")!r}, allow_pickle=True), results)
-print(kernel.__file__, results[0, 0], sep='|')
+inverse_dynamics.solve(*np.load({str(tmp_path / "given.npy")!r}, allow_pickle=True), results)
+print(inverse_dynamics.__file__, results[0, 0], sep='|')
 """
     platform = StewartPlatform(symmetric_parameters())
     given_arrays = np.empty(3, dtype=object)
@@ -631,7 +631,7 @@ print(kernel.__file__, results[0, 0], sep='|')
     assert float(after) > float(before)
 
 
-# Whatever is given
+# Arbitrary input
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 ordinary = st.floats(-2.0, 2.0)
@@ -660,8 +660,8 @@ def test_any_motion_gives_finite_results_or_an_error_of_the_package(
     assert result.condition_number >= 1.0
 
 
-def machines(amount: Any) -> Any:
-    """Return a strategy for machines whose masses and inertias are such amounts."""
+def hexapods(amount: Any) -> Any:
+    """Return a strategy for hexapods whose masses and inertias are such amounts."""
     moments = st.lists(amount, min_size=3, max_size=3)
     return st.fixed_dictionaries({
         name: st.one_of(st.just(usual), numbers(len(usual)))
@@ -678,9 +678,9 @@ def machines(amount: Any) -> Any:
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)
-@given(st.one_of(machines(st.floats(0.01, 100.0)), machines(positive)))
+@given(st.one_of(hexapods(st.floats(0.01, 100.0)), hexapods(positive)))
 @np.errstate(all='ignore')
-def test_any_machine_gives_finite_results_or_an_error_of_the_package(values: Any) -> None:
+def test_any_hexapod_gives_finite_results_or_an_error_of_the_package(values: Any) -> None:
     try:
         result = StewartPlatform(Parameters(values)).inverse_dynamics(Motion(
             [0.1, 0.2, 1.0], np.eye(3), [0.1, 0.2, 0.3], [0.3, 0.2, 0.1], [1.0, 2.0, 3.0],
