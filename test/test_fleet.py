@@ -516,7 +516,7 @@ def test_an_interrupt_leaves_no_partial_results(
     # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
     assert running.returncode in (130, -signal.SIGINT)
     assert out == ''
-    assert re.fullmatch('stewart_replay: interrupted: \\d+ of \\d+ bags are done; the same '
+    assert re.fullmatch(r'stewart_replay: interrupted: \d+ of \d+ bags are done; the same '
                         'command continues with the others\n', err)
     assert hidden(output) == []
     assert not (output / 'huge').exists()

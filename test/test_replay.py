@@ -55,6 +55,7 @@ from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
+from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
@@ -923,6 +924,29 @@ def test_a_full_disk_leaves_nothing(size: int, tmp_path: Path) -> None:
     assert done.stderr.count('\n') == 1
     assert 'too large' in done.stderr
     assert not list((tmp_path / 'out').iterdir())
+
+
+@pytest.mark.parametrize(('error', 'text'), [
+    (MemoryError('Unable to allocate 3. GiB'), 'out of memory: Unable to allocate 3. GiB'),
+    (MemoryError(), 'out of memory'),
+    (ZeroDivisionError('by zero\nin two lines'), r'unexpected error, please report it: '
+     r'ZeroDivisionError: by zero in two lines \(test_replay.py, line \d+\)')])
+def test_unexpected_errors_are_one_line_and_leave_nothing(
+        error: Exception, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(Summary, 'values', fail)
+    out = tmp_path / 'out'
+    for given in ([ROOT / 'bags' / 'clear'], [ROOT / 'bags' / 'clear', ROOT / 'bags' / 'flawed']):
+        assert main([*map(str, given), '--params', str(PARAMS), '--output', str(out),
+                     '--no-report']) == BAD_INPUT
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == len(given)
+        for line in lines:
+            assert re.fullmatch(f'stewart_replay: (.*: )?{text}', line)
+        assert {path.name for path in out.iterdir()} <= {'fleet.csv', 'index.html'}
 
 
 # As a library

@@ -30,6 +30,7 @@ from stewart_dynamics.replay.index import Cell, row_of
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import BAD_INPUT, code_of, Options
 from stewart_dynamics.replay.summary_text import summary_text
+from stewart_dynamics.replay.unexpected_errors import unexpected
 
 # Interval of progress reports, within one computer and on a cluster [s].
 LOCAL_INTERVAL, CLUSTER_INTERVAL = 0.1, 1.0
@@ -78,8 +79,10 @@ def replay_task(task: Task, progress: Callable[[int, int], None]) -> Ended:
         done = replay(task.bag, task.parameters, task.folder, task.options, progress)
     except (StewartError, OSError) as exc:
         why = f'{exc}'
-    except (Exception, Cancelled) as exc:  # an error in one bag does not stop the others
-        why = f'{type(exc).__name__}: {exc}'
+    except Cancelled:
+        why = 'the run was stopped'
+    except Exception as exc:  # an error in one bag does not stop the others
+        why = unexpected(exc)
     else:
         return _outcome(task, done.summary)
     # A process that was believed dead may have finished it in the meantime.

@@ -50,7 +50,8 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     lines += [notice for notice in summary['notices'] if notice not in mistakes]
     for each in summary['rejected']:
         rejection = Rejection(f'{each["topic"]}: {each["count"]}', each['reason'])
-        lines.append(rejection.words(f'first: {each["first"]}') if each['first']
+        when = '' if each['first_at_s'] is None else f' at t = {each["first_at_s"]:.3f} s'
+        lines.append(rejection.words(f'first{when}: {each["first"]}') if each['first']
                      else rejection.words('').removesuffix(': '))
     return '\n'.join(lines)
 

@@ -107,6 +107,8 @@ class Setpoints:
         self._unstamped_logged = False
         self._unstamped_first = ''
         self._stamped: set[str] = set()
+        self.recorded: int | None = None
+        """When the message at work was recorded [ns], if it is one of ``take_many``."""
 
     @property
     def counts(self) -> Counter[Rejection]:
@@ -169,6 +171,7 @@ class Setpoints:
         setpoints = []
         times = []
         for topic, time, data in messages.each():
+            self.recorded = time
             if topic == WRENCH:
                 self.take_wrench(data)
                 continue
