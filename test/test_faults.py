@@ -40,9 +40,8 @@ from rosgraph_msgs.msg import Clock
 from running import (
     bits, DEADLINE, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
     Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, SEPARATE, STEP, wrench_message)
-import yaml
-
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+import yaml
 
 Start = Callable[..., DynamicsNode]
 
