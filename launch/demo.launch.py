@@ -94,8 +94,9 @@ def generate_launch_description() -> LaunchDescription:
             arguments=[PathJoinSubstitution([share, 'examples', 'leg_controller.py'])],
             name='leg_controller',
             namespace=LaunchConfiguration('namespace'),
-            parameters=[{'feed_forward': ParameterValue(
-                LaunchConfiguration('feed_forward'), value_type=bool)}],
+            parameters=[{'params_file': LaunchConfiguration('params_file'),
+                         'feed_forward': ParameterValue(
+                             LaunchConfiguration('feed_forward'), value_type=bool)}],
             condition=IfCondition(LaunchConfiguration('controller')),
             output='screen'),
         # Setpoints go to stewart_dynamics/setpoint/..., hence the same namespace.
