@@ -130,7 +130,8 @@ def record(name: str) -> None:
     for node in nodes:
         executor.add_node(node)
     command = [executable('stewart_trajectory'), '--ros-args',
-               '--params-file', HERE.parent / 'config' / config, '-p', 'start_timeout:=60.0']
+               '--params-file', HERE.parent / 'config' / config, '-p', 'start_timeout:=60.0',
+               '-p', 'motion.hold_at_end:=false']
     if damaged:
         command += ['-p', 'target:=undamaged']
     with subprocess.Popen(command) as trajectory:

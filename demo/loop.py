@@ -247,7 +247,8 @@ class Loop:
     def __init__(self, hexapod: Path, motion: Path, seconds: float, bandwidth: float) -> None:
         parameters = Parameters.from_yaml(hexapod)
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
-                      'motion.duration': seconds, 'base_frame': parameters['base_frame']}
+                      'motion.hold_at_end': False, 'motion.duration': seconds,
+                      'base_frame': parameters['base_frame']}
         settings = ReferenceMotionParameters.from_yaml(motion).replaced(trajectory, str(motion))
         platform = StewartPlatform(parameters)
         self.times = sample_times(settings)

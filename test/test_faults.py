@@ -555,7 +555,7 @@ def test_a_killed_node_answers_again_after_a_restart(start: Start, tmp_path: Pat
         node.at_work()
 
 
-def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
+def test_lifecycles_under_load_leave_nothing_behind(
         begin: Start, tmp_path: Path) -> None:
     node = begin()
     feeder = Feeder(node, tmp_path, 200)
@@ -577,16 +577,16 @@ def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
     for _ in range(20):
         cycle()
     before, publishers = held()
-    for _ in range(100):
+    for _ in range(40):
         cycle()
     after, publishers_after = held()
     feeder.end()
-    assert node.program.stderr.count('dynamics ready after') == 121
+    assert node.program.stderr.count('dynamics ready after') == 61
     assert publishers_after == publishers == dict.fromkeys(OUTPUTS, 1)
     for what in ('descriptors', 'threads'):
         assert after[what] == before[what]
     # A publisher that is left behind takes 30 kB; with none the middleware takes 3 to 7 a time.
-    assert after['memory'] - before['memory'] < 2000
+    assert after['memory'] - before['memory'] < 800
     _expect_what_was_cut_off(node)
 
 

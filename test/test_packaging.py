@@ -173,7 +173,7 @@ def check_share(share: Path) -> None:
     """Check that the files are there which ROS and the launch files look up."""
     assert (share / 'ament_index/resource_index/packages' / NAME).is_file()
     assert (share / NAME / 'package.xml').is_file()
-    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.yaml', 'examples/*.py',
+    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.*', 'examples/*.py',
                     'launch/*.launch.py', 'security/*'):
         expected = {path.name for path in ROOT.glob(pattern)}
         folder, _, files = pattern.rpartition('/')

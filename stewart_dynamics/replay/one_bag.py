@@ -22,9 +22,10 @@ the memory used does not grow with the bag.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing, ExitStack
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,6 +55,7 @@ from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
 
 _SECOND = 1_000_000_000
+_STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
 
@@ -115,7 +117,7 @@ def replay(
             summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / 'summary.json', summary)
             if run.report is not None:
-                run.report.write(partial / 'report.html', summary)
+                run.report.write(partial / 'report.html', summary, options.plotly)
     return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
 
 
@@ -124,6 +126,16 @@ def _fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
         return fingerprint(bag, parameters, options)
     except OSError:  # reported when the bag is opened
         return ''
+
+
+class _First(NamedTuple):
+    """The first message that was rejected for a reason."""
+
+    details: str
+    stamp: int | None
+    """[ns], if the details begin with it."""
+    recorded: int | None
+    """When it was recorded [ns]."""
 
 
 class _Run:
@@ -139,7 +151,8 @@ class _Run:
             parameters['setpoint.source'] == 'pose' and options.cutoff is None)
         if self._quasi_static:
             self.notices.append('setpoint.source is pose: the forces are those at rest')
-        self._firsts: dict[Rejection, str] = {}
+        self._firsts: dict[Rejection, _First] = {}
+        self._first_time: int | None = None
         self._setpoints = Setpoints(parameters, self._rejected, self._notice)
         self._step = Step(parameters)
         self._state: Singularity | None = None
@@ -216,7 +229,9 @@ class _Run:
                 'differentiated_cutoff_hz': self._options.cutoff,
                 'measured': self._options.measured},
             'rejected': [{'topic': rejection.topic, 'reason': rejection.reason, 'count': number,
-                          'first': self._firsts[rejection]}
+                          'first': self._firsts[rejection].details,
+                          'first_at_s': self._rejected_at(
+                              self._firsts[rejection], values['setpoints'])}
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
             'measured': measured and {'headline': measured_headline(measured), **measured},
@@ -224,7 +239,20 @@ class _Run:
         }
 
     def _rejected(self, rejection: Rejection, details: str) -> None:
-        self._firsts.setdefault(rejection, details)
+        if rejection not in self._firsts:
+            found = _STAMP.match(details)
+            self._firsts[rejection] = _First(
+                details, int(found[1]) if found else None,
+                self._setpoints.recorded if details else None)
+
+    def _rejected_at(self, first: _First, setpoints: Mapping[str, Any]) -> float | None:
+        """Return when a message was rejected, since the first setpoint [s]; None: not known."""
+        begin, restarts = setpoints['first_stamp_ns'], setpoints['restarts']
+        if begin is not None and first.stamp is not None and not restarts:
+            return (first.stamp - int(begin)) * 1e-9
+        if self._first_time is not None and first.recorded is not None:
+            return (first.recorded - self._first_time) * 1e-9
+        return None
 
     def _notice(self, text: str) -> None:
         if len(self.notices) < LISTED:
@@ -251,6 +279,8 @@ class _Run:
         if not len(setpoints.stamps):
             return 0
         self._state = outputs.singularity()
+        if self._first_time is None:
+            self._first_time = int(setpoints.times[0])
         self._bag.write(setpoints.times, outputs)
         seconds = self._seconds(setpoints.stamps)
         self._table.write(seconds, setpoints.motions, outputs)
