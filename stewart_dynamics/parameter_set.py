@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import difflib
+from itertools import chain
 import math
 from pathlib import Path
 import re
@@ -84,14 +85,14 @@ class Parameter(NamedTuple):
 
     @property
     def ros_type(self) -> str:
-        """The name of the type in ROS, as in the documents."""
+        """Return the name of the type in ROS, as in the documents."""
         if not self.sizes:
             return self.kind
         return f'{self.kind}[{" or ".join(map(str, self.sizes))}]'
 
     @property
     def rule(self) -> str:
-        """The accepted values, as text."""
+        """Return the accepted values, as text."""
         if self.choices:
             return 'one of ' + ', '.join(self.choices)
         rules = []
@@ -173,7 +174,7 @@ class ParameterSet(Mapping[str, Any]):
 
     @property
     def given(self) -> Mapping[str, Any]:
-        """The values that are not defaults, as they were given."""
+        """Return the values that are not defaults, as they were given."""
         return MappingProxyType(self._given)
 
     def _key(self) -> tuple[Any, ...]:
@@ -268,7 +269,11 @@ def _plain(value: Any) -> Any:
         value = value.ravel() if value.ndim else value[()]
     if hasattr(value, 'tolist'):
         value = value.tolist()
-    return tuple(value) if isinstance(value, list) else value
+    if isinstance(value, list | tuple):  # rows of joints as well
+        entries = [each.tolist() if hasattr(each, 'tolist') else each for each in value]
+        return tuple(chain.from_iterable(
+            each if isinstance(each, list | tuple) else (each,) for each in entries))
+    return value
 
 
 def _as_double(parameter: Parameter, value: Any) -> Any:

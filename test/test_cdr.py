@@ -33,8 +33,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
-
 from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
 from stewart_dynamics.messages.joint_state import (
     JointStateError, JointStateReader, JointStateWriter)
@@ -42,6 +40,7 @@ from stewart_dynamics.messages.setpoint import (
     combined, layout_of, pose, StampedWriter, twist, wrench)
 from stewart_dynamics.messages.standard import (
     boolean, clock, float64, float64_array, float64_values)
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 SECOND = 1_000_000_000
 READERS = {

@@ -25,10 +25,9 @@ from geometry_msgs.msg import WrenchStamped
 import numpy as np
 import pytest
 from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT
-from trajectory_msgs.msg import JointTrajectory
-
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'
 

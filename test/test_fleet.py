@@ -54,6 +54,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stewart_dynamics import BagError, Parameters, StewartError
+from stewart_dynamics.replay.bag_task import kept, Task
 from stewart_dynamics.replay.bags import folders_of_results
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
@@ -189,7 +190,7 @@ def test_every_bag_is_replayed_once(bags: Path, tmp_path: Path, jobs: int) -> No
     check_each_once(fleet, pairs, output)
     assert [each.code for each in fleet.ended] == [DONE] * 10 + [LIMIT_MET]
     assert (fleet.code(strict=False), fleet.code(strict=True)) == (DONE, LIMIT_MET)
-    assert fleet.text() == '11 bags: 10 done, 1 limit met'
+    assert fleet.text() == '11 bags: 10 done, 1 limit or warning'
     # the row of a bag is its summary's
     summary = json.loads((output / 'singular' / 'summary.json').read_text(encoding='utf-8'))
     row = rows(output)[f'{bags / "singular"}']
@@ -221,17 +222,17 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
     assert fleet._replace(ended=(ended['singular'], ended['cut'])).code(True) == PARTLY_READ
     # each is named, with what is wrong, in one line
     head, *told = fleet.text().splitlines()
-    assert head == '16 bags: 11 done, 1 limit met, 1 partly read, 3 failed'
+    assert head == '16 bags: 11 done, 1 limit or warning, 1 incomplete, 3 failed'
     assert len(told) == 4
-    for name, why in (('cut', 'cut.mcap: '), ('noise', 'neither MCAP nor sqlite3'),
+    for name, why in (('cut', 'cut.mcap: '), ('noise', 'not MCAP, not sqlite3'),
                       ('none', 'no such file'), ('other', 'exists already')):
         line = ended[name].error
         assert line in told
         assert line.startswith(f'{ended[name].bag}')
         assert why in line
         row = rows(output)[f'{ended[name].bag}']
-        assert row['error']
-        assert row['error'] in line
+        assert row['reason']
+        assert row['reason'] in line
     assert int(rows(output)[f'{bags / "cut"}']['setpoints']) > 100
     assert rows(output)[f'{bags / "cut"}']['complete'] == 'false'
     assert int(rows(output)[f'{bags / "flawed"}']['rejected']) > 100
@@ -245,9 +246,16 @@ def test_results_are_not_overwritten(bags: Path, tmp_path: Path) -> None:
     pairs = folders_of_results([bags / 'short'], output)
     first = replay_fleet(pairs, PARAMETERS, output, PLAIN)
     before = {path: path.read_bytes() for path in output.rglob('*') if path.is_file()}
-    with pytest.raises(BagError, match='fleet.csv: exists already'):
-        replay_fleet(pairs, PARAMETERS, output, PLAIN)
+    heavy = PARAMETERS.replaced({'platform.mass': 151.0})
+    with pytest.raises(BagError, match='/0: exists already, of other inputs'):
+        replay_fleet(pairs, heavy, output, PLAIN)
+    with pytest.raises(BagError, match='fleet.csv: lists 0, which is not part of this run'):
+        replay_fleet(folders_of_results([bags / 'singular'], output), PARAMETERS, output, PLAIN)
     assert {path: path.read_bytes() for path in output.rglob('*') if path.is_file()} == before
+    (tmp_path / 'other').mkdir()
+    (tmp_path / 'other' / 'fleet.csv').write_text('ship,port\n')
+    with pytest.raises(BagError, match='fleet.csv: exists already'):
+        replay_fleet(pairs, PARAMETERS, tmp_path / 'other', PLAIN)
     again = replay_fleet(pairs, PARAMETERS, output, PLAIN._replace(force=True), jobs=2)
     check_each_once(again, pairs, output)
     assert [each.row for each in again.ended] == [each.row for each in first.ended]
@@ -266,7 +274,8 @@ def test_a_bag_finished_by_the_same_run_is_not_replayed_again(
     options = PLAIN._replace(run='this')
     for bag, folder in pairs[:3]:
         replay(bag, PARAMETERS, folder, options)
-    replay(*(pairs[-1][0], PARAMETERS, pairs[-1][1]), PLAIN._replace(run='another'))
+    other = PARAMETERS.replaced({'platform.mass': 151.0})
+    replay(pairs[-1][0], other, pairs[-1][1], PLAIN._replace(run='another'))
     times = {folder: folder.stat().st_mtime_ns for _, folder in pairs[:3]}
     scheduler = cluster.scheduler_address if jobs == 1 else None
     fleet = replay_fleet(pairs, PARAMETERS, output, options, jobs, scheduler)
@@ -306,8 +315,8 @@ def test_a_bag_whose_process_dies_twice_fails(bags: Path, tmp_path: Path) -> Non
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
     long = fleet.ended[0]
-    assert long.error == (f'{bags / "long"}: the process that replayed it was killed, '
-                          'twice (was there too little memory?)')
+    assert long.error == (f'{bags / "long"}: the process that replayed it was killed '
+                          'twice (out of memory?)')
     assert not long.folder.exists()
     assert hidden(output) == []
     for bag, folder in pairs[1:]:
@@ -333,7 +342,7 @@ def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: 
         '    print(exc)\n', encoding='utf-8')
     ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60,
                            check=False)
-    assert ended.stdout == 'the processes that were to replay bags could not start\n'
+    assert ended.stdout == 'the processes to replay bags could not start\n'
     assert "if __name__ == '__main__':" in ended.stderr
 
 
@@ -369,6 +378,57 @@ def test_hostile_names(
                                  'caf\\udce9'}
     assert {folder for folder in output.iterdir() if folder.is_dir()} == {
         output / name for name in names}
+
+
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_an_interrupted_run_continues(bags: Path, tmp_path: Path, jobs: int) -> None:
+    output = tmp_path / 'out'
+    pairs = folders_of_results([bags], output)
+    for bag, folder in (pairs[0], pairs[-1]):
+        replay(bag, PARAMETERS, folder, PLAIN._replace(run='interrupted'))
+    (pairs[1][1] / 'bag').mkdir(parents=True)  # not complete: without summary.json
+
+    def times() -> dict[Path, int]:
+        return {folder: folder.stat().st_mtime_ns for _, folder in pairs if folder.exists()}
+
+    before = times()
+    fleet = replay_fleet(pairs, PARAMETERS, output, PLAIN, jobs)
+    assert [each.kept for each in fleet.ended] == [True, *[False] * 9, True]
+    assert fleet.text().splitlines() == [
+        '11 bags: 9 done, 1 limit or warning, 1 failed; 2 kept from an earlier run, their '
+        'inputs have not changed', fleet.ended[1].error]
+    assert {folder: when for folder, when in times().items() if folder in before} == before
+    (pairs[1][1] / 'bag').rmdir()
+    pairs[1][1].rmdir()
+    # all are in the table, as if they had been replayed at once
+    again = replay_fleet(pairs, PARAMETERS, output, PLAIN, jobs)
+    assert [each.kept for each in again.ended] == [True, False, *[True] * 9]
+    whole = replay_fleet(
+        folders_of_results([bags], tmp_path / 'whole'), PARAMETERS, tmp_path / 'whole', PLAIN)
+    assert [(each.row, each.text) for each in again.ended] == [
+        (each.row, each.text) for each in whole.ended]
+    assert (output / 'fleet.csv').read_bytes() == (tmp_path / 'whole' / 'fleet.csv').read_bytes()
+
+
+def test_results_are_kept_only_of_unchanged_inputs(bags: Path, tmp_path: Path) -> None:
+    (bag, folder), *_ = folders_of_results([bags / 'short'], tmp_path / 'out')
+    replay(bag, PARAMETERS, folder, PLAIN)
+    task = Task(0, bag, folder, PARAMETERS, PLAIN)
+    assert kept(task)
+    for other in (
+            task._replace(parameters=PARAMETERS.replaced({'gravity': [0.0, 0.0, -9.8]})),
+            task._replace(options=PLAIN._replace(cutoff=5.0)),
+            task._replace(options=PLAIN._replace(topics={'wrench': '/load'})),
+            task._replace(options=PLAIN._replace(report=True)),
+            task._replace(bag=bags / 'long' / 'long.mcap')):
+        assert not kept(other)
+    (folder / 'legs.csv').rename(folder / 'moved')
+    assert not kept(task)
+    (folder / 'moved').rename(folder / 'legs.csv')
+    assert kept(task)
+    file, = bag.glob('*.mcap')
+    os.utime(file, ns=(1, 1))
+    assert not kept(task)
 
 
 # Progress
@@ -455,7 +515,9 @@ def test_an_interrupt_leaves_no_partial_results(
     out, err = running.communicate(timeout=60)
     # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
     assert running.returncode in (130, -signal.SIGINT)
-    assert (out, err) == ('', '')
+    assert out == ''
+    assert re.fullmatch(r'stewart_replay: interrupted: \d+ of \d+ bags are done; the same '
+                        'command continues with the others\n', err)
     assert hidden(output) == []
     assert not (output / 'huge').exists()
     assert not (output / 'fleet.csv').exists()
@@ -543,8 +605,8 @@ def test_a_bag_that_kills_its_workers_does_not_affect_others(
                 os.kill(pid, signal.SIGKILL)
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
-    assert re.search(r'/long: the worker that replayed it died 2 times; the last one was at '
-                     r'tcp://\S+ \(was there too little memory\?\)$', fleet.ended[0].error)
+    assert re.search(r'/long: the worker that replayed it died 2 times, the last one at '
+                     r'tcp://\S+ \(out of memory\?\)$', fleet.ended[0].error)
     assert len(killed) == 2
     assert hidden(output) == []
     for bag, folder in pairs[1:]:

@@ -52,6 +52,7 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
     return {'software': 'stewart_dynamics 9', 'complete': True,
             'setpoints': {'answered': 1000, 'duration_s': 10.0}, 'legs': legs, 'limits': [],
+            'limits_not_checked': [], 'measured': None,
             'rejected': [], 'singularity': {
                 'determinant_nearest_m3': 0.25, 'crossings': 0, 'condition_max': 4.5,
                 'warnings': 0}, **changes}
@@ -77,20 +78,41 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         singularity={'determinant_nearest_m3': -1e-7, 'crossings': 2, 'condition_max': 8e3,
                      'warnings': 1}), results='deep/a')])
     assert table(tmp_path) == [{
-        'bag': 'a', 'code': '1', 'result': 'limit met', 'complete': 'true', 'setpoints': '1000',
-        'duration_s': '10.0', 'force_worst_n': '-120.5', 'force_worst_leg': 'leg_1',
+        'bag': 'a', 'code': '1', 'result': 'limit or warning', 'complete': 'true',
+        'setpoints': '1000', 'duration_s': '10.0', 'force_worst_n': '-120.5',
+        'force_worst_leg': 'leg_1',
         'force_worst_at_s': '1.0', 'force_margin_n': '-20.5', 'length_margin_m': '',
         'rate_margin_m_s': '0.0', 'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3',
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
         'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
-        'error': '', 'results': 'deep/a'}]
+        'reason': 'length_max: leg_2; force_max: leg_1, leg_3; 2 crossings of det(J) = 0; '
+                  '1 singularity warning', 'residual_rms_n': '', 'unmodelled_mass_kg': '',
+        'coulomb_friction_n': '', 'viscous_friction_n_s_m': '', 'contacts': '', 'measured': '',
+        'results': 'deep/a'}]
 
 
 def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
-    unanswered = summary([None] * 6, setpoints={'answered': 0, 'duration_s': 0.0})
+    unanswered = summary([None] * 6, setpoints={'answered': 0, 'duration_s': 0.0}, rejected=[
+        {'topic': 'setpoint/pose', 'reason': reason, 'count': count}
+        for reason, count in (('wrong frame_id', 2), ('not finite', 900))])
     write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
                            row('b', 3, summary([1.0]), 'cut off')])
-    assert [cells['result'] for cells in table(tmp_path)] == ['nothing answered', 'partly read']
+    assert [(cells['result'], cells['reason']) for cells in table(tmp_path)] == [
+        ('nothing answered', 'no setpoint could be answered; setpoint/pose: 900 not finite; '
+                             'setpoint/pose: 2 wrong frame_id'), ('incomplete', 'cut off')]
+
+
+def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: Path) -> None:
+    measured = {
+        'headline': ['19.5 kg', 'friction'], 'mass': {'unmodelled_kg': 19.5},
+        'contacts': {'count': 2}, 'legs': {f'leg_{n}': {
+            'residual_rms_n': 10.0 * n, 'coulomb_friction_n': 25.0 if n else None,
+            'viscous_friction_n_s_m': None} for n in range(6)}}
+    write_fleet(tmp_path, [row('a', 0, summary([1.0], measured=measured)), row('b')])
+    cells, without = table(tmp_path)
+    keys = [column.key for column in COLUMNS if column.optional]
+    assert [cells[key] for key in keys] == ['50.0', '19.5', '25.0', '', '2', '19.5 kg; friction']
+    assert [without[key] for key in keys] == [''] * 6
 
 
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
@@ -100,7 +122,7 @@ def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
     none, bad = table(tmp_path)
     assert (none['force_worst_n'], none['force_worst_leg'], none['condition_max']) == ('',) * 3
     assert {key: cell for key, cell in bad.items() if cell} == {
-        'bag': 'bad', 'code': '2', 'result': 'failed', 'error': 'why'}
+        'bag': 'bad', 'code': '2', 'result': 'failed', 'reason': 'why'}
 
 
 def test_no_cell_is_a_formula_or_is_split(tmp_path: Path) -> None:
@@ -109,10 +131,10 @@ def test_no_cell_is_a_formula_or_is_split(tmp_path: Path) -> None:
     assert len(rows) == len(HOSTILE)
     for name, cells in zip(HOSTILE, rows, strict=True):
         name = name.encode('utf-8', 'backslashreplace').decode()
-        assert not re.match(r'[=+@\t\r\n-]', cells['bag'] + cells['error'])
+        assert not re.match(r'[=+@\t\r\n-]', cells['bag'] + cells['reason'])
         # the same path, and the same words
         assert cells['bag'] in (name, f'./{name}')
-        assert cells['error'] in (name, f"'{name}")
+        assert cells['reason'] in (name, f"'{name}")
     # no text stands outside quotes, where a semicolon would end a cell
     text = (tmp_path / 'fleet.csv').read_text(encoding='utf-8')
     assert not set(re.sub(r'"(?:[^"]|"")*"', '', text)) - set('0123456789.,\r\n')
@@ -232,7 +254,7 @@ def test_failed_bags_and_exceeded_limits_are_highlighted(page: Page, tmp_path: P
         return [int(number) for number in re.findall(r'\d+', text)]
 
     for selector in ('tr:nth-child(2) td.limits_exceeded', 'tr:nth-child(3) .pill',
-                     'tr:nth-child(3) td.error', 'tr:nth-child(4) td.error',
+                     'tr:nth-child(3) td.reason', 'tr:nth-child(4) td.reason',
                      'tr:nth-child(6) td.bad'):
         red, green, blue = color(f'tbody {selector}')
         assert red > 2 * max(green, blue), selector
@@ -241,10 +263,31 @@ def test_failed_bags_and_exceeded_limits_are_highlighted(page: Page, tmp_path: P
 
 
 @in_browser
+def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
+    limits = [{'limit': f'limits.{limit}', 'leg': f'leg_{n}'} for n in range(6)
+              for limit in ('length_max', 'force_max', 'velocity_max')]
+    long = 'a_recording_with_a_long_name/of_a_long_day'
+    reason = 'part of it could not be read: ' + '; '.join(
+        f'the chunk at byte {n}' for n in range(9))
+    page.page.set_viewport_size({'width': 1440, 'height': 800})
+    page.show(tmp_path, [
+        row(f'{long}/limits', 1, summary([1.0], limits=limits)),
+        row(f'{long}/damaged', 3, summary([1.0]), reason), row(f'{long}/failed', 2, None, reason),
+        row(f'{long}/rejected', 3, summary([None], setpoints={'answered': 0, 'duration_s': 0.0}),
+            'no setpoint could be answered')])
+    boxes = page.page.eval_on_selector_all(
+        'td.reason div', 'all => all.map((it) => it.getBoundingClientRect().right)')
+    assert len(boxes) == 4
+    assert max(boxes) < 1440
+    assert page.page.locator('nav button').all_inner_texts() == [
+        'all 4', 'limit or warning 1', 'incomplete 1', 'nothing answered 1', 'failed 1']
+
+
+@in_browser
 def test_rows_are_filtered_by_result_and_by_text(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, six())
     buttons = page.page.locator('nav button')
-    assert buttons.all_inner_texts() == ['all 6', 'done 2', 'limit met 2', 'partly read 1',
+    assert buttons.all_inner_texts() == ['all 6', 'done 2', 'limit or warning 2', 'incomplete 1',
                                          'failed 1']
     page.page.click('nav button:nth-child(3)')
     assert page.column('bag') == ['a10', 'e']

@@ -13,48 +13,40 @@
 # limitations under the License.
 
 
-"""The output bag and the tables of a replay, as read by other programs."""
+"""The output bag of a replay, as read by other programs."""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable
-import csv
-import math
 from pathlib import Path
 import struct
 from typing import Any
 import zlib
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 from numpy.typing import NDArray
-import pyarrow.parquet
 import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
-import yaml  # type: ignore[import-untyped]
-
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.singularity import CAUSE, STATE
-from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable
+from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
+import yaml  # type: ignore[import-untyped]
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
     {'singularity.action': 'suppress_forces'})
-LEGS = tuple(PARAMETERS['joints'])
+LEGS: tuple[str, ...] = tuple(PARAMETERS['joints'])
 STEP = Step(PARAMETERS)
 NODE = '/a_node'
 RECORDED = 1_700_000_000_000_000_000
-RESULTS = 27
 
 
 def turning(number: int, first: int = 0) -> Outputs:
@@ -277,131 +269,3 @@ def test_a_bag_in_many_blocks_has_the_messages_of_one(tmp_path: Path) -> None:
                 by_topic[channel.topic].append((message.log_time, message.data))
         found.append(by_topic)
     assert found[0] == found[1]
-
-
-# The tables
-
-def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
-               stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
-    states = np.zeros((len(stamps), STATE))
-    states[:, CAUSE] = warnings
-    flags = np.zeros(len(stamps), dtype=bool)
-    return Outputs(~flags, stamps, results, forces, states, flags, flags)
-
-
-def bits(values: Any) -> list[int]:
-    return [int(n) for n in np.asarray(values, dtype=float).view(np.uint64).ravel()]
-
-
-def read_csv(file: Path) -> tuple[list[str], list[list[str]]]:
-    with file.open(newline='', encoding='utf-8') as stream:
-        head, *rows = csv.reader(stream)
-    return head, rows
-
-
-def check_tables(folder: Path, blocks: list[Outputs]) -> None:
-    """Check that both tables give every number back to the bit."""
-    tables: list[Any] = [CsvTable(folder, LEGS), ParquetTable(folder, LEGS)]
-    for table in tables:
-        for outputs in blocks:
-            table.write(outputs)
-        table.close()
-    head, rows = read_csv(folder / 'legs.csv')
-    parquet = pyarrow.parquet.read_table(folder / 'legs.parquet')
-    assert parquet.column_names == head
-    columns = [parquet.column(n).to_pylist() for n in range(len(head))]
-    at = 0
-    for outputs in blocks:
-        for n in range(len(outputs.stamps)):
-            row, same = rows[at], [column[at] for column in columns]
-            expected = [*outputs.lengths[n], *outputs.rates[n], *outputs.forces[n],
-                        *outputs.demanded_forces[n], outputs.determinants[n],
-                        outputs.determinant_rates[n], outputs.conditions[n]]
-            assert int(row[0]) == same[0] == outputs.stamps[n]
-            assert len(row) == len(expected) + 2
-            for text, value, number in zip(row[1:-1], same[1:-1], expected, strict=True):
-                if math.isnan(number):
-                    assert (text, value) == ('', None)
-                else:
-                    assert bits(float(text)) == bits(value) == bits(number)
-            assert row[-1] == str(int(outputs.warnings[n]))
-            assert same[-1] is bool(outputs.warnings[n])
-            at += 1
-    assert at == len(rows) == parquet.num_rows
-
-
-def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
-    outputs = turning(300)
-    assert outputs.warnings.any()
-    assert np.isnan(outputs.forces).any()
-    check_tables(tmp_path, [outputs, turning(0), turning(1)])
-
-
-@given(st.data())
-@settings(deadline=None, max_examples=60)
-def test_the_tables_give_any_number_back(
-        tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
-    number = data.draw(st.integers(1, 4))
-    values = st.floats(allow_nan=False, allow_infinity=False)
-    some = data.draw(st.lists(values, min_size=8, max_size=40))
-    results = np.resize(some, (number, RESULTS))
-    forces = np.resize(some[3:], (number, 6))
-    if data.draw(st.booleans()):
-        forces[0] = np.nan
-        results[0, 12:18] = np.nan
-    stamps = data.draw(st.lists(st.integers(-(1 << 63), (1 << 63) - 1), min_size=number,
-                                max_size=number))
-    check_tables(tmp_path_factory.mktemp('table'), [outputs_of(
-        results, forces, np.array(stamps), np.arange(number) % 2 == 0)])
-
-
-def test_numbers_at_the_edges(tmp_path: Path) -> None:
-    edges = np.array([0.0, -0.0, 5e-324, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308,
-                      1e16, 1e17, 123456789012345680.0, 1e-5, 1e-7, 0.1, 1 / 3, 1e22, 1e23,
-                      9007199254740993.0])
-    rng = np.random.default_rng(1)
-    random = rng.integers(0, 1 << 64, 27_000, dtype=np.uint64).view(float)
-    random[~np.isfinite(random)] = 1.0
-    results = np.concatenate([np.resize(edges, (16, 27)), random.reshape(-1, 27)])
-    many = len(results)
-    check_tables(tmp_path, [outputs_of(
-        results, results[:, 5:11].copy(), np.arange(many), np.zeros(many, dtype=bool))])
-
-
-@pytest.mark.parametrize('table', [CsvTable, ParquetTable])
-def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
-    legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
-    writer = table(tmp_path, legs)
-    writer.write(turning(2))
-    writer.close()
-    if table is CsvTable:
-        head, rows = read_csv(tmp_path / 'legs.csv')
-        assert [len(row) for row in rows] == [len(head)] * 2
-    else:
-        head = pyarrow.parquet.read_table(tmp_path / 'legs.parquet').column_names
-    assert [name.removesuffix(' length (m)') for name in head[1:7]] == list(legs)
-    assert [name.removesuffix(' force (N)') for name in head[13:19]] == list(legs)
-
-
-@pytest.mark.parametrize('table', [CsvTable, ParquetTable])
-def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
-    writer = table(tmp_path, LEGS)
-    writer.write(turning(0))
-    writer.close()
-    file, = tmp_path.iterdir()
-    if table is CsvTable:
-        assert len(read_csv(file)[0]) == 29
-        assert not read_csv(file)[1]
-    else:
-        assert pyarrow.parquet.read_table(file).shape == (0, 29)
-
-
-def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
-    outputs = turning(1000)
-    table = ParquetTable(tmp_path, LEGS)
-    for _ in range(100):
-        table.write(outputs)
-    table.close()
-    file = pyarrow.parquet.ParquetFile(tmp_path / 'legs.parquet')
-    assert file.metadata.num_rows == 100_000
-    assert file.metadata.num_row_groups == 2

@@ -26,8 +26,6 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from referees import ROOT
-import yaml
-
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, Pose, PoseError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
@@ -35,6 +33,7 @@ from stewart_dynamics.parameter_files import flat, other_nodes, read_yaml
 from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.parameters_yaml import read_document
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+import yaml
 
 GOOD = """\
 /**:
@@ -625,6 +624,11 @@ def test_parameters_are_taken_from_numpy_and_from_parameters() -> None:
     assert Parameters(dict(parameters)) == parameters
     joints = list(parameters['geometry.base_joints'].ravel())
     assert parameters.replaced({'geometry.base_joints': joints}) == parameters
+    rows = parameters['geometry.base_joints'].tolist()
+    for same in (rows, [tuple(row) for row in rows], [np.array(row) for row in rows]):
+        assert parameters.replaced({'geometry.base_joints': same}) == parameters
+    with pytest.raises(ParameterError, match='must have 18 entries, has 17'):
+        parameters.replaced({'geometry.base_joints': [*rows[:5], rows[5][:2]]})
     assert parameters != 1
 
 

@@ -25,6 +25,7 @@ import math
 import os
 from pathlib import Path
 import random
+import re
 import sqlite3
 import tempfile
 import tracemalloc
@@ -47,8 +48,6 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
-import zstandard
-
 from stewart_dynamics import BagError, Parameters
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.mcap_layout import LARGEST_CHUNK
@@ -56,6 +55,7 @@ from stewart_dynamics.replay.one_bag import replay as replay_one
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, NODE, Options, PARTLY_READ
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.input_topics import ACCEL, INPUT_TYPES, POSE, TWIST
+import zstandard
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -247,7 +247,9 @@ def test_the_rows_of_a_damaged_bag_are_rows_of_the_whole_one(
         file.write_bytes(content)
         code = main([str(file), '--params', str(PARAMS), '--output', str(out), '--no-report'])
         table = out / 'bag' / 'legs.csv'
-        rows = table.read_text().splitlines() if table.exists() else []
+        # without the time since the first setpoint that could be read
+        rows = [re.sub(r'^([^,]*),[^,]*', r'\1', row) for row in (
+            table.read_text().splitlines() if table.exists() else [])]
         return code, rows, capsys.readouterr().err
 
     code, whole, err = run(content, tmp_path / 'whole')

@@ -55,6 +55,7 @@ from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
+from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
@@ -233,16 +234,16 @@ def test_the_table_has_the_same_numbers_exactly(
     zero = PARAMETERS['geometry.zero_length']
     for n, row in enumerate(outputs.rows):
         state = of['leg_states'][n][1]
-        assert int(row['stamp (ns)']) == nanoseconds(state)
+        assert int(row['stamp_ns']) == nanoseconds(state)
 
         def six(quantity: str, row: dict[str, str] = row) -> list[float]:
-            return [float(row[f'{leg} {quantity}']) for leg in PARAMETERS['joints']]
+            return [float(row[f'{leg}_{quantity}']) for leg in PARAMETERS['joints']]
 
-        assert six('length (m)') == list(of['leg_lengths'][n][1].data)
-        assert np.array_equal(np.array(six('length (m)')) - zero, state.position)
-        assert six('rate (m/s)') == list(state.velocity)
-        assert six('force (N)') == list(state.effort) == list(of['leg_forces'][n][1].data)
-        assert float(row['det(J) (m^3)']) == of['jacobian_determinant'][n][1].data
+        assert six('length_m') == list(of['leg_lengths'][n][1].data)
+        assert np.array_equal(np.array(six('length_m')) - zero, state.position)
+        assert six('rate_m_s') == list(state.velocity)
+        assert six('force_n') == list(state.effort) == list(of['leg_forces'][n][1].data)
+        assert float(row['determinant_m3']) == of['jacobian_determinant'][n][1].data
         assert all(len(text) <= len(repr(float(text))) + 1 for text in row.values())
 
 
@@ -250,10 +251,23 @@ def test_the_table_has_the_same_numbers_exactly(
 def test_the_table_has_what_no_topic_has(name: str, replayed: dict[str, Outputs]) -> None:
     result = PLATFORM.inverse_dynamics(library_motion(name))
     for n, row in enumerate(replayed[name].rows):
-        assert [float(row[f'{leg} demanded force (N)'])
+        assert [float(row[f'{leg}_demanded_force_n'])
                 for leg in PARAMETERS['joints']] == result.forces[n].tolist()
-        assert float(row['d(det(J))/dt (m^3/s)']) == result.determinant_rate[n]
-        assert float(row['condition number']) == result.condition_number[n]
+        assert float(row['determinant_rate_m3_s']) == result.determinant_rate[n]
+        assert float(row['condition']) == result.condition_number[n]
+
+
+@pytest.mark.parametrize('name', ['clear', 'singular'])
+def test_the_table_has_time_and_pose(name: str, replayed: dict[str, Outputs]) -> None:
+    rows = replayed[name].rows
+    motion = library_motion(name)
+    first = int(rows[0]['stamp_ns'])
+    for n, row in enumerate(rows):
+        assert float(row['time_s']) == pytest.approx((int(row['stamp_ns']) - first) * 1e-9)
+        assert [float(row[f'position_{axis}_m']) for axis in 'xyz'] == motion.position[n].tolist()
+        quaternion = np.array([float(row[f'orientation_{part}']) for part in 'xyzw'])
+        assert Rotation.from_quat(quaternion).as_matrix() == pytest.approx(
+            motion.rotation[n], abs=1e-12)
 
 
 @pytest.mark.parametrize('name', BAGS)
@@ -281,12 +295,12 @@ def test_the_warning_is_written_at_every_change(replayed: dict[str, Outputs]) ->
     assert [m.data for _, m in replayed['clear'].messages[topic]] == [False]
     of = replayed['singular']
     assert [m.data for _, m in of.messages[topic]] == [False, True]
-    column = [row['singularity warning'] for row in of.rows]
+    column = [row['warning'] for row in of.rows]
     first = column.index('1')
     assert column == ['0'] * first + ['1'] * (1001 - first)
     assert of.messages[topic][1][0] == of.messages[f'{NODE}/leg_states'][first][0]
     # it comes before the sign of det(J) changes
-    signs = np.sign([float(row['det(J) (m^3)']) for row in of.rows])
+    signs = np.sign([float(row['determinant_m3']) for row in of.rows])
     change = int(np.flatnonzero(signs[1:] != signs[:-1])[0])
     assert first < change - 10
 
@@ -328,7 +342,7 @@ def test_the_flaws_are_counted_as_they_are_in_the_bag(tmp_path: Path) -> None:
     result = replay(ROOT / 'bags' / 'flawed', PARAMETERS, tmp_path / 'flawed')
     answered, expected = expected_of('flawed')
     assert rejections(result) == expected
-    assert [int(row['stamp (ns)']) for row in outputs_of(tmp_path / 'flawed').rows] == answered
+    assert [int(row['stamp_ns']) for row in outputs_of(tmp_path / 'flawed').rows] == answered
     # every message of the bag is in a setpoint or in a count
     held = Counter(topic for topic, _, _ in recorded(bag_file('flawed')))
     for topic in TOPICS:
@@ -343,8 +357,8 @@ def test_the_flawed_bag_gives_the_numbers_of_the_whole_one(
     # the same motion, recorded at other times: its columns at t since the start are the same
     def by_time(name: str) -> dict[int, list[str]]:
         rows = replayed[name].rows
-        first = min(int(row['stamp (ns)']) for row in rows)
-        return {int(row['stamp (ns)']) - first: list(row.values())[1:25] for row in rows}
+        first = min(int(row['stamp_ns']) for row in rows)
+        return {int(row['stamp_ns']) - first: list(row.values())[2:33] for row in rows}
 
     flawed, clear = by_time('flawed'), by_time('clear')
     assert len(flawed) > 900
@@ -374,7 +388,7 @@ def test_a_wrench_in_the_bag_is_used(tmp_path: Path) -> None:
         [(0.0, 0.0, -0.05 * math.sin(0.01 * n)) for n in range(1, 21)])
     free = PLATFORM.inverse_dynamics(heave).forces
     loaded = PLATFORM.inverse_dynamics(heave, load).forces
-    forces = [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']] for row in rows]
+    forces = [[float(row[f'{leg}_force_n']) for leg in PARAMETERS['joints']] for row in rows]
     assert np.array_equal(forces[:10], free[:10])
     assert np.array_equal(forces[10:], loaded[10:])
     assert np.min(np.max(np.abs(free - loaded), axis=1)) > 10.0
@@ -410,11 +424,11 @@ def test_a_bag_of_poses_is_quasi_static(
     still = PLATFORM.inverse_dynamics(Motion(
         [(0.0, 0.0, 1.1 + 0.05 * math.sin(0.01 * n)) for n in range(1, 31)], np.eye(3)))
     rows = outputs_of(tmp_path / 'out' / 'poses').rows
-    assert [[float(row[f'{leg} force (N)']) for leg in PARAMETERS['joints']]
+    assert [[float(row[f'{leg}_force_n']) for leg in PARAMETERS['joints']]
             for row in rows] == still.forces.tolist()
     # values that depend on velocities are not known, and not zero
-    assert {row[f'{leg} rate (m/s)'] for row in rows for leg in PARAMETERS['joints']} == {''}
-    assert {row['d(det(J))/dt (m^3/s)'] for row in rows} == {''}
+    assert {row[f'{leg}_rate_m_s'] for row in rows for leg in PARAMETERS['joints']} == {''}
+    assert {row['determinant_rate_m3_s'] for row in rows} == {''}
     capsys.readouterr()
     for options, code in (((), LIMIT_MET), (('--differentiate', '--cutoff', '5'), DONE)):
         assert main([str(bag), '--params', str(params), '--output', str(tmp_path / f'{code}'),
@@ -472,7 +486,7 @@ def test_setpoints_without_stamps_are_stamped_as_they_were_recorded(tmp_path: Pa
         (topic, RECORDED + n * 10 * MS, write(0)) for n in range(5) for topic, write in (
             (POSE, messages.pose), (TWIST, messages.twist), (ACCEL, messages.accel))])
     assert run(bag, tmp_path / 'out') == DONE
-    assert [int(row['stamp (ns)']) for row in outputs_of(tmp_path / 'out' / 'bag').rows] == [
+    assert [int(row['stamp_ns']) for row in outputs_of(tmp_path / 'out' / 'bag').rows] == [
         RECORDED + n * 10 * MS for n in range(5)]
 
 
@@ -521,8 +535,8 @@ def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:
           for topic, when, data in motion(3)]
     assert run(write_bag(tmp_path / 'bag', of), tmp_path / 'out') == DONE
     outputs = outputs_of(tmp_path / 'out' / 'bag')
-    assert [row['leg_1 force (N)'] != '' for row in outputs.rows] == [True, False, True]
-    assert all(outputs.rows[1][f'leg_{leg} demanded force (N)'] == '' for leg in range(1, 7))
+    assert [row['leg_1_force_n'] != '' for row in outputs.rows] == [True, False, True]
+    assert all(outputs.rows[1][f'leg_{leg}_demanded_force_n'] == '' for leg in range(1, 7))
     assert len(outputs.messages[f'{NODE}/leg_forces']) == 2
     assert [len(m.effort) for _, m in outputs.messages[f'{NODE}/leg_states']] == [6, 0, 6]
 
@@ -564,7 +578,7 @@ def test_strict_exits_with_1_at_a_limit_without_a_warning(tmp_path: Path) -> Non
     assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'out'),
                  '--strict']) == LIMIT_MET
     for row in outputs_of(tmp_path / 'out' / 'bag').rows:
-        assert {abs(float(row[f'{leg} force (N)'])) for leg in PARAMETERS['joints']} == {100.0}
+        assert {abs(float(row[f'{leg}_force_n'])) for leg in PARAMETERS['joints']} == {100.0}
 
 
 def rejected(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
@@ -895,7 +909,7 @@ def test_an_interrupted_replay_leaves_nothing(
         _, text = process.communicate(timeout=30)
         # Python itself dies of the signal where it comes while text is executed: 130 to a shell.
         assert process.returncode in (130, -signal.SIGINT)
-    assert 'Traceback' not in text
+    assert text == 'stewart_replay: interrupted\n'
     assert not list((tmp_path / 'out').iterdir())
 
 
@@ -910,6 +924,29 @@ def test_a_full_disk_leaves_nothing(size: int, tmp_path: Path) -> None:
     assert done.stderr.count('\n') == 1
     assert 'too large' in done.stderr
     assert not list((tmp_path / 'out').iterdir())
+
+
+@pytest.mark.parametrize(('error', 'text'), [
+    (MemoryError('Unable to allocate 3. GiB'), 'out of memory: Unable to allocate 3. GiB'),
+    (MemoryError(), 'out of memory'),
+    (ZeroDivisionError('by zero\nin two lines'), r'unexpected error, please report it: '
+     r'ZeroDivisionError: by zero in two lines \(test_replay.py, line \d+\)')])
+def test_unexpected_errors_are_one_line_and_leave_nothing(
+        error: Exception, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(Summary, 'values', fail)
+    out = tmp_path / 'out'
+    for given in ([ROOT / 'bags' / 'clear'], [ROOT / 'bags' / 'clear', ROOT / 'bags' / 'flawed']):
+        assert main([*map(str, given), '--params', str(PARAMS), '--output', str(out),
+                     '--no-report']) == BAD_INPUT
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == len(given)
+        for line in lines:
+            assert re.fullmatch(f'stewart_replay: (.*: )?{text}', line)
+        assert {path.name for path in out.iterdir()} <= {'fleet.csv', 'index.html'}
 
 
 # As a library
@@ -1005,7 +1042,7 @@ def test_a_wrench_is_never_found_by_its_type(tmp_path: Path) -> None:
                     twist=INPUT_TYPES[TWIST], accel=INPUT_TYPES[ACCEL])
     assert run(bag, tmp_path / 'free', '--no-report') == DONE
     assert run(bag, tmp_path / 'loaded', '--no-report', '--wrench', '/cell/load') == DONE
-    free, loaded = (rows_of(tmp_path / name / 'bag')[0]['leg_1 force (N)'] for name in (
+    free, loaded = (rows_of(tmp_path / name / 'bag')[0]['leg_1_force_n'] for name in (
         'free', 'loaded'))
     assert float(loaded) > float(free) + 100.0
 
@@ -1033,9 +1070,9 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
     assert summary['complete']
     assert summary['setpoints']['answered'] == len(rows)
     for leg, found in summary['legs'].items():
-        forces = np.array([float(row[f'{leg} demanded force (N)']) for row in rows])
+        forces = np.array([float(row[f'{leg}_demanded_force_n']) for row in rows])
         assert abs(found['force_peak_n']) == np.max(np.abs(forces))
-        lengths = [float(row[f'{leg} length (m)']) for row in rows]
+        lengths = [float(row[f'{leg}_length_m']) for row in rows]
         assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
     assert set(summary['force_breakdown']['leg_1']) == set(SOURCES)
     assert summary['parameters']['platform.mass'] == 150.0
@@ -1166,13 +1203,13 @@ def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert 'smoothing splines through the poses, cut-off frequency 5 Hz' in printed
     assert run(write_bag(tmp_path / 'whole', of), tmp_path / 'out', '--no-report') == DONE
     made, whole = (rows_of(tmp_path / 'out' / name) for name in ('bag', 'whole'))
-    assert [row['stamp (ns)'] for row in made] == [row['stamp (ns)'] for row in whole]
+    assert [row['stamp_ns'] for row in made] == [row['stamp_ns'] for row in whole]
     # away from the ends as the twist and acceleration that were recorded
     for one, other in zip(made[50:-50], whole[50:-50], strict=True):
-        assert float(one['leg_1 rate (m/s)']) == pytest.approx(
-            float(other['leg_1 rate (m/s)']), abs=2e-5)
-        assert float(one['leg_1 force (N)']) == pytest.approx(
-            float(other['leg_1 force (N)']), abs=0.5)
+        assert float(one['leg_1_rate_m_s']) == pytest.approx(
+            float(other['leg_1_rate_m_s']), abs=2e-5)
+        assert float(one['leg_1_force_n']) == pytest.approx(
+            float(other['leg_1_force_n']), abs=0.5)
     summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
     assert summary['inputs']['differentiated_cutoff_hz'] == 5.0
     with AnyReader([tmp_path / 'out' / 'bag' / 'bag']) as reader:
@@ -1212,6 +1249,8 @@ def test_measured_forces_give_the_external_load(tmp_path: Path) -> None:
     assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state') == DONE
     found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
     assert found['setpoints_compared'] == 200
+    # neither a mass nor friction: that is in the headline
+    assert [text[:7] for text in found['headline']] == ['neither']
     # with the sign of the load
     for axis, value in zip(('x', 'y', 'z'), load, strict=False):
         peak = found['external_wrench'][f'force_{axis}']
@@ -1224,3 +1263,37 @@ def test_measured_forces_give_the_external_load(tmp_path: Path) -> None:
               for axis in 'xyz' for unit in ('', unit)}
     for key in keys_of(summary) - names:
         assert re.search(rf'[`.]{key}\b', documented), key
+
+
+def test_a_missing_payload_and_friction_are_in_the_headline(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seconds = np.arange(1, 401) * 0.01
+    angle = 2.0 * np.pi * seconds
+    offset, speed = 0.05 * np.sin(angle), 0.1 * np.pi * np.cos(angle)
+    acceleration = -0.2 * np.pi ** 2 * np.sin(angle)
+    still = np.zeros(3)
+    axis = np.array([1.0, 0.5, 2.0])
+    poses, twists, accels = (
+        np.concatenate([np.outer(factor, axis) + origin, np.zeros((400, 3))], axis=1)
+        for factor, origin in ((offset, [0.0, 0.0, 1.1]), (speed, still), (acceleration, still)))
+    true = StewartPlatform(PARAMETERS.replaced({
+        'platform.mass': PARAMETERS['platform.mass'] + 19.5,
+        'actuator.coulomb_friction': PARAMETERS['actuator.coulomb_friction'] + 25.0}))
+    forces = true.inverse_dynamics(Motion(
+        poses[:, :3], np.eye(3), twists[:, :3], None, accels[:, :3])).forces
+    names = list(PARAMETERS['joints'])
+    of: list[Recorded] = []
+    for n in range(400):
+        stamp = (n + 1) * 10 * MS
+        of += [(POSE, RECORDED + stamp, messages.pose(stamp, tuple(poses[n, :3]))),
+               (TWIST, RECORDED + stamp, messages.twist(stamp, tuple(twists[n]))),
+               (ACCEL, RECORDED + stamp, messages.accel(stamp, tuple(accels[n]))),
+               ('/hexapod/state', RECORDED + stamp, joint_state(stamp, names, forces[n]))]
+    bag = write_bag(tmp_path / 'bag', of, state='sensor_msgs/msg/JointState')
+    assert run(bag, tmp_path / 'out', '--measured', '/hexapod/state') == DONE
+    text = capsys.readouterr().out
+    found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['measured']
+    mass = found['mass']['unmodelled_kg']
+    assert mass == pytest.approx(19.5, rel=0.05)
+    assert 'Coulomb 25 N, viscous 0 N s/m' in found['headline'][1]
+    assert text.splitlines()[1].startswith(f'measured: {mass:.4g} kg in addition')

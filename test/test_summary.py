@@ -241,6 +241,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
                 limits.append({
                     'limit': limit, 'leg': name, 'setpoints': len(found),
                     'worst': numbers[far, leg], 'bound': bound, 'first_at_s': t[found[0]]})
+    not_checked = ['limits.force_max'] if np.isnan(s.demanded).any() else []
     crossings = []
     last = None
     for n, det in enumerate(s.det.tolist()):
@@ -271,7 +272,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'gaps': sum(step > gap for step in steps),
             'gaps_s': math.fsum(step for step in steps if step > gap),
             'restarts': sum(s.restarts.tolist())},
-        'legs': legs, 'limits': limits, 'limits_not_checked': [],
+        'legs': legs, 'limits': limits, 'limits_not_checked': not_checked,
         'singularity': {
             'determinant_nearest_m3': s.det[nearest], 'determinant_nearest_at_s': t[nearest],
             'crossings': len(crossings), 'crossings_at_s': crossings[:LISTED],
@@ -286,7 +287,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'warning_s': math.fsum(step for n, step in enumerate(steps)
                                    if s.warnings[n] and step <= gap)},
         'force_breakdown': breakdown,
-        'limit_met': bool(limits) or bool(spans)}
+        'limit_met': bool(limits or not_checked or spans)}
 
 
 def assert_same(found: Any, truth: Any, at: str = '') -> None:
@@ -645,6 +646,19 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
     without.add(samples.seconds, batch(samples.stamps), samples.outputs())
     assert not without.values()['limit_met']
+
+
+def test_a_force_limit_is_not_checked_where_there_are_no_forces() -> None:
+    demanded = np.ones((4, 6))
+    demanded[1:3] = math.nan
+    parameters = hexapod(**{'limits.force_max': 5.0})
+    found = Samples(4, demanded=demanded).summary(parameters).values()
+    assert (found['limits'], found['limits_not_checked']) == ([], ['limits.force_max'])
+    assert found['limit_met']
+    text = '\n'.join(summary_lines(found, parameters))
+    assert 'limits.force_max could not be checked in 2 setpoints: J_inv cannot be solved' in text
+    assert 'all limits held' not in text
+    assert not Samples(4, demanded=demanded).summary(hexapod()).values()['limits_not_checked']
 
 
 def test_a_limit_is_exceeded_only_above_its_tolerance() -> None:

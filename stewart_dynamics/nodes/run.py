@@ -21,6 +21,7 @@ from functools import partial
 import math
 import sys
 from typing import Any, TypeVar
+import warnings
 
 from rcl_interfaces.msg import (
     FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult)
@@ -28,6 +29,7 @@ import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.exceptions import NameValidationException
 from rclpy.lifecycle import LifecycleNode
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.signals import SignalHandlerOptions
@@ -190,6 +192,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         warning = check_environment(sys.argv)
         reject_impossible_times()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        warnings.showwarning = lambda message, *_: get_logger(kind.node).warning(str(message))
         with without_security_libraries():
             node = make_node()
         if warning:

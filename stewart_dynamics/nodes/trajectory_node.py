@@ -29,14 +29,13 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from rclpy.time import Time
 from std_msgs.msg import Header
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
-
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_count, sample_time
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.runtime import input_topics as inputs
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 # Samples are computed so many at once: one by one they cost more than to publish.
 _BLOCK = 256

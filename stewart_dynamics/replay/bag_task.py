@@ -25,9 +25,12 @@ from typing import Any, NamedTuple
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.fingerprint import fingerprint, VERSION
 from stewart_dynamics.replay.index import Cell, row_of
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import BAD_INPUT, code_of, Options
+from stewart_dynamics.replay.summary_text import summary_text
+from stewart_dynamics.replay.unexpected_errors import unexpected
 
 # Interval of progress reports, within one computer and on a cluster [s].
 LOCAL_INTERVAL, CLUSTER_INTERVAL = 0.1, 1.0
@@ -42,9 +45,11 @@ class Ended(NamedTuple):
     row: dict[str, Cell]
     """Of fleet.csv."""
     text: str = ''
-    """The summary in the terminal; empty if the bag failed or was finished before."""
+    """The summary in the terminal; empty if the bag failed."""
     error: str = ''
     """Why it failed or was read in part, with its path."""
+    kept: bool = False
+    """The results are those of an earlier run."""
 
 
 class Task(NamedTuple):
@@ -74,28 +79,51 @@ def replay_task(task: Task, progress: Callable[[int, int], None]) -> Ended:
         done = replay(task.bag, task.parameters, task.folder, task.options, progress)
     except (StewartError, OSError) as exc:
         why = f'{exc}'
-    except (Exception, Cancelled) as exc:  # an error in one bag does not stop the others
-        why = f'{type(exc).__name__}: {exc}'
+    except Cancelled:
+        why = 'the run was stopped'
+    except Exception as exc:  # an error in one bag does not stop the others
+        why = unexpected(exc)
     else:
-        return _whole(task, done.code, done.summary, done.text)
+        return _outcome(task, done.summary)
     # A process that was believed dead may have finished it in the meantime.
     return finished(task) or failed(task, why)
 
 
 def finished(task: Task) -> Ended | None:
     """Return the outcome of a bag that a process of this run finished before it died."""
+    summary = _summary_of(task)
+    return _outcome(task, summary) if summary and summary['run'] == task.options.run else None
+
+
+def kept(task: Task) -> Ended | None:
+    """Return the outcome of a bag whose results are there and whose inputs have not changed."""
+    table = 'legs.parquet' if task.options.parquet else 'legs.csv'
+    files = ['bag', table, *(['report.html'] if task.options.report else [])]
+    summary = _summary_of(task)
+    try:
+        if (summary is None or not all((task.folder / name).exists() for name in files)
+                or summary['fingerprint'] != fingerprint(
+                    task.bag, task.parameters, task.options)):
+            return None
+    except OSError:  # reported when the bag is replayed
+        return None
+    return _outcome(task, summary)._replace(kept=True)
+
+
+def _summary_of(task: Task) -> dict[str, Any] | None:
+    """Return the content of summary.json; None if there is none of this version."""
     try:
         summary = json.loads((task.folder / 'summary.json').read_text(encoding='utf-8'))
-        if summary['run'] != task.options.run:
-            return None
-    except (OSError, ValueError, TypeError, KeyError):  # no summary, or not one of this program
+        return summary if summary['version'] == VERSION and 'fingerprint' in summary else None
+    except (OSError, ValueError, TypeError, KeyError):
         return None
-    return _whole(task, code_of(summary), summary)
 
 
-def _whole(task: Task, code: int, summary: dict[str, Any], text: str = '') -> Ended:
+def _outcome(task: Task, summary: dict[str, Any]) -> Ended:
+    code = code_of(summary)
     missing = '; '.join(' '.join(what.split()) for what in summary['missing'])
-    return Ended(task.bag, task.folder, code, row_of(code, summary, missing), text,
+    return Ended(task.bag, task.folder, code, row_of(code, summary, missing),
+                 summary_text(summary, task.parameters),
                  f'{task.bag}: part of it could not be read: {missing}' if missing else '')
 
 

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, Options
+from stewart_dynamics.replay.unexpected_errors import unexpected
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters import Parameters
@@ -53,7 +54,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (StewartError, OSError) as exc:
         _complain(exc)
         return BAD_INPUT
-    except KeyboardInterrupt:
+    except Exception as exc:  # exit codes and one line also for errors that no rule covers
+        _complain(unexpected(exc))
+        return BAD_INPUT
+    except KeyboardInterrupt as exc:
+        _complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
         return _INTERRUPTED
     finally:
         for each, handler in before.items():
@@ -106,6 +111,9 @@ def _arguments() -> argparse.ArgumentParser:
                             'the motion allows: noise grows with its power of 2.5')
     output = parser.add_argument_group('what is written')
     output.add_argument('--no-report', action='store_true', help='write no report.html')
+    output.add_argument('--plotly', choices=('inline', 'shared'), default='inline',
+                        help='shared: one file of plotly.js in DIR for all reports, which are '
+                             '5 MB smaller and need it (default: inline)')
     output.add_argument('--parquet', action='store_true',
                         help='write legs.parquet in place of legs.csv')
     many = parser.add_argument_group('many bags')
@@ -134,13 +142,16 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     from stewart_dynamics.parameters import Parameters
     from stewart_dynamics.replay.bags import FLEET_PAGE, folders_of_results
     from stewart_dynamics.replay.many_bags import replay_fleet
+    from stewart_dynamics.replay.report import share_plotly
 
     parameters = Parameters.from_yaml(given.params, given.node)
     bags = folders_of_results(given.bags, given.output)
+    if options.report and given.plotly == 'shared':
+        options = options._replace(plotly=share_plotly(given.output))
     if compiled.HINT:
         print(f'stewart_replay: {compiled.HINT}', file=sys.stderr)
     for mistake in likely_mistakes(parameters):
-        print(f'stewart_replay: {mistake}', file=sys.stderr)
+        _complain(f'warning: {mistake}')
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(

@@ -35,33 +35,49 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 _FOLDER = Path(__file__).with_name('templates')
 
 
+# Between thousands: a narrow space that does not break, as SI recommends.
+_THIN_SPACE = '\u202f'
+
+
 def number(value: float | None, decimals: int) -> str:
     """Return a number with so many decimals, without any from 1e5 on."""
     if value is None or not math.isfinite(value):
         return '–'
-    return f'{value:.{decimals}f}'.replace('-', '−') if abs(value) < 1e5 else digits(value)
+    return _typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
 
 
 def digits(value: float | None) -> str:
     """Return a number with five digits, or all digits before the point."""
     if value is None or not math.isfinite(value):
         return '–'
-    grouped = 1e5 <= abs(value) < 1e10
-    return (f'{value:,.0f}' if grouped else f'{value:.5g}').replace('-', '−').replace(',', ' ')
+    if not 1e3 <= abs(value) < 1e10:
+        return _typeset(f'{value:.5g}')
+    text = f'{value:.5g}' if abs(value) < 1e5 else f'{value:.0f}'
+    decimals = len(text.partition('.')[2]) if 'e' not in text else 0
+    return _typeset(f'{value:,.{decimals}f}')
+
+
+def thousands(count: int) -> str:
+    """Return a count with spaces between thousands."""
+    return _typeset(f'{count:,}')
+
+
+def _typeset(text: str) -> str:
+    return text.replace(',', _THIN_SPACE).replace('-', '−')
 
 
 @functools.lru_cache(maxsize=1)
 def _environment() -> Environment:
     made = Environment(loader=FileSystemLoader(_FOLDER), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
-    made.filters.update(number=number, digits=digits, exactly=repr)
+    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr)
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
     # Data cannot end the element that contains them: the filter escapes < > & and '.
     made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
     return made
 
 
-def page(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
+def page(template: str, scripts: Sequence[str] = (), shared: bool = False, **values: Any) -> str:
     """
     Return a page.
 
@@ -71,6 +87,8 @@ def page(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
         Name of the template (.html), its style (.css) and its script (.js).
     scripts : sequence of str
         Other scripts that the page is allowed to run.
+    shared : bool
+        The page is allowed to run scripts in files.
     values : mapping
         Variables of the template.
 
@@ -78,7 +96,8 @@ def page(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     script, style = (_FOLDER.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
                      for suffix in ('.js', '.css'))
     script = f'\n{script}'
-    hashes = ' '.join(f"'sha256-{_digest(each)}'" for each in (*scripts, script))
+    hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script)),
+                       *(["'self'"] if shared else [])])
     return _environment().get_template(f'{template}.html').render(
         hashes=hashes, script=script, style=style, **values)
 

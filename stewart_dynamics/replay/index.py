@@ -29,15 +29,23 @@ from urllib.parse import quote
 
 from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.html_pages import page
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, PARTLY_READ
+from stewart_dynamics.replay.spreadsheet import harmless
+from stewart_dynamics.replay.summary_text import plural
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]
 """The cells of one bag, by column."""
 
-RESULTS = ('done', 'limit met', 'failed', 'partly read')
-"""The exit codes in words."""
+RESULTS = ('done', 'limit or warning', 'failed', 'incomplete')
+"""The results by exit code."""
 NOTHING_ANSWERED = 'nothing answered'
-"""In place of partly read where no setpoint could be answered."""
+"""The result of code 3 if no setpoint could be answered."""
+SEVERITY = (RESULTS[DONE], RESULTS[LIMIT_MET], RESULTS[PARTLY_READ], NOTHING_ANSWERED,
+            RESULTS[BAD_INPUT])
+"""The results, the most severe last."""
+# At most so many reasons of rejection are listed in a row.
+_LISTED = 3
 
 
 class Column(NamedTuple):
@@ -45,7 +53,8 @@ class Column(NamedTuple):
     A column: its key in fleet.csv, its title on the page, and its unit.
 
     ``of`` returns the cell from the content of summary.json; None: not from there.
-    ``size``: the page sorts these numbers by magnitude.
+    ``size``: the page sorts these numbers by magnitude. ``optional``: the page shows the column
+    only if a bag has a value.
     """
 
     key: str
@@ -54,6 +63,7 @@ class Column(NamedTuple):
     of: Callable[[dict[str, Any]], Cell] | None = None
     number: bool = True
     size: bool = False
+    optional: bool = False
 
 
 def _legs(key: str, choose: Callable[..., Any]) -> Callable[[dict[str, Any]], Cell]:
@@ -79,6 +89,22 @@ def _worst_force(what: int) -> Callable[[dict[str, Any]], Cell]:
     return of
 
 
+def _measured(of: Callable[[dict[str, Any]], Cell]) -> Callable[[dict[str, Any]], Cell]:
+    """Return a function for a value of the comparison with measured forces, if there is one."""
+    def of_summary(summary: dict[str, Any]) -> Cell:
+        return of(summary['measured']) if summary['measured'] else None
+
+    return of_summary
+
+
+def _largest_of_legs(key: str) -> Callable[[dict[str, Any]], Cell]:
+    def of(measured: dict[str, Any]) -> Cell:
+        return max((leg[key] for leg in measured['legs'].values() if leg[key] is not None),
+                   default=None)
+
+    return _measured(of)
+
+
 def _exceeded(summary: dict[str, Any]) -> str:
     legs: dict[str, list[str]] = {}
     for each in summary['limits']:
@@ -98,7 +124,7 @@ COLUMNS = (
     Column('bag', 'bag', number=False),
     Column('code', ''),
     Column('result', 'result', number=False),
-    Column('error', 'error', number=False),
+    Column('reason', 'reason', number=False),
     Column('complete', '', '', lambda summary: bool(summary['complete']), number=False),
     Column('setpoints', 'setpoints', '', lambda summary: summary['setpoints']['answered']),
     Column('duration_s', 'duration', 's', lambda summary: summary['setpoints']['duration_s']),
@@ -118,6 +144,19 @@ COLUMNS = (
     Column('warnings', 'warnings', '', _singularity('warnings')),
     Column('rejected', 'rejected', '',
            lambda summary: sum(each['count'] for each in summary['rejected'])),
+    Column('residual_rms_n', 'residual RMS', 'N', _largest_of_legs('residual_rms_n'),
+           optional=True),
+    Column('unmodelled_mass_kg', 'unmodelled mass', 'kg',
+           _measured(lambda measured: measured['mass']['unmodelled_kg']), optional=True),
+    Column('coulomb_friction_n', 'added Coulomb friction', 'N',
+           _largest_of_legs('coulomb_friction_n'), optional=True),
+    Column('viscous_friction_n_s_m', 'added viscous friction', 'N s/m',
+           _largest_of_legs('viscous_friction_n_s_m'), optional=True),
+    Column('contacts', 'contacts', '', _measured(lambda measured: measured['contacts']['count']),
+           optional=True),
+    Column('measured', 'measured', '',
+           _measured(lambda measured: '; '.join(measured['headline'])), number=False,
+           optional=True),
     Column('results', '', number=False),
 )
 
@@ -136,13 +175,30 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
         What is wrong with the bag.
 
     """
-    cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'error': error}
+    cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'reason': error}
     if summary is not None:
         cells['software'] = summary['software']
+        cells['reason'] = '; '.join([*([error] if error else []), *_reasons(summary)])
         if not summary['setpoints']['answered']:
             cells['result'] = NOTHING_ANSWERED
         cells.update({column.key: column.of(summary) for column in COLUMNS if column.of})
     return cells
+
+
+def _reasons(summary: dict[str, Any]) -> list[str]:
+    """Return why a bag that was replayed is not done without limits, warnings and rejections."""
+    found = [_exceeded(summary)] if summary['limits'] else []
+    found += [f'{name.removeprefix("limits.")} not checked'
+              for name in summary['limits_not_checked']]
+    singularity = summary['singularity']
+    if singularity['crossings']:
+        found.append(f'{plural(singularity["crossings"], "crossing")} of det(J) = 0')
+    if singularity['warnings']:
+        found.append(plural(singularity['warnings'], 'singularity warning'))
+    if not summary['setpoints']['answered']:
+        most = sorted(summary['rejected'], key=lambda each: -each['count'])
+        found += [f'{each["topic"]}: {each["count"]} {each["reason"]}' for each in most[:_LISTED]]
+    return found
 
 
 def write_fleet(output: Path, rows: Sequence[Row]) -> None:
@@ -157,6 +213,18 @@ def write_fleet(output: Path, rows: Sequence[Row]) -> None:
         file.write(_page(output, rows))
 
 
+def listed_results(table: Path) -> set[str] | None:
+    """Return the folders of results in a fleet.csv; None if it cannot be read as one."""
+    try:
+        with table.open(newline='', encoding='utf-8') as file:
+            reader = csv.DictReader(file)
+            if reader.fieldnames != [column.key for column in COLUMNS]:
+                return None
+            return {row['results'].removeprefix('./') for row in reader if row['results']}
+    except (OSError, ValueError, csv.Error):
+        return None
+
+
 def _harmless(key: str, cell: Cell) -> Cell:
     """
     Return a cell that no spreadsheet takes for a formula.
@@ -168,18 +236,20 @@ def _harmless(key: str, cell: Cell) -> Cell:
         return ''
     if isinstance(cell, bool):
         return str(cell).lower()
-    if isinstance(cell, str) and cell[:1] in tuple('=+-@\t\r\n'):
-        return ('./' if key in ('bag', 'results') else "'") + cell
+    if isinstance(cell, str):
+        return harmless(cell, './' if key in ('bag', 'results') else "'")
     return cell
 
 
 def _page(output: Path, rows: Sequence[Row]) -> str:
-    shown = [column for column in COLUMNS if column.head]
+    shown = [column for column in COLUMNS if column.head and not (
+        column.optional and all(row.get(column.key) is None for row in rows))]
     fleet = {
         'software': next((row['software'] for row in rows if 'software' in row), ''),
         'columns': [{'key': column.key, 'head': column.head, 'unit': column.unit,
                      'number': column.number, 'size': column.size} for column in shown],
         'codes': [row['code'] for row in rows],
+        'severity': SEVERITY,
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }

@@ -24,7 +24,7 @@ before it died is recognized by it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 import os
 from pathlib import Path
@@ -35,9 +35,9 @@ import uuid
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_task import (
-    counted, Ended, LOCAL_INTERVAL, replay_task, Results, Task)
+    counted, Ended, kept, LOCAL_INTERVAL, replay_task, Results, Task)
 from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
-from stewart_dynamics.replay.index import Cell, RESULTS, write_fleet
+from stewart_dynamics.replay.index import Cell, listed_results, SEVERITY, write_fleet
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, Options, PARTLY_READ
 from stewart_dynamics.replay.progress_bar import ProgressBar
 from stewart_dynamics.replay.results_folder import partial_name
@@ -58,9 +58,11 @@ class Fleet(NamedTuple):
 
     def text(self) -> str:
         """Return the number of bags by result, and a line for every bag with an error."""
-        number = Counter(each.code for each in self.ended)
-        counts = ', '.join(f'{number[code]} {RESULTS[code]}'
-                           for code in sorted(number, key=_SEVERITY))
+        number = Counter(str(each.row['result']) for each in self.ended)
+        counts = ', '.join(f'{number[result]} {result}' for result in SEVERITY if number[result])
+        kept = sum(each.kept for each in self.ended)
+        if kept:
+            counts += f'; {kept} kept from an earlier run, their inputs have not changed'
         return '\n'.join([f'{len(self.ended)} bags: {counts}',
                           *(each.error for each in self.ended if each.error)])
 
@@ -90,30 +92,36 @@ def replay_fleet(
     show_progress : bool, optional
         On stderr; by default if that is a terminal.
 
-    Raises StewartError if fleet.csv or index.html exists already, or if the cluster cannot be
+    Results of an earlier run are kept if bag, parameters, options and program have not changed,
+    unless ``options.force``.
+
+    Raises StewartError if files of another run would be replaced, or if the cluster cannot be
     reached. Errors in a bag are written to its row. KeyboardInterrupt stops the run; finished
     bags keep their results.
 
     """
-    for path in (output / FLEET_TABLE, output / FLEET_PAGE):
-        if path.is_dir() or path.exists() and not options.force:
-            raise BagError(f'{path}: exists already' + (
-                ' and is a folder' if path.is_dir() else '; --force replaces results'))
     output.mkdir(parents=True, exist_ok=True)
     options = options._replace(run=options.run or uuid.uuid4().hex)
     tasks = [Task(number, bag, folder, parameters, options)
              for number, (bag, folder) in enumerate(bags)]
-    sizes = [bytes_of(task.bag) for task in tasks]
-    # The largest first: started last, it would run alone at the end.
-    order = sorted(tasks, key=lambda task: -sizes[task.number])
     ended: dict[int, Ended] = {}
+    if not options.force:
+        ended = {task.number: found for task in tasks if (found := kept(task)) is not None}
+    _check_replaceable(tasks, ended, output, options)
+    sizes = [0 if task.number in ended else bytes_of(task.bag) for task in tasks]
+    # The largest first: started last, it would run alone at the end.
+    order = sorted((task for task in tasks if task.number not in ended),
+                   key=lambda task: -sizes[task.number])
     try:
-        with closing(ProgressBar(sizes, show_progress)) as bar, closing(
+        with closing(ProgressBar(sizes, show_progress, len(ended))) as bar, closing(
                 _results(order, jobs, scheduler, bar)) as results:
             for number, result in results:
                 bag, folder = bags[number]
                 ended[number] = result._replace(bag=bag, folder=folder)
                 bar.end(number, result)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f'{len(ended)} of {len(tasks)} bags are done; the same command '
+                                'continues with the others') from None
     finally:
         _remove_partial(tasks, options.run)
     fleet = Fleet(tuple(ended[number] for number in range(len(tasks))))
@@ -122,6 +130,8 @@ def replay_fleet(
 
 
 def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, bar: ProgressBar) -> Results:
+    if not tasks:
+        return
     if scheduler is not None:
         from stewart_dynamics.replay.dask_cluster import replay_on_cluster
         yield from replay_on_cluster(tasks, scheduler, bar)
@@ -133,9 +143,35 @@ def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, bar: Progr
             yield task.number, replay_task(task, counted(task.number, bar.at, LOCAL_INTERVAL))
 
 
+def _check_replaceable(tasks: Sequence[Task], done: Mapping[int, Ended], output: Path,
+                       options: Options) -> None:
+    """Raise BagError if fleet.csv and index.html must not be replaced."""
+    table, page = output / FLEET_TABLE, output / FLEET_PAGE
+    for path in (table, page):
+        if path.is_dir():
+            raise BagError(f'{path}: exists already and is a folder')
+    if options.force or not (table.exists() or page.exists()):
+        return
+    listed = listed_results(table)
+    if listed is None:
+        raise BagError(f'{table if table.exists() else page}: exists already; --force replaces '
+                       'results')
+    others = listed - {_results_folder(task.folder, output) for task in tasks}
+    if others:
+        raise BagError(f'{table}: lists {min(others)}, which is not part of this run; --force '
+                       'replaces it')
+    for task in tasks:
+        if task.number not in done and task.folder.exists():
+            raise BagError(f'{task.folder}: exists already, of other inputs: bag, parameters, '
+                           'options or version have changed; --force replaces results')
+
+
+def _results_folder(folder: Path, output: Path) -> str:
+    return Path(os.path.relpath(folder, output)).as_posix()
+
+
 def _row(ended: Ended, output: Path) -> dict[str, Cell]:
-    results = None if ended.code == BAD_INPUT else Path(
-        os.path.relpath(ended.folder, output)).as_posix()
+    results = None if ended.code == BAD_INPUT else _results_folder(ended.folder, output)
     return {**ended.row, 'bag': str(ended.bag), 'results': results}
 
 

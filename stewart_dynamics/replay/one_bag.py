@@ -24,8 +24,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing, ExitStack
-from importlib import metadata
 from pathlib import Path
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,25 +37,25 @@ from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
+from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
+from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable, Table
 from stewart_dynamics.replay.options import code_of, Options
-from stewart_dynamics.replay.output import CsvTable, OutputBag, ParquetTable, Table
+from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_efforts import Efforts
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.results_folder import check_free, whole_folder, write_json
 from stewart_dynamics.replay.summary import Summary
-from stewart_dynamics.replay.summary_text import measured_lines, summary_lines
+from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import input_topics as inputs
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.runtime.setpoints import Messages, Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
 
-# Of summary.json; increased when the meaning of a key changes.
-VERSION = 1
-
 _SECOND = 1_000_000_000
+_STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
 
@@ -98,6 +98,7 @@ def replay(
     """
     options = options or Options()
     check_free(folder, options)
+    made_of = _fingerprint(bag, parameters, options)
     source = ('pose' if options.cutoff is not None
               else 'combined' if 'combined' in options.topics else None)
     if source:
@@ -113,11 +114,28 @@ def replay(
                 if progress is not None:
                     progress(size, answered)
             run.end()
-            summary = run.summary()
+            summary = run.summary() | {'fingerprint': made_of}
             write_json(partial / 'summary.json', summary)
             if run.report is not None:
-                run.report.write(partial / 'report.html', summary)
-    return Replayed(bag, folder, summary, run.text(summary), code_of(summary))
+                run.report.write(partial / 'report.html', summary, options.plotly)
+    return Replayed(bag, folder, summary, summary_text(summary, parameters), code_of(summary))
+
+
+def _fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
+    try:
+        return fingerprint(bag, parameters, options)
+    except OSError:  # reported when the bag is opened
+        return ''
+
+
+class _First(NamedTuple):
+    """The first message that was rejected for a reason."""
+
+    details: str
+    stamp: int | None
+    """[ns], if the details begin with it."""
+    recorded: int | None
+    """When it was recorded [ns]."""
 
 
 class _Run:
@@ -133,7 +151,8 @@ class _Run:
             parameters['setpoint.source'] == 'pose' and options.cutoff is None)
         if self._quasi_static:
             self.notices.append('setpoint.source is pose: the forces are those at rest')
-        self._firsts: dict[Rejection, str] = {}
+        self._firsts: dict[Rejection, _First] = {}
+        self._first_time: int | None = None
         self._setpoints = Setpoints(parameters, self._rejected, self._notice)
         self._step = Step(parameters)
         self._state: Singularity | None = None
@@ -199,7 +218,7 @@ class _Run:
             notices.append(f'and {self._more} more like these')
         return {
             'version': VERSION,
-            'software': _software(),
+            'software': software(),
             'bag': str(self._recording.path),
             'run': self._options.run,
             'complete': not missing,
@@ -210,29 +229,30 @@ class _Run:
                 'differentiated_cutoff_hz': self._options.cutoff,
                 'measured': self._options.measured},
             'rejected': [{'topic': rejection.topic, 'reason': rejection.reason, 'count': number,
-                          'first': self._firsts[rejection]}
+                          'first': self._firsts[rejection].details,
+                          'first_at_s': self._rejected_at(
+                              self._firsts[rejection], values['setpoints'])}
                          for rejection, number in sorted(self._setpoints.counts.items())],
             **values,
-            'measured': measured,
-            'parameters': {name: _plain(value)
-                           for name, value in self._parameters.items()},
+            'measured': measured and {'headline': measured_headline(measured), **measured},
+            'parameters': plain_parameters(self._parameters),
         }
 
-    def text(self, summary: Mapping[str, Any]) -> str:
-        """Return the summary for the terminal."""
-        lines = [f'{self._recording.path}:']
-        if summary['measured']:
-            lines += measured_lines(summary['measured'])
-        lines += summary_lines(summary, self._parameters)
-        lines += summary['notices']
-        for each in summary['rejected']:
-            words = Rejection(f'{each["topic"]}: {each["count"]}', each['reason']).words(
-                f'first: {each["first"]}')
-            lines.append(words if each['first'] else words.removesuffix(': first: '))
-        return '\n'.join(lines)
-
     def _rejected(self, rejection: Rejection, details: str) -> None:
-        self._firsts.setdefault(rejection, details)
+        if rejection not in self._firsts:
+            found = _STAMP.match(details)
+            self._firsts[rejection] = _First(
+                details, int(found[1]) if found else None,
+                self._setpoints.recorded if details else None)
+
+    def _rejected_at(self, first: _First, setpoints: Mapping[str, Any]) -> float | None:
+        """Return when a message was rejected, since the first setpoint [s]; None: not known."""
+        begin, restarts = setpoints['first_stamp_ns'], setpoints['restarts']
+        if begin is not None and first.stamp is not None and not restarts:
+            return (first.stamp - int(begin)) * 1e-9
+        if self._first_time is not None and first.recorded is not None:
+            return (first.recorded - self._first_time) * 1e-9
+        return None
 
     def _notice(self, text: str) -> None:
         if len(self.notices) < LISTED:
@@ -259,9 +279,11 @@ class _Run:
         if not len(setpoints.stamps):
             return 0
         self._state = outputs.singularity()
+        if self._first_time is None:
+            self._first_time = int(setpoints.times[0])
         self._bag.write(setpoints.times, outputs)
-        self._table.write(outputs)
         seconds = self._seconds(setpoints.stamps)
+        self._table.write(seconds, setpoints.motions, outputs)
         breakdown = None
         if self.report is not None and self._breakdown is not None:
             breakdown = self._breakdown(setpoints.motions, setpoints.wrenches)
@@ -293,16 +315,3 @@ class _Run:
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):
             self.report.add_measured(*compared)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.ravel().tolist()
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _software() -> str:
-    try:
-        return f'stewart_dynamics {metadata.version("stewart_dynamics")}'
-    except metadata.PackageNotFoundError:  # run from its sources
-        return 'stewart_dynamics'

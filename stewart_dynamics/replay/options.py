@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -40,6 +41,8 @@ class Options(NamedTuple):
     """Write legs.parquet in place of legs.csv."""
     report: bool = True
     """Write report.html."""
+    plotly: Path | None = None
+    """The file of plotly.js that the reports share; None: it is in each report."""
     force: bool = False
     """Replace existing results."""
     run: str = ''

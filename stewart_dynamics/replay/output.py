@@ -13,15 +13,14 @@
 # limitations under the License.
 
 
-"""The outputs of a replay: a bag with the topics of the node, and a table of the legs."""
+"""The output bag of a replay: the topics of the node, in MCAP."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from struct import Struct
-from typing import Any, Protocol
+from typing import Any
 import zlib
 
 from mcap.data_stream import RecordBuilder
@@ -29,16 +28,13 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
 import numpy as np
-import orjson
 from rosbags.typesys import get_typestore, Stores
-import yaml  # type: ignore[import-untyped]
-
 from stewart_dynamics.arrays import Bytes, Stamps
-from stewart_dynamics.errors import StewartError
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Outputs
+import yaml  # type: ignore[import-untyped]
 
 _LIBRARY = 'stewart_dynamics'
 # Of a message record: opcode, length, channel, sequence, log time and publish time.
@@ -192,111 +188,3 @@ def _bytes(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return bytes(builder.end())  # type: ignore[no-untyped-call]
-
-
-# End of a row in legs.csv: no warning, warning.
-_ENDS = (b',0\n', b',1\n')
-
-
-class Table(Protocol):
-    """A file with one row per setpoint."""
-
-    def write(self, outputs: Outputs) -> None:
-        """Write the rows of these outputs."""
-
-    def close(self) -> None:
-        """Finish the file."""
-
-
-def _columns(legs: Sequence[str]) -> list[str]:
-    return ['stamp (ns)',
-            *(f'{leg} {quantity}' for quantity in (
-                'length (m)', 'rate (m/s)', 'force (N)', 'demanded force (N)') for leg in legs),
-            'det(J) (m^3)', 'd(det(J))/dt (m^3/s)', 'condition number', 'singularity warning']
-
-
-def _numbers(outputs: Outputs, quasi_static: bool) -> Any:
-    """Return the columns between stamp and warning (N, 27); nan: not known."""
-    numbers = np.column_stack([
-        outputs.lengths, outputs.rates, outputs.forces, outputs.demanded_forces,
-        outputs.determinants, outputs.determinant_rates, outputs.conditions])
-    if quasi_static:
-        numbers[:, 6:12] = numbers[:, 25] = np.nan
-    return numbers
-
-
-class CsvTable:
-    """legs.csv: each number with the fewest digits that represent it exactly."""
-
-    def __init__(
-            self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
-        self._quasi_static = quasi_static
-        self._file = (folder / 'legs.csv').open('wb')
-        self._file.write(','.join(map(_quoted, _columns(legs))).encode() + b'\n')
-
-    def write(self, outputs: Outputs) -> None:
-        """Write the rows of these outputs."""
-        if not len(outputs.stamps):
-            return
-        numbers = _numbers(outputs, self._quasi_static)
-        text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
-        if not np.isfinite(numbers).all():
-            text = text.replace(b'null', b'')
-        # '1,2],[3,4' becomes ',1,2' and ',3,4'
-        cells = [b''] * (3 * len(numbers))
-        cells[::3] = orjson.dumps(
-            outputs.stamps, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1].split(b',')
-        cells[1::3] = (b',' + text.replace(b'[', b'')).split(b']')
-        cells[2::3] = [_ENDS[on] for on in outputs.warnings.tolist()]
-        self._file.write(b''.join(cells))
-
-    def close(self) -> None:
-        """Finish the file."""
-        self._file.close()
-
-
-def _quoted(text: str) -> str:
-    if any(mark in text for mark in ',"\n\r'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
-
-
-class ParquetTable:
-    """legs.parquet: the columns of legs.csv; null: not known, or no force."""
-
-    def __init__(
-            self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
-        self._quasi_static = quasi_static
-        try:
-            import pyarrow
-            import pyarrow.parquet
-        except ImportError as exc:
-            raise StewartError(
-                "--parquet needs pyarrow: pip install 'stewart_dynamics[parquet]'") from exc
-        self._arrow = pyarrow
-        names = _columns(legs)
-        self._schema = pyarrow.schema([
-            (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
-            (names[-1], pyarrow.bool_())])
-        self._writer = pyarrow.parquet.ParquetWriter(folder / 'legs.parquet', self._schema)
-        self._waiting: list[Any] = []
-
-    def write(self, outputs: Outputs) -> None:
-        """Write the rows of these outputs."""
-        columns = [outputs.stamps, *_numbers(outputs, self._quasi_static).T, outputs.warnings]
-        self._waiting.append(self._arrow.record_batch(
-            [self._arrow.array(column, type=field.type, from_pandas=True)
-             for column, field in zip(columns, self._schema, strict=True)], schema=self._schema))
-        if sum(batch.num_rows for batch in self._waiting) >= 1 << 16:
-            self._flush()
-
-    def close(self) -> None:
-        """Finish the file."""
-        self._flush()
-        self._writer.close()
-
-    def _flush(self) -> None:
-        # Parquet is read faster in large row groups.
-        if self._waiting:
-            self._writer.write_table(self._arrow.Table.from_batches(self._waiting))
-            self._waiting.clear()

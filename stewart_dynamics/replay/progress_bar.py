@@ -22,9 +22,8 @@ import sys
 import threading
 import time
 
-from tqdm import tqdm
-
 from stewart_dynamics.replay.bag_task import Ended
+from tqdm import tqdm
 
 
 class ProgressBar:
@@ -32,18 +31,29 @@ class ProgressBar:
     A line on stderr: bags, setpoints, their rate and the time left.
 
     The time left is estimated from bytes, since bags differ in size.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Of all bags [bytes]; zero of those that need not be replayed.
+    show : bool, optional
+        None: only if stderr is a terminal.
+    ended : int
+        Number of bags that are done already.
+
     """
 
-    def __init__(self, sizes: Sequence[int], show: bool | None) -> None:
+    def __init__(self, sizes: Sequence[int], show: bool | None, ended: int = 0) -> None:
         self._sizes = sizes
         self._read = [0] * len(sizes)
         self._setpoints = [0] * len(sizes)
-        self._ended = 0
+        self._ended = ended
         self._lock = threading.Lock()  # Dask reports progress in another thread
         self._started = time.monotonic()
         self._line = tqdm(
-            desc=self._words(), total=sum(sizes), disable=None if show is None else not show,
-            file=sys.stderr, dynamic_ncols=True, smoothing=0.1,
+            desc=self._words(), total=sum(sizes), file=sys.stderr,
+            disable=True if not sum(sizes) else None if show is None else not show,
+            dynamic_ncols=True, smoothing=0.1,
             bar_format='{percentage:3.0f}%|{bar}| {desc}, {remaining} left')
 
     def at(self, number: int, read: int, setpoints: int) -> None:

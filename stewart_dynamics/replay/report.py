@@ -25,9 +25,12 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping
 import functools
+import hashlib
 import importlib.util
+import os
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,7 +44,7 @@ from stewart_dynamics.replay.html_pages import page
 from stewart_dynamics.replay.plot_curves import Curves, Frames
 from stewart_dynamics.replay.report_plots import COLORS, measured_plots, motion_plots
 from stewart_dynamics.replay.report_verdicts import (
-    date, exceeded_limits, smallest_margins, units, verdicts)
+    date, exceeded_limits, rejections, smallest_margins, units, verdicts)
 from stewart_dynamics.runtime.step import Batch, Outputs
 
 # A frame of the moving platform: position, rotation, lengths, forces.
@@ -129,7 +132,7 @@ class Report:
         self._compared.add(seconds, np.concatenate(
             [measured, computed, measured - computed, wrench], axis=1).T)
 
-    def write(self, path: Path, summary: Mapping[str, Any]) -> None:
+    def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None) -> None:
         """
         Write the report.
 
@@ -139,17 +142,23 @@ class Report:
             The file; one that exists is overwritten.
         summary : mapping
             The content of summary.json.
+        plotly : Path, optional
+            The file of plotly.js that several reports share; by default it is in the report.
 
         Raises StewartError if plotly is not installed.
 
         """
-        plotly = _plotly()
+        script = _plotly() if plotly is None else ''
         text = page(
-            'report', [plotly], s=summary, p=self._parameters, legs=list(self._legs),
-            name=Path(summary['bag']).name or summary['bag'], plotly=plotly,
+            'report', [script] if script else [], plotly is not None, s=summary,
+            p=self._parameters, legs=list(self._legs),
+            name=Path(summary['bag']).name or summary['bag'], plotly=script,
+            plotly_file=None if plotly is None else quote(Path(
+                os.path.relpath(plotly, path.parent)).as_posix()),
             data=self._data(summary), sources=SOURCES, verdicts=verdicts(summary),
             exceeded=exceeded_limits(summary['limits']), margins=smallest_margins(summary),
             rejected=sum(each['count'] for each in summary['rejected']),
+            rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), units=units(),
             most_times=_MOST_TIMES)
         path.write_text(text, encoding='utf-8', errors='backslashreplace', newline='\n')
@@ -210,6 +219,18 @@ def _curve(curves: Curves, channel: int) -> dict[str, str]:
 
 def _base64(numbers: ArrayLike, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(numbers, dtype=kind).tobytes()).decode()
+
+
+def share_plotly(folder: Path) -> Path:
+    """Write plotly.js into a folder, if it is not there; return its path."""
+    script = _plotly().encode()
+    path = folder.absolute() / f'plotly-{hashlib.sha256(script).hexdigest()[:12]}.min.js'
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f'.{path.name}.{os.getpid()}')
+        partial.write_bytes(script)
+        partial.replace(path)
+    return path
 
 
 @functools.lru_cache(maxsize=1)

@@ -13,12 +13,13 @@
 # limitations under the License.
 
 
-"""The cards on the first screen of a report: reading, limits, singularity."""
+"""The first screen of a report: reading, limits, singularity, measured forces."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
+import re
 from typing import Any
 
 from stewart_dynamics.parameters import PARAMETERS
@@ -33,9 +34,10 @@ _MARGINS = (('length', 'length_margin_m', 'm'), ('rate', 'rate_margin_m_s', 'm/s
 
 
 def verdicts(summary: Summary) -> dict[str, Verdict]:
-    """Return the verdicts on reading, limits and singularity."""
+    """Return the cards of reading, limits, singularity and measured forces."""
     return {'reading': _reading(summary), 'limits': _limits(summary),
-            'singularity': _singularity(summary['singularity'])}
+            'singularity': _singularity(summary['singularity']),
+            'measured': _measured(summary['measured'])}
 
 
 def _reading(summary: Summary) -> Verdict:
@@ -66,6 +68,21 @@ def _singularity(found: Mapping[str, Any]) -> Verdict:
     if found['condition_max'] is None and found['determinant_nearest_m3'] is None:
         return 'none', 'Singularity'
     return 'good', 'Clear of singularities'
+
+
+def _measured(measured: Mapping[str, Any] | None) -> Verdict:
+    if not measured or not measured['setpoints_compared']:
+        return 'none', 'Measured forces'
+    if measured['contacts']['count'] or measured['mass']['unmodelled_kg'] is not None or any(
+            leg['coulomb_friction_n'] is not None for leg in measured['legs'].values()):
+        return 'warn', 'Measured forces differ'
+    return 'good', 'Measured forces'
+
+
+def rejections(summary: Summary) -> list[dict[str, Any]]:
+    """Return the rejected messages, with details that do not repeat the stamp."""
+    return [{**each, 'details': re.sub(r'^stamp \d+ ns(: | is )?', '', each['first'])}
+            for each in summary['rejected']]
 
 
 def smallest_margins(summary: Summary) -> list[dict[str, Any]]:

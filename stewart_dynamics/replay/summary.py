@@ -81,11 +81,9 @@ class Summary:
         self._legs: tuple[str, ...] = parameters['joints']
         self._timeout: float = parameters['setpoint.timeout']
         self._limits = Limits(parameters)
-        self._not_checked = [VELOCITY_MAX] if (
-            quasi_static and VELOCITY_MAX in self._limits.bounds) else []
         self._exceeded = {
             name: _Exceeded(np.zeros(6, dtype=np.int64), np.full(6, np.nan))
-            for name in self._limits.bounds if name not in self._not_checked}
+            for name in self._limits.bounds if not (quasi_static and name == VELOCITY_MAX)}
         self._held: list[_Block] = []
         self._gap: float | None = None
         self._stamps: tuple[int, int] | None = None
@@ -199,6 +197,8 @@ class Summary:
         """Return the parts of summary.json that depend on the motion, with finite numbers."""
         self._release()
         limits = self._exceeded_limits()
+        not_checked = [name for name in self._limits.bounds if name not in self._exceeded
+                       or name == FORCE_MAX and self._unsolved]
         return {
             'quasi_static': self._quasi_static,
             'setpoints': {
@@ -209,10 +209,10 @@ class Summary:
                 'restarts': self._restarts},
             'legs': {name: self._leg(n) for n, name in enumerate(self._legs)},
             'limits': limits,
-            'limits_not_checked': list(self._not_checked),
+            'limits_not_checked': not_checked,
             'singularity': self._singularity(),
             'force_breakdown': self._force_breakdown(),
-            'limit_met': bool(limits or self._not_checked) or self._warnings.count > 0,
+            'limit_met': bool(limits or not_checked) or self._warnings.count > 0,
         }
 
     def _leg(self, leg: int) -> dict[str, float | None]:

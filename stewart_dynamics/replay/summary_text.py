@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The summary of a motion as text for a terminal."""
+"""The summary of a bag as text for a terminal."""
 
 from __future__ import annotations
 
@@ -22,9 +22,38 @@ import textwrap
 from typing import Any
 
 from stewart_dynamics.mechanics.limits import FORCE_MAX
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.rejections import Rejection
 
 _LISTED = 5
 _WIDTH = 100
+
+
+def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
+    """
+    Return the summary of a bag, without the likely mistakes among its notices.
+
+    Parameters
+    ----------
+    summary : mapping
+        The content of summary.json.
+    parameters : Parameters
+        Of the hexapod.
+
+    """
+    lines = [f'{summary["bag"]}:']
+    if summary['measured']:
+        lines += _measured_lines(summary['measured'])
+    lines += summary_lines(summary, parameters)
+    mistakes = likely_mistakes(parameters)
+    lines += [notice for notice in summary['notices'] if notice not in mistakes]
+    for each in summary['rejected']:
+        rejection = Rejection(f'{each["topic"]}: {each["count"]}', each['reason'])
+        when = '' if each['first_at_s'] is None else f' at t = {each["first_at_s"]:.3f} s'
+        lines.append(rejection.words(f'first{when}: {each["first"]}') if each['first']
+                     else rejection.words('').removesuffix(': '))
+    return '\n'.join(lines)
 
 
 def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
@@ -56,24 +85,55 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
             for line in lines]
 
 
-def measured_lines(measured: Mapping[str, Any]) -> list[str]:
-    """Return the result of the comparison with measured forces, the headline first."""
+def measured_headline(measured: Mapping[str, Any]) -> list[str]:
+    """
+    Return what accounts for the difference between measured and computed forces.
+
+    Parameters
+    ----------
+    measured : mapping
+        The values of Comparison.values.
+
+    """
     if not measured['setpoints_compared']:
-        return ['measured: no setpoint could be compared']
+        return ['no setpoint could be compared']
     lines = []
     if measured['mass']['unmodelled_kg'] is not None:
-        lines.append(f'measured: {measured["mass"]["unmodelled_kg"]:.4g} kg more on the platform '
-                     f'explain {100.0 * measured["mass"]["share"]:.0f} % of the residual')
-    friction = {leg: found for leg, found in measured['legs'].items()
-                if found['coulomb_friction_n'] is not None}
-    if friction:
-        lines.append('measured: friction beyond the parameters, Coulomb [N] and viscous [N s/m]: '
-                     + ', '.join(f'{leg} {found["coulomb_friction_n"]:.3g} and '
-                                 f'{found["viscous_friction_n_s_m"]:.3g}'
-                                 for leg, found in friction.items()))
+        lines.append(f'{measured["mass"]["unmodelled_kg"]:.4g} kg in addition on the platform '
+                     f'account for {100.0 * measured["mass"]["share"]:.0f} % of the residual '
+                     'force')
+    legs = measured['legs'].values()
+    found = [leg for leg in legs if leg['coulomb_friction_n'] is not None]
+    if found:
+        lines.append(f'friction in addition to the parameters, in {len(found)} of {len(legs)} '
+                     f'legs: Coulomb {_span(found, "coulomb_friction_n")} N, viscous '
+                     f'{_span(found, "viscous_friction_n_s_m")} N s/m')
+    if not lines:
+        largest = max(leg['residual_rms_n'] for leg in legs)
+        lines.append('neither a mass on the platform nor friction accounts for half of the '
+                     f'residual; its RMS is at most {largest:.3g} N')
+    return lines
+
+
+def _span(legs: Sequence[Mapping[str, Any]], key: str) -> str:
+    values = [leg[key] for leg in legs]
+    # without the rounding error of zero
+    texts = (f'{round(value, 6) + 0.0:.4g}' for value in (min(values), max(values)))
+    return ' to '.join(dict.fromkeys(texts))
+
+
+def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
+    """Return the result of the comparison with measured forces, the headline first."""
+    lines = [f'measured: {text}' for text in measured['headline']]
+    if not measured['setpoints_compared']:
+        return lines
+    lines += [f'  {leg}: Coulomb {found["coulomb_friction_n"]:.4g} N, viscous '
+              f'{found["viscous_friction_n_s_m"]:.4g} N s/m'
+              for leg, found in measured['legs'].items()
+              if found['coulomb_friction_n'] is not None]
     rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
                     measured['legs'].items() if found['residual_rms_n'] is not None)
-    lines.append(f'compared {measured["setpoints_compared"]} setpoints; measured less computed '
+    lines.append(f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
                  f'force, RMS [N]: {rms or "none"}')
     contacts = measured['contacts']
     lines += [f'contact from t = {each["from_s"]:.2f} to {each["to_s"]:.2f} s: external force '
@@ -90,27 +150,30 @@ def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) ->
         lines.append('* reaches limits.force_max: the published force is clipped to it')
     for each in found['limits']:
         lines.append(f'{each["limit"]}, {each["bound"]:g}, exceeded by {each["leg"]} in '
-                     f'{_counted(each["setpoints"], "setpoint")} from t = '
+                     f'{plural(each["setpoints"], "setpoint")} from t = '
                      f'{each["first_at_s"]:.2f} s on: {each["worst"]:.6g} at worst')
     for name in found['limits_not_checked']:
-        lines.append(f'{name} could not be checked: velocities are not known; --differentiate '
-                     'computes them from the poses')
+        lines.append(f'{name} could not be checked' + (
+            f' in {plural(found["singularity"]["unsolved"], "setpoint")}: J_inv cannot be solved'
+            if name == FORCE_MAX else
+            ': velocities are not known; --differentiate computes them from the poses'))
     if limits_given and not lines:
         lines.append('all limits held')
     return lines
 
 
-def _counted(number: int, what: str) -> str:
+def plural(number: int, what: str) -> str:
+    """Return a number with its noun."""
     return f'{number} {what}' if number == 1 else f'{number} {what}s'
 
 
 def _heading(setpoints: Mapping[str, Any]) -> str:
-    text = f'{_counted(setpoints["answered"], "setpoint")} in {setpoints["duration_s"]:.2f} s'
+    text = f'{plural(setpoints["answered"], "setpoint")} in {setpoints["duration_s"]:.2f} s'
     if setpoints['gaps']:
         text += (f', of them {setpoints["gaps_s"]:.2f} s in '
-                 f'{_counted(setpoints["gaps"], "gap")}')
+                 f'{plural(setpoints["gaps"], "gap")}')
     if setpoints['restarts']:
-        text += f', {_counted(setpoints["restarts"], "restart")}'
+        text += f', {plural(setpoints["restarts"], "restart")}'
     return text
 
 
@@ -172,7 +235,7 @@ def _singularity_lines(found: Mapping[str, Any]) -> list[str]:
         lines.append(f'condition number of J_inv: {found["condition_max"]:.4g} at most, at t = '
                      f'{found["condition_max_at_s"]:.2f} s')
     if unpublished := found['unsolved'] + found['suppressed']:
-        lines.append(f'no forces were published in {_counted(unpublished, "setpoint")}')
+        lines.append(f'no forces were published in {plural(unpublished, "setpoint")}')
     for begun, ended in spans[:_LISTED]:
         ahead = [time - begun for time in crossings
                  if begun <= time and (ended is None or time <= ended)]

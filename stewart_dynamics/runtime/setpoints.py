@@ -107,15 +107,17 @@ class Setpoints:
         self._unstamped_logged = False
         self._unstamped_first = ''
         self._stamped: set[str] = set()
+        self.recorded: int | None = None
+        """When the message at work was recorded [ns], if it is one of ``take_many``."""
 
     @property
     def counts(self) -> Counter[Rejection]:
-        """What was rejected so far, and how often."""
+        """Return what was rejected so far, and how often."""
         return self._rejections.counts
 
     @property
     def wrench(self) -> Six:
-        """The known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
+        """Return the known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
         return self._wrench_input.wrench
 
     def take_wrench(self, data: bytes) -> None:
@@ -169,6 +171,7 @@ class Setpoints:
         setpoints = []
         times = []
         for topic, time, data in messages.each():
+            self.recorded = time
             if topic == WRENCH:
                 self.take_wrench(data)
                 continue

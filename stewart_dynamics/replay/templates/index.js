@@ -1,9 +1,8 @@
 'use strict';
 const fleet = JSON.parse(document.getElementById('fleet').textContent);
 const at = Object.fromEntries(fleet.columns.map((column, n) => [column.key, n]));
-const WORDS = ['done', 'limit met', 'failed', 'partly read'];
-const GRAVITY = [0, 1, 3, 2];
 const FAILED = 2;
+const LONG = new Set(['reason', 'limits_exceeded', 'measured']);
 const CHUNK = 300;
 
 // Text from bags is inserted as text, never as HTML.
@@ -52,7 +51,7 @@ const rows = fleet.rows.map((cells, n) => ({
 function lineOf(row) {
   if (row.line) return row.line;
   row.line = element('tr', undefined, 'code' + row.code);
-  const error = row.cells[at.error];
+  const reason = row.cells[at.reason];
   row.cells.forEach((value, m) => {
     const {key, number} = fleet.columns[m];
     const cell = element('td', undefined, [number ? 'number' : '', marked(key, value)].join(' ').trim());
@@ -66,16 +65,16 @@ function lineOf(row) {
       }
     } else if (key === 'result') {
       const pill = element('span', value, 'pill');
-      pill.title = error;
+      pill.title = reason;
       cell.append(pill);
     } else if (row.code === FAILED) {
       // It has no numbers: the error is shown instead.
-      if (key !== 'error') return;
+      if (key !== 'reason') return;
       cell.colSpan = fleet.columns.length - row.line.children.length;
       cell.append(element('div', value));
-    } else if (key === 'error' || key === 'limits_exceeded') cell.append(element('div', value));
+    } else if (LONG.has(key)) cell.append(element('div', value));
     else cell.textContent = cellText(value, m);
-    if (key === 'error' || key === 'limits_exceeded') cell.classList.add(key);
+    if (LONG.has(key)) cell.classList.add('long', key);
     row.line.append(cell);
   });
   return row.line;
@@ -88,7 +87,7 @@ let sorted = {column: -1, down: false};
 
 function keyOf(row, m) {
   const {key, number, size} = fleet.columns[m];
-  if (key === 'result') return GRAVITY[row.code];
+  if (key === 'result') return fleet.severity.indexOf(row.cells[m]);
   const value = row.cells[m];
   if (value === null || value === '') return null;
   return number && size ? Math.abs(value) : value;
@@ -138,7 +137,7 @@ function more() {
 
 function show() {
   const wanted = filter.value.toLowerCase();
-  passing = rows.filter((row) => (only === null || row.code === only) && row.text.includes(wanted));
+  passing = rows.filter((row) => (only === null || row.cells[at.result] === only) && row.text.includes(wanted));
   body.replaceChildren();
   more();
   main.scrollTop = 0;
@@ -155,15 +154,15 @@ filter.addEventListener('input', show);
 
 const choices = document.getElementById('results');
 choices.style.display = 'contents';
-for (const code of [null, 0, 1, 3, 2]) {
-  const number = code === null ? rows.length : rows.filter((row) => row.code === code).length;
-  if (code !== null && !number) continue;
-  const button = element('button', code === null ? 'all' : WORDS[code]);
+for (const result of [null, ...fleet.severity]) {
+  const number = result === null ? rows.length : rows.filter((row) => row.cells[at.result] === result).length;
+  if (result !== null && !number) continue;
+  const button = element('button', result === null ? 'all' : result);
   button.type = 'button';
   button.append(' ', element('b', shown(number)));
-  button.setAttribute('aria-pressed', code === null);
+  button.setAttribute('aria-pressed', result === null);
   button.addEventListener('click', () => {
-    only = code;
+    only = result;
     for (const each of choices.children) each.setAttribute('aria-pressed', each === button);
     show();
   });

@@ -47,13 +47,20 @@ function valueAt(number, time) {
   return NaN;
 }
 
+const THIN_SPACE = '\u202f';
+
+// Spaces between thousands, a true minus.
+function grouped(value, decimals = 0) {
+  return value.toLocaleString('en', {minimumFractionDigits: decimals, maximumFractionDigits: decimals})
+    .replaceAll(',', THIN_SPACE).replace('-', '−');
+}
+
 function shown(value) {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
-  const text = size === 0 ? '0'
-    : size >= 1e6 || size < 1e-4 ? value.toExponential(3)
-    : size >= 1e4 ? value.toFixed(0) : size < 1 ? value.toFixed(4) : value.toPrecision(5);
-  return text.replace('-', '−');
+  if (size === 0) return '0';
+  if (size >= 1e6 || size < 1e-4) return value.toExponential(3).replaceAll('-', '−');
+  return grouped(value, size >= 1e4 ? 0 : size < 1 ? 4 : 4 - Math.floor(Math.log10(size)));
 }
 
 function element(name, options = {}, ...children) {
@@ -67,6 +74,9 @@ function element(name, options = {}, ...children) {
 
 const INK = '#1d2430';
 const FONT = {family: getComputedStyle(document.body).fontFamily, size: 12.5, color: INK};
+// Fingers scroll the page, and turn the hexapod.
+const TOUCH = window.matchMedia('(pointer: coarse)').matches;
+const NARROW = 560;  // [px]
 const CONFIG = {displaylogo: false, responsive: true, showTips: false, modeBarButtons: [
   ['toImage'], ['zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2d']]};
 const CONFIG_3D = {...CONFIG, modeBarButtons: [
@@ -96,9 +106,19 @@ function moveCursor(to) {
   time.cursor = Math.min(Math.max(to, report.begin), report.end);
   document.getElementById('slider').value = time.cursor;
   document.getElementById('now').replaceChildren(
-    `t = ${time.cursor.toFixed(3)} s`, element('span', {textContent: ` of ${report.end.toFixed(3)} s`}));
+    `t = ${grouped(time.cursor, 3)} s`, element('span', {textContent: ` of ${grouped(report.end, 3)} s`}));
   for (const plot of plots) plot.showCursor();
   if (player) player.show();
+}
+
+// Move the cursor to a time, and the range of all plots if the time is outside.
+function showTime(when) {
+  const [begin, end] = time.range;
+  if (when < begin || when > end) {
+    const half = 0.5 * (end - begin);
+    zoomTo([when - half, when + half]);
+  }
+  moveCursor(when);
 }
 
 function hoverAt(when) {
@@ -136,7 +156,7 @@ class TimePlot {
     this.drawn = false;
     this.hidden = new Set();
     this.canvas = element('div', {className: 'canvas time', id: `plot_${spec.key}`});
-    this.cursor = element('div', {className: 'cursor'});
+    this.cursor = element('div', {className: 'cursor'}, element('span'));
     this.values = [];
     this.readout = element('aside', {className: 'readout'});
     this.tools = element('div', {className: 'tools'});
@@ -149,7 +169,7 @@ class TimePlot {
     const head = element('div', {className: 'head'});
     const title = element('h3', {textContent: spec.title});
     if (spec.figure) {
-      title.prepend(element('span', {className: 'figure', textContent: `Fig. ${spec.figure}  `}));
+      title.append(element('span', {className: 'figure', textContent: ` figure ${spec.figure} of the paper`}));
     }
     this.remark = element('span', {className: 'note', textContent: spec.note});
     head.append(title, this.remark, this.tools);
@@ -289,11 +309,11 @@ class TimePlot {
       ticks: 'outside', tickcolor: '#8a93a1', ticklen: 4, showline: true, mirror: true};
     return {
       height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
-      dragmode: 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff', shapes, annotations: notes,
+      separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff', shapes, annotations: notes,
       xaxis: {...axis, range: time.range.slice(), title: {text: 'time [s]', standoff: 6, font: {size: 12.5}}, zeroline: false},
       yaxis: {...axis, range: this.yRange.slice(), type: this.spec.log ? 'log' : 'linear',
         title: {text: this.spec.log ? '' : `[${this.spec.unit}]`, standoff: 8, font: {size: 12.5}},
-        exponentformat: this.spec.log ? 'power' : 'none',
+        exponentformat: this.spec.log ? 'power' : 'none', separatethousands: true,
         ...(this.spec.log ? {dtick: this.yRange[1] - this.yRange[0] > 1.2 ? 1 : 'D2'} : {})},
     };
   }
@@ -333,8 +353,10 @@ class TimePlot {
     });
     this.canvas.on('plotly_afterplot', () => this.showCursor());
     let pressed = null;
-    this.canvas.addEventListener('mousemove', event => hoverAt(this.timeAt(event)));
-    this.canvas.addEventListener('mouseleave', () => hoverAt(null));
+    this.canvas.addEventListener('pointermove', event => {
+      if (event.pointerType === 'mouse') hoverAt(this.timeAt(event));
+    });
+    this.canvas.addEventListener('pointerleave', () => hoverAt(null));
     this.canvas.addEventListener('pointerdown', event => { pressed = [event.clientX, event.clientY]; }, true);
     // a click, not the end of a drag
     window.addEventListener('pointerup', event => {
@@ -374,6 +396,8 @@ class TimePlot {
     this.cursor.style.left = `${xaxis._offset + x - 0.75}px`;
     this.cursor.style.top = `${yaxis._offset}px`;
     this.cursor.style.height = `${yaxis._length}px`;
+    this.cursor.classList.toggle('late', x > 0.8 * xaxis._length);
+    this.cursor.firstChild.textContent = `${grouped(when, 3)} s`;
     this.curves.forEach((each, n) => { this.values[n].textContent = shown(valueAt(each.curve, when)); });
   }
 }
@@ -524,6 +548,7 @@ class Player {
 
   draw() {
     const frame = frameAt(0), joints = platformJoints(frame), lines = legLines(joints, frame.subarray(18));
+    const narrow = this.canvas.clientWidth < NARROW;
     this.frame = 0;
     Plotly.newPlot(this.canvas, [
       ...baseTraces(),
@@ -532,10 +557,11 @@ class Player {
       {type: 'scatter3d', mode: 'lines', x: lines.x, y: lines.y, z: lines.z, hoverinfo: 'skip',
         showlegend: false, connectgaps: false, line: {width: 13, color: lines.colors,
           colorscale: FORCE_COLORS, cmin: -this.reach, cmax: this.reach, showscale: true,
-          colorbar: {title: {text: 'leg force [N]<br>+ pushes', side: 'top'}, thickness: 14, len: 0.7,
-            x: 1, outlinewidth: 0}}},
-    ], {height: 520, margin: {l: 0, r: 0, t: 0, b: 0}, font: FONT, showlegend: false, hovermode: false,
-      scene: scene(frames.times.keys(), this.canvas.clientWidth), paper_bgcolor: '#fff'}, CONFIG_3D);
+          colorbar: {title: {text: narrow ? 'leg force [N], + pushes' : 'leg force [N]<br>+ pushes', side: 'top'},
+            thickness: 14, outlinewidth: 0, separatethousands: true, exponentformat: 'none',
+            ...(narrow ? {orientation: 'h', len: 0.9, nticks: 5, x: 0.5, y: 0, yanchor: 'top'} : {len: 0.7, x: 1})}}},
+    ], {height: heightOf(this.canvas), margin: {l: 0, r: 0, t: 0, b: narrow ? 70 : 0}, font: FONT, showlegend: false,
+      hovermode: false, separators: `.${THIN_SPACE}`, scene: scene(frames.times.keys(), this.canvas.clientWidth), paper_bgcolor: '#fff'}, CONFIG_3D);
     this.drawn = true;
     this.showValues(0);
   }
@@ -575,10 +601,13 @@ class Player {
     const pose = [frame[0], frame[1], frame[2], degrees * Math.atan2(r[7], r[8]),
       degrees * Math.atan2(-r[6], Math.hypot(r[0], r[3])), degrees * Math.atan2(r[3], r[0])];
     this.poseValues.forEach(({cell}, n) => { cell.textContent = shown(pose[n]); });
-    this.sample.textContent = `sample at t = ${frames.times[number].toFixed(3)} s`
-      + (frames.times.length < report.samples ? `, one of ${frames.times.length} shown` : '');
+    this.sample.textContent = `sample at t = ${grouped(frames.times[number], 3)} s`
+      + (frames.times.length < report.samples ? `, one of ${grouped(frames.times.length)} shown` : '');
   }
 }
+
+// A scene is not much higher than wide.
+function heightOf(canvas) { return Math.min(520, Math.max(300, Math.round(1.15 * canvas.clientWidth))); }
 
 class InitialAndFinal {
   constructor(place) {
@@ -591,11 +620,11 @@ class InitialAndFinal {
       return element('tr', {}, element('th', {}, swatch, text));
     };
     place.append(element('div', {className: 'plot'}, element('div', {className: 'head'},
-      element('h3', {}, element('span', {className: 'figure', textContent: 'Fig. 16  '}),
-        'Platform at initial and final position')),
+      element('h3', {}, 'Platform at initial and final position',
+        element('span', {className: 'figure', textContent: ' figure 16 of the paper'}))),
     element('div', {className: 'body'}, this.canvas, element('aside', {className: 'readout'},
-      element('table', {}, row('#8a93a1', `initial, t = ${frames.times[0].toFixed(3)} s`),
-        row('#d55e00', `final, t = ${frames.times[last].toFixed(3)} s`))))));
+      element('table', {}, row('#8a93a1', `initial, t = ${grouped(frames.times[0], 3)} s`),
+        row('#d55e00', `final, t = ${grouped(frames.times[last], 3)} s`))))));
     watch(this.canvas, this);
   }
 
@@ -610,7 +639,7 @@ class InitialAndFinal {
         {type: 'scatter3d', mode: 'lines', x: lines.x, y: lines.y, z: lines.z, hoverinfo: 'skip',
           showlegend: false, line: {width, color}});
     }
-    Plotly.newPlot(this.canvas, traces, {height: 520, margin: {l: 0, r: 0, t: 0, b: 0}, font: FONT,
+    Plotly.newPlot(this.canvas, traces, {height: heightOf(this.canvas), margin: {l: 0, r: 0, t: 0, b: 0}, font: FONT,
       showlegend: false, hovermode: false, scene: scene([0, last], this.canvas.clientWidth), paper_bgcolor: '#fff'}, CONFIG_3D);
   }
 }
@@ -677,6 +706,11 @@ function setUpBar() {
 
 function setUp() {
   const place = document.getElementById('plots');
+  if (typeof Plotly === 'undefined') {
+    place.append(element('p', {className: 'note', textContent:
+      'The plots need the file plotly-….min.js of the folder of results: move reports together with it.'}));
+    return;
+  }
   if (!report.samples) {
     place.append(element('p', {className: 'note', textContent:
       'No setpoint could be answered: there are no plots.'}));
@@ -685,12 +719,13 @@ function setUp() {
   setUpBar();
   player = new Player(document.getElementById('motion'));
   place.append(element('h2', {textContent: 'Plots over time'}));
-  const drag = 'Drag to zoom: all plots follow. Double click: whole range. Click: move the cursor there. ';
+  const drag = TOUCH ? 'Tap: move the cursor there. '
+    : 'Drag to zoom: all plots follow. Double click: whole range. Click: move the cursor there. ';
   place.append(element('p', {className: 'note', textContent: drag + (report.samplesInBucket < 2
     ? 'Every sample is drawn.'
-    : `${report.samples.toLocaleString('en')} samples: of each ${report.samplesInBucket} the lowest and the `
+    : `${grouped(report.samples)} samples: of each ${grouped(report.samplesInBucket)} the lowest and the `
       + 'highest are drawn; values are those of the drawn sample nearest to the cursor.')}));
-  const part = (listed, all) => listed.length < all ? `, the first ${listed.length} of ${all.toLocaleString('en')}` : '';
+  const part = (listed, all) => listed.length < all ? `, the first ${listed.length} of ${grouped(all)}` : '';
   const legend = element('div', {className: 'legend'});
   if (report.warnings.length) {
     const box = element('i');
@@ -717,18 +752,21 @@ function setUp() {
 
 document.addEventListener('click', event => {
   const button = event.target.closest('button.at');
-  if (button && report.samples) {
+  if (button && plots.length) {
     stop();
-    moveCursor(+button.dataset.at);
+    showTime(+button.dataset.at);
+    const plot = document.getElementById(`plot_${button.dataset.plot}`) || document.getElementById('plots');
+    plot.scrollIntoView({block: 'center'});
   }
 });
 
 // For printing all plots are drawn, in the width of the paper.
+const PAPER = 560;  // [px]
 window.addEventListener('beforeprint', () => {
   for (const drawing of byCanvas.values()) {
     inView.add(drawing);
     drawing.appear();
-    Plotly.relayout(drawing.canvas, {width: 560});
+    Plotly.relayout(drawing.canvas, {width: PAPER});
   }
 });
 window.addEventListener('afterprint', () => {

@@ -1,0 +1,169 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""legs.csv and legs.parquet: one row per setpoint, with time, pose, legs and det(J)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import orjson
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.replay.spreadsheet import harmless
+from stewart_dynamics.runtime.step import Outputs
+
+# End of a row in legs.csv: no warning, warning.
+_ENDS = (b',0\n', b',1\n')
+
+
+class Table(Protocol):
+    """A file with one row per setpoint."""
+
+    def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
+        """
+        Write the rows of N setpoints.
+
+        Parameters
+        ----------
+        seconds : (N,)
+            Time since the first setpoint of the bag [s].
+        motions : (N, 24)
+            Their motions, laid out as ``inverse_dynamics`` says.
+        outputs : Outputs
+            Their outputs.
+
+        """
+
+    def close(self) -> None:
+        """Complete the file."""
+
+
+def column_names(legs: Sequence[str]) -> list[str]:
+    """Return the names of the columns; a name ends with its unit."""
+    return ['stamp_ns', 'time_s',
+            *(f'position_{axis}_m' for axis in 'xyz'),
+            *(f'orientation_{part}' for part in 'xyzw'),
+            *(f'{leg}_{quantity}' for quantity in (
+                'length_m', 'rate_m_s', 'force_n', 'demanded_force_n') for leg in legs),
+            'determinant_m3', 'determinant_rate_m3_s', 'condition', 'warning']
+
+
+def _numbers(seconds: Array, motions: Array, outputs: Outputs, quasi_static: bool) -> Array:
+    """Return the columns between stamp and warning (N, 35); nan: not known."""
+    rates, determinant_rates = outputs.rates, outputs.determinant_rates
+    if quasi_static:
+        rates = np.full_like(rates, np.nan)
+        determinant_rates = np.full_like(determinant_rates, np.nan)
+    return np.column_stack([
+        seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
+        outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
+        outputs.determinants, determinant_rates, outputs.conditions])
+
+
+class CsvTable:
+    """
+    legs.csv: each number with the fewest digits that represent it exactly.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the file.
+    legs : sequence of str
+        Names of the six legs.
+    quasi_static : bool
+        Velocities are not known: columns that depend on them are empty.
+
+    """
+
+    def __init__(
+            self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
+        self._quasi_static = quasi_static
+        self._file = (folder / 'legs.csv').open('wb')
+        names = [_quoted(harmless(name)) for name in column_names(legs)]
+        self._file.write(','.join(names).encode() + b'\n')
+
+    def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
+        """Write the rows of N setpoints."""
+        if not len(outputs.stamps):
+            return
+        numbers = _numbers(seconds, motions, outputs, self._quasi_static)
+        text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
+        if not np.isfinite(numbers).all():
+            text = text.replace(b'null', b'')
+        # '1,2],[3,4' becomes ',1,2' and ',3,4'
+        cells = [b''] * (3 * len(numbers))
+        cells[::3] = orjson.dumps(
+            outputs.stamps, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1].split(b',')
+        cells[1::3] = (b',' + text.replace(b'[', b'')).split(b']')
+        cells[2::3] = [_ENDS[on] for on in outputs.warnings.tolist()]
+        self._file.write(b''.join(cells))
+
+    def close(self) -> None:
+        """Complete the file."""
+        self._file.close()
+
+
+def _quoted(text: str) -> str:
+    if any(mark in text for mark in ',"\n\r'):
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+class ParquetTable:
+    """legs.parquet: the columns of legs.csv; null: not known, or no force."""
+
+    def __init__(
+            self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
+        self._quasi_static = quasi_static
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError as exc:
+            raise StewartError(
+                "--parquet needs pyarrow: pip install 'stewart_dynamics[parquet]'") from exc
+        self._arrow = pyarrow
+        names = column_names(legs)
+        self._schema = pyarrow.schema([
+            (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
+            (names[-1], pyarrow.bool_())])
+        self._writer = pyarrow.parquet.ParquetWriter(folder / 'legs.parquet', self._schema)
+        self._waiting: list[Any] = []
+
+    def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
+        """Write the rows of N setpoints."""
+        numbers = _numbers(seconds, motions, outputs, self._quasi_static)
+        columns = [outputs.stamps, *numbers.T, outputs.warnings]
+        self._waiting.append(self._arrow.record_batch(
+            [self._arrow.array(column, type=field.type, from_pandas=True)
+             for column, field in zip(columns, self._schema, strict=True)], schema=self._schema))
+        if sum(batch.num_rows for batch in self._waiting) >= 1 << 16:
+            self._flush()
+
+    def close(self) -> None:
+        """Complete the file."""
+        self._flush()
+        self._writer.close()
+
+    def _flush(self) -> None:
+        # Parquet is read faster in large row groups.
+        if self._waiting:
+            self._writer.write_table(self._arrow.Table.from_batches(self._waiting))
+            self._waiting.clear()

@@ -1,0 +1,190 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The table of the legs as CSV and Parquet, as read by other programs."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pyarrow.parquet
+import pytest
+from scipy.spatial.transform import Rotation
+from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.rows import MOTION
+from stewart_dynamics.mechanics.singularity import CAUSE, STATE
+from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
+from stewart_dynamics.runtime.step import Outputs
+from test_output import LEGS, turning
+
+RESULTS = 27
+
+
+def motions_of(number: int) -> NDArray[np.float64]:
+    """Return motions of a platform that rises, at an orientation of its own each (N, 24)."""
+    motions = np.zeros((number, MOTION))
+    motions[:, 2] = 1.0 / 3.0 + np.arange(number)
+    for n, quaternion in enumerate(np.random.default_rng(number).normal(size=(number, 4))):
+        motions[n, 3:12] = Rotation.from_quat(quaternion).as_matrix().ravel()
+    return motions
+
+
+def seconds_of(number: int) -> NDArray[np.float64]:
+    return np.arange(number) / 7.0
+
+
+def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
+               stamps: NDArray[np.int64], warnings: NDArray[np.bool_]) -> Outputs:
+    states = np.zeros((len(stamps), STATE))
+    states[:, CAUSE] = warnings
+    flags = np.zeros(len(stamps), dtype=bool)
+    return Outputs(~flags, stamps, results, forces, states, flags, flags)
+
+
+def bits(values: Any) -> list[int]:
+    return [int(n) for n in np.asarray(values, dtype=float).view(np.uint64).ravel()]
+
+
+def read_csv(file: Path) -> tuple[list[str], list[list[str]]]:
+    with file.open(newline='', encoding='utf-8') as stream:
+        head, *rows = csv.reader(stream)
+    return head, rows
+
+
+def check_tables(folder: Path, blocks: list[Outputs]) -> None:
+    """Check that both tables give every number back to the bit."""
+    tables: list[Any] = [CsvTable(folder, LEGS), ParquetTable(folder, LEGS)]
+    for table in tables:
+        for outputs in blocks:
+            number = len(outputs.stamps)
+            table.write(seconds_of(number), motions_of(number), outputs)
+        table.close()
+    head, rows = read_csv(folder / 'legs.csv')
+    parquet = pyarrow.parquet.read_table(folder / 'legs.parquet')
+    assert parquet.column_names == head
+    columns = [parquet.column(n).to_pylist() for n in range(len(head))]
+    at = 0
+    for outputs in blocks:
+        number = len(outputs.stamps)
+        seconds, motions = seconds_of(number), motions_of(number)
+        quaternions = to_quaternion(motions[:, 3:12].reshape(-1, 3, 3))
+        for n in range(number):
+            row, same = rows[at], [column[at] for column in columns]
+            expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.lengths[n],
+                        *outputs.rates[n], *outputs.forces[n],
+                        *outputs.demanded_forces[n], outputs.determinants[n],
+                        outputs.determinant_rates[n], outputs.conditions[n]]
+            assert int(row[0]) == same[0] == outputs.stamps[n]
+            assert len(row) == len(expected) + 2
+            for text, value, truth in zip(row[1:-1], same[1:-1], expected, strict=True):
+                if math.isnan(truth):
+                    assert (text, value) == ('', None)
+                else:
+                    assert bits(float(text)) == bits(value) == bits(truth)
+            assert row[-1] == str(int(outputs.warnings[n]))
+            assert same[-1] is bool(outputs.warnings[n])
+            at += 1
+    assert at == len(rows) == parquet.num_rows
+
+
+def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
+    outputs = turning(300)
+    assert outputs.warnings.any()
+    assert np.isnan(outputs.forces).any()
+    check_tables(tmp_path, [outputs, turning(0), turning(1)])
+
+
+@given(st.data())
+@settings(deadline=None, max_examples=60)
+def test_the_tables_give_any_number_back(
+        tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    number = data.draw(st.integers(1, 4))
+    values = st.floats(allow_nan=False, allow_infinity=False)
+    some = data.draw(st.lists(values, min_size=8, max_size=40))
+    results = np.resize(some, (number, RESULTS))
+    forces = np.resize(some[3:], (number, 6))
+    if data.draw(st.booleans()):
+        forces[0] = np.nan
+        results[0, 12:18] = np.nan
+    stamps = data.draw(st.lists(st.integers(-(1 << 63), (1 << 63) - 1), min_size=number,
+                                max_size=number))
+    check_tables(tmp_path_factory.mktemp('table'), [outputs_of(
+        results, forces, np.array(stamps), np.arange(number) % 2 == 0)])
+
+
+def test_numbers_at_the_edges(tmp_path: Path) -> None:
+    edges = np.array([0.0, -0.0, 5e-324, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308,
+                      1e16, 1e17, 123456789012345680.0, 1e-5, 1e-7, 0.1, 1 / 3, 1e22, 1e23,
+                      9007199254740993.0])
+    rng = np.random.default_rng(1)
+    random = rng.integers(0, 1 << 64, 27_000, dtype=np.uint64).view(float)
+    random[~np.isfinite(random)] = 1.0
+    results = np.concatenate([np.resize(edges, (16, 27)), random.reshape(-1, 27)])
+    many = len(results)
+    check_tables(tmp_path, [outputs_of(
+        results, results[:, 5:11].copy(), np.arange(many), np.zeros(many, dtype=bool))])
+
+
+@pytest.mark.parametrize('table', [CsvTable, ParquetTable])
+def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
+    legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
+    writer = table(tmp_path, legs)
+    writer.write(seconds_of(2), motions_of(2), turning(2))
+    writer.close()
+    if table is CsvTable:
+        head, rows = read_csv(tmp_path / 'legs.csv')
+        assert [len(row) for row in rows] == [len(head)] * 2
+    else:
+        head = pyarrow.parquet.read_table(tmp_path / 'legs.parquet').column_names
+    assert [name.removesuffix('_length_m') for name in head[9:15]] == list(legs)
+    assert [name.removesuffix('_force_n') for name in head[21:27]] == list(legs)
+
+
+def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
+    CsvTable(tmp_path, ('=1+1', '+a', '-b', '@c', '\td', 'e')).close()
+    head, _ = read_csv(tmp_path / 'legs.csv')
+    assert [name.removesuffix('_length_m') for name in head[9:15]] == [
+        "'=1+1", "'+a", "'-b", "'@c", "'\td", 'e']
+
+
+@pytest.mark.parametrize('table', [CsvTable, ParquetTable])
+def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
+    writer = table(tmp_path, LEGS)
+    writer.write(seconds_of(0), motions_of(0), turning(0))
+    writer.close()
+    file, = tmp_path.iterdir()
+    if table is CsvTable:
+        assert len(read_csv(file)[0]) == 37
+        assert not read_csv(file)[1]
+    else:
+        assert pyarrow.parquet.read_table(file).shape == (0, 37)
+
+
+def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
+    outputs = turning(1000)
+    table = ParquetTable(tmp_path, LEGS)
+    for _ in range(100):
+        table.write(seconds_of(1000), motions_of(1000), outputs)
+    table.close()
+    file = pyarrow.parquet.ParquetFile(tmp_path / 'legs.parquet')
+    assert file.metadata.num_rows == 100_000
+    assert file.metadata.num_row_groups == 2
