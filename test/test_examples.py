@@ -82,6 +82,11 @@ def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
         assert program.stdout == ('accepted: 201 points over 2 s, largest effort '
                                   f'{np.abs(expected.forces).max():.0f} N\n')
         node.until(lambda n=n: len(answers) == n + 1, 'the answer is heard here, too')
+    monitor = run('show_diagnostics.py', node.domain)
+    node.until(lambda: 'setpoints: no setpoint: ' in monitor.stdout, 'a status is printed')
+    assert re.search(r'^STALE  stewart_dynamics: setpoints: no setpoint: setpoint/pose never came',
+                     monitor.stdout, re.MULTILINE)
+    assert monitor.stop() == 0
     program = run('plan_motion.py', node.domain, '--timeout', '1.0')
     assert program.wait() == 1
     assert program.stderr == ('no publisher on /stewart_dynamics/leg_trajectory within 1 s; are '

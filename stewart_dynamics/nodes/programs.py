@@ -74,7 +74,7 @@ def _described(parameter: Parameter) -> str:
 
 def _run(module: str, name: str, node: str) -> int:
     """Run the node of a module, with the parameters of another one; return its exit code."""
-    SIGNALS.watch()  # before anything else is imported
+    SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
     kind: type[ParameterSet] = getattr(_imported(module), name)
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(usage(kind))
@@ -93,8 +93,6 @@ def _run(module: str, name: str, node: str) -> int:
         print(f'{kind.node}: needs ROS 2: {reason}: source its setup file, or pip install '
               '"stewart_dynamics[ros]"', file=sys.stderr)
         return 1
-    if SIGNALS.received:
-        return 0
     code: int = program.main()
     return code
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import os
 import signal
 from typing import Any
 
@@ -36,10 +37,16 @@ class Signals:
 
     def __init__(self) -> None:
         self.received = False
-        self._interrupts = False
+        self._ends = self._interrupts = False
 
-    def watch(self) -> None:
-        """Handle both signals from now on; only the main thread may do so."""
+    def watch(self, end_at_once: bool = False) -> None:
+        """
+        Handle both signals from now on; only the main thread may call it.
+
+        With ``end_at_once`` they end the process, exit code 0: while libraries are imported, there
+        is nothing to clean up.
+        """
+        self._ends = end_at_once
         for number in _NUMBERS:
             signal.signal(number, self._handle)
 
@@ -61,6 +68,8 @@ class Signals:
 
     def _handle(self, number: int, frame: Any) -> None:
         self.received = True
+        if self._ends:
+            os._exit(0)
         if self._interrupts:
             raise KeyboardInterrupt
 

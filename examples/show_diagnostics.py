@@ -1,0 +1,71 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Example: print /diagnostics readably, where there is no rqt_runtime_monitor. Copy what you need.
+
+Each status is printed when its level or its message changes; with --values the numbers as well,
+once in a second.
+"""
+
+import argparse
+import sys
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+LEVELS = {DiagnosticStatus.OK: 'OK', DiagnosticStatus.WARN: 'WARN',
+          DiagnosticStatus.ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
+
+
+class Monitor(Node):
+    """Prints what changes."""
+
+    def __init__(self, values: bool) -> None:
+        super().__init__('diagnostics_monitor')
+        self.values, self.last = values, {}
+        self.create_subscription(DiagnosticArray, '/diagnostics', self.on_diagnostics, 10)
+
+    def on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            state = status.level, status.message
+            if self.values or self.last.get(status.name) != state:
+                print(f'{LEVELS.get(status.level, "?"):5}  {status.name}: {status.message}')
+            self.last[status.name] = state
+            if self.values:
+                for pair in status.values:
+                    print(f'         {pair.key}: {pair.value}')
+        sys.stdout.flush()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--values', action='store_true', help='print all values, too')
+    # The handlers of rclpy would shut ROS down in the middle of a call.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    monitor = Monitor(parser.parse_args(remove_ros_args(sys.argv)[1:]).values)
+    try:
+        while True:
+            rclpy.spin_once(monitor, timeout_sec=0.1)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()
