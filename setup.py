@@ -27,7 +27,7 @@ version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py'
     encoding='utf-8'), re.MULTILINE)[0]
 
 # No ROS package is in install_requires: with a ROS installation they come from package.xml, and
-# has them under other names. Everything else that an executable imports is listed here.
+# pip has them under other names. Everything else that an executable imports is listed here.
 install_requires = [
     'jinja2>=3.1',  # the replay's pages
     'lz4>=4',

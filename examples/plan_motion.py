@@ -30,8 +30,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
 import numpy as np
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 from trajectory_msgs.msg import (
@@ -125,12 +125,13 @@ def main() -> None:
     parser.add_argument('--duration', type=float, default=2.0, help='[s]')
     parser.add_argument('--timeout', type=float, default=10.0,
                         help='for the node to appear, and to answer [s]')
-    rclpy.init()
+    # The handlers of rclpy would shut ROS down in the middle of a call.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
         answer = ask(Planner(), trajectory(options.start, options.to, options.duration),
                      options.timeout)
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         sys.exit(130)
     except StewartError as exc:
         sys.exit(str(exc))

@@ -26,8 +26,8 @@ import time
 
 from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
 
@@ -86,14 +86,15 @@ def main() -> None:
     parser.add_argument('--moment', default=[0.0, 0.0, 50.0], help='[N m]', **three)
     parser.add_argument('--timeout', type=float, default=10.0,
                         help='for the next external wrench [s]')
-    rclpy.init()
+    # The handlers of rclpy would shut ROS down in the middle of a call.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     pusher = Pusher()
     try:
         print('before:', text(pusher.wait(options.timeout)))
         print('pushed:', text(pusher.push(options.force, options.moment, options.timeout)))
         print('after: ', text(pusher.push([0.0] * 3, [0.0] * 3, options.timeout)))
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         sys.exit(130)
     finally:
         rclpy.try_shutdown()

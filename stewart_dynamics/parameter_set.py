@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import difflib
+from itertools import chain
 import math
 from pathlib import Path
 import re
@@ -268,7 +269,11 @@ def _plain(value: Any) -> Any:
         value = value.ravel() if value.ndim else value[()]
     if hasattr(value, 'tolist'):
         value = value.tolist()
-    return tuple(value) if isinstance(value, list) else value
+    if isinstance(value, list | tuple):  # rows of joints as well
+        entries = [each.tolist() if hasattr(each, 'tolist') else each for each in value]
+        return tuple(chain.from_iterable(
+            each if isinstance(each, list | tuple) else (each,) for each in entries))
+    return value
 
 
 def _as_double(parameter: Parameter, value: Any) -> Any:

@@ -17,16 +17,21 @@ Mutation testing: how many wrong lines of the package the tests notice.
 
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
-the tests that import the module, its own first, until one fails. It prints the share killed,
+the tests that import the module, quick ones first, until one fails. It prints the share killed,
 every survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run
-uncompiled, so that they need no compilation.
+uncompiled, so that they need no compilation. Tests that need ROS, that fail uncompiled or that
+take long are left out, and of each property few examples are tried (``mutation_plugin``): the
+share killed is a lower bound.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+import json
 import os
 from pathlib import Path
 import random
@@ -40,25 +45,9 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'stewart_dynamics'
 
-# A plugin of pytest: few examples of each property, to kill most mutants soon. The share killed is
-# thus a lower bound.
-_FEW_EXAMPLES = """
-from hypothesis import settings
-
-original = settings.__init__
-
-def few(self, *arguments, **given):
-    if 'max_examples' in given:
-        given['max_examples'] = min(given['max_examples'], 20)
-    original(self, *arguments, **given)
-
-settings.__init__ = few
-settings.register_profile('few', max_examples=20)
-settings.load_profile('few')
-"""
-
-# They take minutes uncompiled.
-_COMPILED = {'test_external_wrench', 'test_planned_trajectory', 'test_planned_trajectory_messages'}
+# Test modules that are left out: with ROS or a browser.
+_NEEDS = re.compile('from running import|import rclpy|playwright')
+_NO_TESTS = 5  # an exit code of pytest
 
 _ARITHMETIC = {ast.Add: ('+', '-'), ast.Sub: ('-', '+'), ast.Mult: ('*', '/'),
                ast.Div: ('/', '*'), ast.FloorDiv: ('//', '*'), ast.Mod: ('%', '*'),
@@ -193,40 +182,59 @@ def mutants(paths: list[Path]) -> Iterator[Mutant]:
         yield from finder.found
 
 
-def tests_of(path: Path, tests: list[Path]) -> list[Path]:
-    """Return the test modules that import a module, its own first; without those that need ROS."""
-    name = path.stem
-    imported = re.compile(rf'^(from|import) .*\b{name}\b', re.MULTILINE)
-    naming = [test for test in tests
-              if imported.search(text := test.read_text(encoding='utf-8'))
-              and 'from running import' not in text and 'import rclpy' not in text]
-    return sorted(naming, key=lambda test: (test.stem != f'test_{name}', test.stat().st_size))
+def modules_of(path: Path, tests: list[Path]) -> list[str]:
+    """Return the names of the test modules that import a module."""
+    imported = re.compile(rf'^(from|import) .*\b{path.stem}\b', re.MULTILINE)
+    return [test.name for test in tests if imported.search(test.read_text(encoding='utf-8'))]
 
 
-def fate(mutant: Mutant, tests: list[Path], seconds: float, deselect: list[str]) -> str:
+class Suite:
+    """
+    The tests that need no ROS, and how long each takes.
+
+    Parameters
+    ----------
+    folder : Path
+        Gets the durations.
+    compiled : bool
+        Whether numba compiles.
+
+    """
+
+    def __init__(self, folder: Path, compiled: bool) -> None:
+        self._durations = folder / f'durations_{compiled}.json'
+        self._environment = {**os.environ, 'PYTHONDONTWRITEBYTECODE': '1',
+                             'PYTHONSAFEPATH': '1', 'MUTATION_DURATIONS': str(self._durations)}
+        if not compiled:
+            self._environment['NUMBA_DISABLE_JIT'] = '1'
+
+    def measure(self, modules: list[str]) -> None:
+        """Run whole test modules on the package as it is, and note how long each test takes."""
+        self._run(ROOT, modules, 3600.0)
+        known = json.loads(self._durations.read_text(encoding='utf-8'))
+        print(f'{len(known)} tests of {len(modules)} modules pass', flush=True)
+
+    def fails(self, package: Path, modules: list[str], seconds: float) -> bool:
+        """Return whether a test fails with a package; raises subprocess.TimeoutExpired."""
+        return self._run(package, modules, seconds, '-x') not in (0, _NO_TESTS)
+
+    def _run(self, package: Path, modules: list[str], seconds: float, *options: str) -> int:
+        return subprocess.run(
+            [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider',
+             '-p', 'mutation_plugin', *options, *(f'test/{name}' for name in modules)],
+            cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=seconds,
+            env={**self._environment, 'PYTHONPATH': f'{package}:{ROOT / "test"}'}).returncode
+
+
+def fate(mutant: Mutant, suite: Suite, modules: list[str], seconds: float) -> str:
     """Return whether a mutant was killed, survived all tests, or did not end in time."""
     with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / PACKAGE
-        shutil.copytree(ROOT / PACKAGE, target)  # with the machine code kept so far
-        changed = mutant.path.relative_to(ROOT)
-        (Path(folder) / changed).write_text(mutant.text(), encoding='utf-8')
-        (Path(folder) / 'few_examples.py').write_text(_FEW_EXAMPLES, encoding='utf-8')
-        uncompiled = {'NUMBA_DISABLE_JIT': '1'} if 'mechanics' in changed.parts else {}
-        if uncompiled:
-            tests = [test for test in tests if test.stem not in _COMPILED]
+        shutil.copytree(ROOT / PACKAGE, Path(folder) / PACKAGE)  # with the compiled code kept
+        (Path(folder) / mutant.path.relative_to(ROOT)).write_text(mutant.text(), encoding='utf-8')
         try:
-            code = subprocess.run(
-                [sys.executable, '-m', 'pytest', '-x', '-q',
-                 '-p', 'no:cacheprovider', '-p', 'few_examples',
-                 *(part for name in deselect for part in ('--deselect', name)),
-                 *(str(test.relative_to(ROOT)) for test in tests)],
-                cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=seconds,
-                env={**os.environ, 'PYTHONPATH': folder, 'PYTHONSAFEPATH': '1',
-                     'PYTHONDONTWRITEBYTECODE': '1', **uncompiled},
-            ).returncode
+            return 'killed' if suite.fails(Path(folder), modules, seconds) else 'survived'
         except subprocess.TimeoutExpired:
             return 'timed out'
-    return 'killed' if code else 'survived'
 
 
 def main() -> None:
@@ -238,27 +246,38 @@ def main() -> None:
     parser.add_argument('--seed', type=int, default=1, help='of the sample (default: %(default)s)')
     parser.add_argument('--seconds', type=float, default=300.0,
                         help='after which a mutant is killed (default: %(default)s)')
-    parser.add_argument('--deselect', nargs='*', default=[], help='tests to leave out')
-    parser.add_argument('--leave-out', nargs='*', default=[], help='test modules to leave out')
     given = parser.parse_args()
     paths = [path for name in given.modules for path in (
         sorted((ROOT / PACKAGE / name).rglob('*.py')) if (ROOT / PACKAGE / name).is_dir()
         else [ROOT / PACKAGE / name])]
     tests = [test for test in sorted((ROOT / 'test').glob('test_*.py'))
-             if test.stem not in given.leave_out]
+             if not _NEEDS.search(test.read_text(encoding='utf-8'))]
     everything = list(mutants(paths))
     sample = random.Random(given.seed).sample(everything, min(given.sample, len(everything)))
-    killed = 0
-    for n, mutant in enumerate(sample, start=1):
-        end = fate(mutant, tests_of(mutant.path, tests), given.seconds, given.deselect)
-        if end != 'survived':  # an endless loop is noticed, too
-            killed += 1
-        if end != 'killed':
-            print(f'{end}: {mutant}', flush=True)
-        if n % 10 == 0:
-            print(f'{killed} of {n} killed', flush=True)
+    modules = {path: modules_of(path, tests) for path in {mutant.path for mutant in sample}}
+    ends: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(len(
+            os.sched_getaffinity(0))) as pool:
+        suites = {compiled: Suite(Path(folder), compiled) for compiled in (False, True)}
+        list(pool.map(lambda compiled: suites[compiled].measure(sorted({
+            name for path, names in modules.items() for name in names
+            if is_compiled(path) == compiled})), suites))
+        fates = pool.map(lambda mutant: fate(mutant, suites[is_compiled(
+            mutant.path)], modules[mutant.path], given.seconds), sample)
+        for mutant, end in zip(sample, fates, strict=True):
+            ends[end] += 1
+            if end != 'killed':
+                print(f'{end}: {mutant}', flush=True)
+            if sum(ends.values()) % 10 == 0:
+                print(dict(ends), flush=True)
+    killed = len(sample) - ends['survived']  # an endless loop is noticed, too
     print(f'{killed} of {len(sample)} mutants killed, {100.0 * killed / len(sample):.1f} %; '
           f'{len(everything)} possible in {len(paths)} modules')
+
+
+def is_compiled(path: Path) -> bool:
+    """Return whether the tests of a module run compiled."""
+    return 'mechanics' not in path.relative_to(ROOT).parts
 
 
 if __name__ == '__main__':

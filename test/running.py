@@ -38,7 +38,7 @@ import struct
 import subprocess
 import sys
 import tempfile
-from threading import Thread
+from threading import Event, Thread
 import time
 from typing import Any, NamedTuple
 from unittest.mock import patch
@@ -55,7 +55,7 @@ from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, SetParameters, SetParametersAtomically)
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
@@ -74,6 +74,7 @@ import yaml
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
+from stewart_dynamics.nodes.rclpy_workarounds import spin
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 NODE = '/stewart_dynamics'
@@ -102,11 +103,8 @@ SERVICES: dict[str, Any] = {
 SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
 # What a program may print on stderr: lines of ROS's log. Fast DDS reports there what other
-# programs, killed ones, have left in shared memory; and rcl where a signal, which ends ROS from a
-# thread of its own, falls between a line on stderr and the same line on /rosout.
-LOG_LINE = re.compile(
-    r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RTPS_|'
-    r"Failed to publish log message to rosout: publisher's context is invalid")
+# programs, killed ones, have left in shared memory.
+LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RTPS_')
 
 _DOMAINS = range(1, 101)
 _LOCKS: dict[int, int] = {}  # file descriptors
@@ -294,18 +292,14 @@ class Inside:
                     raise
             self._executor = EventsExecutor()
             self._executor.add_node(node)
-            self._thread = Thread(target=self._spin)
-            for end in (gc.unfreeze, node.destroy_node, self._executor.shutdown,
-                        self._thread.join, rclpy.try_shutdown):  # the last one first
-                stack.callback(end)
+            stop = Event()
+            self._thread = Thread(target=spin, args=(
+                self._executor, node, done or Future(), stop.is_set))
+            for end in (rclpy.try_shutdown, gc.unfreeze, node.destroy_node,
+                        self._executor.shutdown, self._thread.join, stop.set):
+                stack.callback(end)  # the last one first
             self._thread.start()
             self._stack = stack.pop_all()
-
-    def _spin(self) -> None:
-        # Bounded waits, and an end by ROS's own: as the executables have it.
-        with suppress(ExternalShutdownException):
-            while rclpy.ok():
-                self._executor.spin_until_future_complete(Future(), 10.0)
 
     @property
     def stderr(self) -> str:

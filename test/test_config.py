@@ -240,8 +240,18 @@ def test_commands_in_the_comments_fit_the_file(path: Any) -> None:
     text = path.read_text(encoding='utf-8')
     assert f'spawner joint_state_broadcaster {name} ' in text
     assert f'--param-file {path.name}' in text
+    # The spawner is fatal where the manager does not know the types.
+    assert f'ros2_control_node --ros-args --params-file {path.name}\n' in text
     topic = 'commands' if types[name].startswith('effort_') else 'joint_trajectory'
     assert f":=/{name}/{topic}'" in text
+
+
+def test_pages_send_forces_to_the_controller_of_the_file() -> None:
+    file, = (path for path in CONTROLLERS if path.name == 'effort.yaml')
+    name, = sections(file)[1]
+    for page in ('README.md', 'docs/node.md', 'docs/from_cad_to_controller.md'):
+        text = (ROOT / page).read_text(encoding='utf-8')
+        assert set(re.findall("-r '~/leg_forces:=(.*)'", text)) == {f'/{name}/commands'}, page
 
 
 def test_there_is_a_controller_of_each_kind() -> None:

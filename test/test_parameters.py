@@ -625,6 +625,11 @@ def test_parameters_are_taken_from_numpy_and_from_parameters() -> None:
     assert Parameters(dict(parameters)) == parameters
     joints = list(parameters['geometry.base_joints'].ravel())
     assert parameters.replaced({'geometry.base_joints': joints}) == parameters
+    rows = parameters['geometry.base_joints'].tolist()
+    for same in (rows, [tuple(row) for row in rows], [np.array(row) for row in rows]):
+        assert parameters.replaced({'geometry.base_joints': same}) == parameters
+    with pytest.raises(ParameterError, match='must have 18 entries, has 17'):
+        parameters.replaced({'geometry.base_joints': [*rows[:5], rows[5][:2]]})
     assert parameters != 1
 
 

@@ -62,6 +62,7 @@ HEXAPODS = {
         ring(1.65, 10.5), np.roll(ring(1.6, 3.6, 60.0), 1, axis=0), 4000.0, 9000.0,
         platform__center_of_mass=[0.1, 0.0, 1.2], limits__length_min=2.08,
         limits__length_max=3.33, limits__velocity_max=1.0, geometry__zero_length=2.08,
+        actuator__reflected_mass=0.0,  # hydraulic
         legs__cylinder__mass=120.0, legs__cylinder__center_of_mass=0.8,
         legs__cylinder__inertia=40.0, legs__piston__mass=40.0,
         legs__piston__center_of_mass=0.6, legs__piston__inertia=10.0),
@@ -87,7 +88,7 @@ HEXAPODS = {
     # a cabin on six cables from towers on a circle of 300 m, which meet it in pairs
     'cable robot': hexapod(
         ring(300.0, 30.0), np.roll(ring(6.5, 2.0, 60.0), 1, axis=0), 30000.0, 3e5,
-        gravity=[0.0, 0.0, -9.8], limits__velocity_max=0.6),
+        gravity=[0.0, 0.0, -9.8], limits__velocity_max=0.6, actuator__reflected_mass=2e4),
     # its axis along x
     'horizontal': hexapod(
         ring(1.0, 10.0)[:, [2, 0, 1]], np.roll(ring(0.7, 10.0, 60.0), 1, axis=0)[:, [2, 0, 1]],
@@ -186,6 +187,45 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         'gravity: 9806.65 m/s^2: four times that of Jupiter: in mm/s^2?']),
     'gravity in g': ({'gravity': [0.0, 0.0, -1.0]}, ['gravity: 1 m/s^2: in g?']),
     'a rate in mm/s': ({'limits.velocity_max': 500.0}, ['limits.velocity_max: 500 m/s: in mm/s?']),
+    'a mass in g': ({'platform.mass': 150e3, 'limits.force_max': ()}, [
+        'platform.mass: 150000 kg, with platform.inertia a radius of gyration of 0.0121 m, but '
+        'the platform joints are 0.6 m from their center: in g, or the joints in cm?']),
+    'a cylinder in g': ({'legs.cylinder.mass': 12e3}, [
+        'legs.cylinder.mass: 12000 kg, with legs.cylinder.inertia a radius of gyration of '
+        '0.00736 m, but the longest leg is 1.65 m: in g?']),
+    'one piston in g': ({'legs.piston.mass': [6.0, 6.0, 6.0, 6e3, 6.0, 6.0]}, [
+        'legs.piston.mass: 6000 kg, with']),
+    'no reflected mass': ({'actuator.reflected_mass': None}, [
+        'actuator.reflected_mass: missing, but limits.velocity_max is given: it is '
+        'J (2 pi / lead)^2 of rotor and screw; write 0.0 for a drive that has none']),
+    'no reflected mass, friction alone': (
+        {'actuator.reflected_mass': None, 'actuator.viscous_friction': None,
+         'limits.force_max': None, 'limits.velocity_max': None}, [
+            'actuator.reflected_mass: missing, but actuator.coulomb_friction is given']),
+    'the inertia of the rotor in kg m^2': ({'actuator.reflected_mass': 4.2e-4}, [
+        'actuator.reflected_mass: 0.00042 kg, but each leg carries 31 kg: the inertia of the '
+        'rotor? It is J (2 pi / lead)^2']),
+    'the inertia of the rotor in kg cm^2': ({'actuator.reflected_mass': 4.2}, [
+        'actuator.reflected_mass: 4.2 kg: limits.force_max alone would accelerate it by 1.43e+03 '
+        'm/s^2, more than any motor: the inertia of the rotor in kg cm^2? It is '
+        'J (2 pi / lead)^2 in kg']),
+    'the same without a limit of the rate': (
+        {'actuator.reflected_mass': 0.76, 'limits.velocity_max': ()}, [
+            'actuator.reflected_mass: 0.76 kg: limits.force_max alone']),
+    'strokes in place of lengths': ({'limits.length_min': 0.0, 'limits.length_max': 0.7}, [
+        'limits.length_min: [0] m, limits.length_max: [0.7] m: strokes? They are lengths from '
+        'joint to joint']),
+    'a stroke in place of the longest length': (
+        {'limits.length_min': (), 'limits.length_max': 0.7}, [
+            'limits.length_max: [0.7] m, less than geometry.zero_length, [0.95] m: a stroke?']),
+    'platform joints that begin with the leg after the next': (
+        {'geometry.platform_joints': np.roll(TOP, 2, axis=0)}, [
+            'geometry.platform_joints: at home (the axes parallel, a mean leg of 1.3 m) the legs '
+            'are shorter with the platform joints in the order [3, 4, 5, 6, 1, 2]: are the '
+            'joints in another order?']),
+    'two platform joints exchanged, no limits': (
+        {'geometry.platform_joints': TOP[[0, 2, 1, 3, 4, 5]], **NO_LIMITS}, [
+            'in the order [1, 3, 2, 4, 5, 6]']),
     'similar hexagons': ({'geometry.platform_joints': 0.65 * BASE}, [
         'geometry: singular at every pose of 150 tried: the condition number is at least ']),
     'similar hexagons, rounded': ({'geometry.platform_joints': np.round(0.65 * BASE, 3)}, [
@@ -218,10 +258,33 @@ def test_a_mistake_is_reported(name: str) -> None:
 def test_one_mistake_is_reported_once() -> None:
     several = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
                'the base joints in mm', 'the platform joints in cm and limits', 'limits in mm'}
+    assert several <= set(SLIPS)
     for name in set(SLIPS) - several:
         changes = {key: np.ravel(value) if np.ndim(value) else value
                    for key, value in SLIPS[name][0].items()}
         assert len(likely_mistakes(PLATFORM.replaced(changes))) == 1, name
+
+
+@pytest.mark.parametrize('spread', [8.0, 12.0, 20.0, 25.0])
+@pytest.mark.parametrize('by', [1, 2, 3, 4, 5])
+def test_platform_joints_that_begin_with_another_leg_are_reported(
+        by: int, spread: float) -> None:
+    platform = np.roll(ring(0.6, spread, 60.0), 1, axis=0)
+    right = hexapod(ring(0.9, 12.0), platform, 150.0, 20.0, geometry__zero_length=1.2)
+    assert likely_mistakes(Parameters(right)) == ()
+    (mistake,) = likely_mistakes(Parameters(
+        {**right, 'geometry.platform_joints': np.roll(platform, by, axis=0).ravel()}))
+    assert mistake.endswith('the joints in another order?')
+
+
+def test_drives_without_reflected_mass_and_slow_ones_are_no_mistakes() -> None:
+    for change in ({'actuator.reflected_mass': 0.0},  # hydraulic
+                   # a positioner of 0.5 mm/s, a screw of 1 mm
+                   {'actuator.reflected_mass': 39.0, 'limits.velocity_max': 5e-4},
+                   {'actuator.reflected_mass': None, 'limits.velocity_max': None,
+                    'limits.force_max': None, 'actuator.viscous_friction': None,
+                    'actuator.coulomb_friction': None}):
+        assert likely_mistakes(PLATFORM.replaced(change)) == ()
 
 
 def test_the_figure_at_home_is_that_of_the_runtime_path() -> None:

@@ -140,7 +140,9 @@ def write_measured(given: Given, path: Path) -> None:
             comparison.add_setpoints(given.seconds, given.setpoints, given.outputs),
             comparison.finish()):
         report.add_measured(*compared)
-    report.write(path, given.summary(measured=comparison.values()))
+    values = comparison.values()
+    report.write(path, given.summary(measured={
+        'headline': measured_headline(values), **values}))
 
 
 def data_text(path: Path) -> str:

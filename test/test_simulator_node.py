@@ -433,8 +433,11 @@ def test_what_cannot_be_computed_holds_it_at_rest(
     assert len(simulator.said('ERROR', '')) == 1
 
 
+TOO_STIFF = 'actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0'
+
+
 def test_a_hexapod_too_stiff_for_real_time_skips_time(begin: Start) -> None:
-    simulator = begin('actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0')
+    simulator = begin(*TOO_STIFF)
     simulator.command(holding())
     simulator.until_said('WARN', 'fell behind by')
     # Its stamps go on with the clock, with periods left out.
@@ -462,11 +465,14 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
 
 
 def test_a_signal_ends_it(start: Start) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        for overrides in ((), (STEPPED,)):
-            simulator = start(*overrides)
-            simulator.until_there()
-            simulator.stop(number)
+    for number, overrides in (
+            (signal.SIGINT, ()), (signal.SIGTERM, (STEPPED,)), (signal.SIGINT, TOO_STIFF)):
+        simulator = start(*overrides)
+        simulator.until_there()
+        simulator.command(holding())
+        if overrides == TOO_STIFF:
+            simulator.until_said('WARN', 'fell behind by')
+        simulator.stop(number)
 
 
 CANNOT = [

@@ -32,8 +32,8 @@ from referees import (
     ROOT, rotation_about, symmetric_parameters)
 
 from stewart_dynamics import (
-    ForceBreakdown, Motion, MotionError, ParameterError, Parameters, Pose, SingularityError,
-    StewartError, StewartPlatform)
+    check_planned_trajectory, ForceBreakdown, Motion, MotionError, ParameterError, Parameters,
+    Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 
@@ -87,6 +87,12 @@ def test_other_types_are_rejected(platform: StewartPlatform, given: Any) -> None
             call(given)
     with pytest.raises(StewartError, match='must be Parameters; StewartPlatform.from_yaml'):
         StewartPlatform(given)
+
+
+@pytest.mark.parametrize('given', [None, {}, EXAMPLE, 'config/platform.yaml'])
+def test_other_types_in_place_of_a_platform_are_rejected(given: Any) -> None:
+    with pytest.raises(MotionError, match='^platform: .*: must be a StewartPlatform'):
+        check_planned_trajectory(given, [0.0, 1.0], Motion([[0.0, 0.0, 1.1]] * 2, np.eye(3)))
 
 
 def test_the_error_about_a_pose_in_place_of_a_motion_says_how_to_make_one(

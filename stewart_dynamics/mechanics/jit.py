@@ -57,6 +57,8 @@ except ImportError:
     compiled = inlined
     entry_point = _quiet
 else:
+    from stewart_dynamics.mechanics.kept_code import CheckedCache, NOT_KEPT
+
     COMPILED = not getattr(numba.config, 'DISABLE_JIT', 0)
     if not COMPILED:
         HINT = f'NUMBA_DISABLE_JIT is set: {_UNCOMPILED}'
@@ -76,18 +78,13 @@ else:
         global HINT
         if not COMPILED:
             return _quiet(function)
-        kept = numba.njit(error_model='numpy', nogil=True, cache=True)
+        dispatcher: Any = compiled(function)
         try:
-            dispatcher: Any = kept(function)
-        except RuntimeError:  # no folder that numba may write to
-            HINT = ('the compiled dynamics cannot be kept on disk: every start takes seconds; '
-                    'let NUMBA_CACHE_DIR name a folder that can be written to')
-            return compiled(function)
-        # numba takes kept code as valid while the file of the entry point is unchanged, even if
-        # the files of the functions that it calls have changed.
-        index = dispatcher._cache._cache_file
-        index._source_stamp = index._source_stamp, _MECHANICS
+            dispatcher._cache = CheckedCache(function, _SOURCES)
+        except RuntimeError:
+            HINT = NOT_KEPT.format(reason='')
         return cast('Function', dispatcher)
 
-    _MECHANICS = hashlib.sha256(b''.join(
+    # Functions of this folder are compiled into the entry points of all others.
+    _SOURCES = hashlib.sha256(b''.join(
         path.read_bytes() for path in sorted(Path(__file__).parent.glob('*.py')))).hexdigest()

@@ -23,6 +23,7 @@ telescope on cables of 300 m; a value outside is a warning, not an error.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import permutations
 import math
 
 import numpy as np
@@ -48,8 +49,28 @@ _THINNEST = 0.01  # [kg/m^3]
 # With kg cm^2 for kg m^2 it is 100 times as large, with kg mm^2 1000 times, g mm^2 3e4 times.
 _LARGEST_GYRATION = 30.0
 _SMALLEST_GYRATION = 1.0 / 200.0
+# With a mass in g it is 1/32 as large.
+_SMALLEST_GYRATION_OF_A_MASS = 0.03
 # The same of a leg's part divided by the longest leg: 0.3 for a rod as long as the leg.
 _LARGEST_LEG_GYRATION = 3.0
+_SMALLEST_LEG_GYRATION = 0.01
+
+# The reflected mass of a rotor and screw is 10 to 200 % of the mass that a leg carries. The number
+# of their inertia in kg m^2 is 1e4 to 1e6 times smaller, in kg cm^2 10 to 100 times.
+_SMALLEST_REFLECTED_MASS = 1e-3
+# No electric motor reaches its speed within a millisecond under its peak torque (the mechanical
+# time constants of those with ironless rotors are 1 to 5 ms), and no screw drive 30 g.
+_SHORTEST_START = 1e-3  # [s]
+_LARGEST_ACCELERATION = 300.0  # [m/s^2]
+# Data of an actuator; where they are given its inertia is known.
+_OF_AN_ACTUATOR = ('limits.velocity_max', 'limits.force_max', 'actuator.viscous_friction',
+                   'actuator.coulomb_friction')
+
+# The shortest leg divided by the longest: 0.5 to 1, with telescopic actuators 0.2; 0 for strokes.
+_SMALLEST_LENGTH_RATIO = 0.05
+# Sum of the squares of the legs' horizontal parts in the best order, divided by the one given:
+# 1 for hexapods, 0.5 to 0.8 where the platform joints begin with another leg.
+_OTHER_ORDER = 0.9
 
 # Violation of the triangle inequality by principal moments rounded to two or three digits.
 _ROUNDING = 0.02
@@ -79,10 +100,12 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
         found = [*_sizes(parameters, shape), *_inertia(parameters, shape),
-                 *_others(parameters, shape)]
+                 *_reflected_mass(parameters), *_others(parameters, shape)]
         if geometry:
             reach = reach_of(parameters, shape)
-            found += [*_legs(parameters, shape, reach), *_singular(parameters, shape, reach)]
+            found += [*_legs(parameters, shape, reach),
+                      *(tuple(_singular(parameters, shape, reach))
+                        or _order(parameters, shape, reach))]
     return tuple(found)
 
 
@@ -115,6 +138,9 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
     if gyration < _SMALLEST_GYRATION * shape.platform_radius:
         yield (f'platform.inertia: {moments[2]:.3g} kg m^2 at most, a radius of gyration of '
                f'{gyration:.3g} m, but {size}: scaled twice, or the joints in mm?')
+    elif gyration < _SMALLEST_GYRATION_OF_A_MASS * shape.platform_radius:
+        yield (f'platform.mass: {p["platform.mass"]:.6g} kg, with platform.inertia a radius of '
+               f'gyration of {gyration:.3g} m, but {size}: in g, or the joints in cm?')
     if moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
         yield (f'platform.inertia: principal moments {_listed(moments)} kg m^2: no body has one '
                'larger than the sum of the other two: is the order ixx ixy ixz iyy iyz izz?')
@@ -123,6 +149,32 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
     if away > _FARTHEST_CENTER * shape.radius:
         yield (f'platform.center_of_mass: {_listed(p["platform.center_of_mass"])} m is '
                f'{away:.3g} m from the middle of the platform joints, but {size}: in mm?')
+
+
+def _reflected_mass(p: Parameters) -> Iterator[str]:
+    name = 'actuator.reflected_mass'
+    if name not in p.given:
+        given = [each for each in _OF_AN_ACTUATOR if each in p.given]
+        if given:
+            yield (f'{name}: missing, but {given[0]} is given: it is J (2 pi / lead)^2 of '
+                   'rotor and screw; write 0.0 for a drive that has none')
+        return
+    carried = (p['platform.mass'] + np.sum(p['legs.piston.mass'])) / 6.0
+    least = float(np.min(p[name]))
+    if 0.0 < least < _SMALLEST_REFLECTED_MASS * carried:
+        yield (f'{name}: {least:.3g} kg, but each leg carries {carried:.3g} kg: the inertia of '
+               'the rotor? It is J (2 pi / lead)^2')
+        return
+    force, rate = p['limits.force_max'], p['limits.velocity_max']
+    if least == 0.0 or force is None:
+        return
+    acceleration = force / p[name]
+    at = int(np.argmax(acceleration))
+    start = 0.0 if rate is None else rate[at] / acceleration[at]
+    if acceleration[at] > _LARGEST_ACCELERATION and start < _SHORTEST_START:
+        yield (f'{name}: {p[name][at]:.3g} kg: limits.force_max alone would accelerate it by '
+               f'{acceleration[at]:.3g} m/s^2, more than any motor: the inertia of the rotor in '
+               'kg cm^2? It is J (2 pi / lead)^2 in kg')
 
 
 def _others(p: Parameters, shape: Shape) -> Iterator[str]:
@@ -141,6 +193,11 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
 
 
 def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+    low, high = p['limits.length_min'], p['limits.length_max']
+    if low is not None and high is not None and np.any(low < _SMALLEST_LENGTH_RATIO * high):
+        yield (f'limits.length_min: {_listed(np.unique(low))} m, limits.length_max: '
+               f'{_listed(np.unique(high))} m: strokes? They are lengths from joint to joint')
+        return  # the limits are used below
     if reach.yaw is None:
         limits = ' and '.join(f'{name}: {_listed(np.unique(p[name]))} m' for name in (
             'limits.length_min', 'limits.length_max') if p[name] is not None)
@@ -148,6 +205,12 @@ def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
                f'{shape.base_radius:.3g} m from their center, the platform joints '
                f'{shape.platform_radius:.3g} m: different units?')
         return  # any of them may be wrong, so that the other checks would report it again
+    if high is not None and np.any(p['geometry.zero_length'] > high) and not is_too_long(
+            p, 'geometry.zero_length', shape):
+        yield (f'limits.length_max: {_listed(np.unique(high))} m, less than geometry.zero_length, '
+               f'{_listed(np.unique(p["geometry.zero_length"]))} m: a stroke? It is the length '
+               'from joint to joint')
+        return
     longest = reach.longest
     for part, joint in (('cylinder', 'base'), ('piston', 'platform')):
         name = f'legs.{part}.center_of_mass'
@@ -164,6 +227,26 @@ def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
             yield (f'legs.{part}.inertia: {p[f"legs.{part}.inertia"][at]:.3g} kg m^2, a radius '
                    f'of gyration of {gyration[at]:.3g} m, but no leg is over {longest:.3g} m: '
                    'in g mm^2 or kg mm^2?')
+        gyration[gyration == 0.0] = np.inf
+        at = int(np.argmin(gyration))
+        if gyration[at] < _SMALLEST_LEG_GYRATION * longest:
+            yield (f'legs.{part}.mass: {masses[at]:.6g} kg, with legs.{part}.inertia a radius of '
+                   f'gyration of {gyration[at]:.3g} m, but the longest leg is {longest:.3g} m: '
+                   'in g?')
+
+
+def _order(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+    """Yield that other pairs of joints give shorter legs at home, as in all hexapods known."""
+    home = home_of(p, shape, reach)
+    turned = shape.platform @ turns_about(2, np.array([home.yaw]))[0].T
+    squares = ((shape.base[:, None, :2] - turned[:, :2]) ** 2).sum(axis=-1)
+    orders = np.array(list(permutations(range(6))))
+    sums = squares[np.arange(6), orders].sum(axis=1)
+    best = int(np.argmin(sums))
+    if sums[best] < _OTHER_ORDER * np.trace(squares):
+        yield (f'geometry.platform_joints: at home ({home.text}) the legs are shorter with the '
+               f'platform joints in the order {(orders[best] + 1).tolist()}: are the joints in '
+               'another order?')
 
 
 def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:

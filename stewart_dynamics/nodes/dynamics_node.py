@@ -24,7 +24,6 @@ from typing import Any, NamedTuple
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.logging import get_logger
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.arrays import NO_WRENCH
@@ -37,10 +36,11 @@ from stewart_dynamics.nodes.diagnostics_publisher import DiagnosticsPublisher
 from stewart_dynamics.nodes.markers_publisher import MarkersPublisher
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.nodes.rclpy_workarounds import (
-    answer_impossible_transitions, set_parameters_together, take_waiting_messages, until_shutdown)
+    answer_impossible_transitions, set_parameters_together, take_waiting_messages)
 from stewart_dynamics.nodes.repeated_log import RepeatedLog
 from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
+from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics
 from stewart_dynamics.parameter_files import is_of_ros
 from stewart_dynamics.parameters import Parameters
@@ -95,12 +95,11 @@ class DynamicsNode(LifecycleNode):
         self._topics = Topics(self)
         # A steady clock: ROS time may stand still or jump.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        timer = self.create_timer(
-            PAUSE, until_shutdown(self, lambda: self._planned.tick()), clock=steady)
+        timer = self.create_timer(PAUSE, lambda: self._planned.tick(), clock=steady)
         timer.cancel()
         self._planned = PlannedTrajectoryQueue(timer.reset, timer.cancel, self._on_outcome)
         self.add_on_set_parameters_callback(self._on_set_parameters)
-        self.create_timer(TICK, until_shutdown(self, self._on_tick), clock=steady)
+        self.create_timer(TICK, self._on_tick, clock=steady)
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
         set_parameters_together(self)
@@ -163,15 +162,14 @@ class DynamicsNode(LifecycleNode):
 
     def destroy_node(self) -> None:
         """Log the last line of each series, and end."""
-        # The node's own logger warns that /rosout does not exist after a signal has ended ROS.
-        self._log.logger = get_logger(f'{self.get_name()}.last')
         self._log.write_last()
         super().destroy_node()
 
     def _configure(self) -> None:
         begun = time.monotonic()
         self._models = _Models.of(self._settings)
-        self._models.compile_ahead()
+        with SIGNALS.interrupting():
+            self._models.compile_ahead()
         how = 'compiled ' if jit.COMPILED else ''
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
         for mistake in likely_mistakes(self._settings):
@@ -182,7 +180,6 @@ class DynamicsNode(LifecycleNode):
             planned.INPUT: self._on_trajectory})
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
         self._exclusive = self._settings['setpoint.exclusive']
-        self._answer_task = until_shutdown(self, self._answer)
         self._configured = True
         # These objects stay: the collector would go through all of them again and again, for
         # 50 ms and more, while a setpoint waits.
@@ -233,7 +230,7 @@ class DynamicsNode(LifecycleNode):
     def _on_answered(self) -> None:
         self._markers.publish_due(time.monotonic())
         executor: Any = self.executor
-        executor.create_task(self._answer_task)
+        executor.create_task(self._answer)
 
     # -- wrench, measured legs, planned trajectories ----------------------------------------
 

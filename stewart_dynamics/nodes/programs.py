@@ -22,29 +22,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
-import signal
 import sys
+from typing import Any, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.parameter_set import Parameter, ParameterSet
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.nodes.signals import SIGNALS
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameter_set import Parameter, ParameterSet
 
 
 def dynamics() -> int:
     """Run the node stewart_dynamics; return its exit code."""
-    return _run(Parameters, 'dynamics_node')
+    return _run('parameters', 'Parameters', 'dynamics_node')
 
 
 def simulator() -> int:
     """Run the node stewart_simulator; return its exit code."""
-    return _run(SimulatorParameters, 'simulator_node')
+    return _run('runtime.simulator_parameters', 'SimulatorParameters', 'simulator_node')
 
 
 def trajectory() -> int:
     """Run the node stewart_trajectory; return its exit code."""
-    return _run(ReferenceMotionParameters, 'trajectory_node')
+    return _run('mechanics.reference_motion_parameters', 'ReferenceMotionParameters',
+                'trajectory_node')
 
 
 def parameter_files(arguments: Sequence[str]) -> list[str]:
@@ -71,18 +72,17 @@ def _described(parameter: Parameter) -> str:
     return f'  {parameter.name} ({", ".join(filter(None, notes))}): {parameter.text}'
 
 
-def _run(kind: type[ParameterSet], module: str) -> int:
+def _run(module: str, name: str, node: str) -> int:
+    """Run the node of a module, with the parameters of another one; return its exit code."""
+    SIGNALS.watch()  # before anything else is imported
+    kind: type[ParameterSet] = getattr(_imported(module), name)
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(usage(kind))
         return 0
     try:
-        # A signal while the libraries are loaded: the node has its own handlers later.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         for path in parameter_files(sys.argv):
             kind.check_file(path)
-        program = import_module(f'stewart_dynamics.nodes.{module}')
-    except KeyboardInterrupt:
-        return 0
+        program = _imported(f'nodes.{node}')
     except ParameterError as exc:
         print(f'{kind.node}: {exc}', file=sys.stderr)
         return 1
@@ -93,5 +93,11 @@ def _run(kind: type[ParameterSet], module: str) -> int:
         print(f'{kind.node}: needs ROS 2: {reason}: source its setup file, or pip install '
               '"stewart_dynamics[ros]"', file=sys.stderr)
         return 1
+    if SIGNALS.received:
+        return 0
     code: int = program.main()
     return code
+
+
+def _imported(module: str) -> Any:
+    return import_module(f'stewart_dynamics.{module}')

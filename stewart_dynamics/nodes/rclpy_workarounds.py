@@ -29,6 +29,7 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
@@ -41,7 +42,7 @@ from rclpy.time_source import TimeSource
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters_yaml import read_value
 
-_SPIN_SECONDS = 10.0
+_PIECE, _LOOK = 10.0, 0.1  # [s]
 _NANOSECONDS = 1_000_000_000
 
 _NUMBERS = (
@@ -173,24 +174,6 @@ def describe_by(
             service.callback = answer
 
 
-def until_shutdown(node: Node, callback: Callable[..., None]) -> Callable[..., None]:
-    """
-    Return a callback that ends without an error where ROS is shut down while it runs.
-
-    A signal shuts ROS down from another thread while a callback runs, and whatever the callback
-    then calls of ROS raises RCLError (https://github.com/ros2/rclpy/issues/1287, and its effect:
-    https://github.com/ros-visualization/interactive_markers/issues/88).
-    """
-    def guarded(*arguments: Any) -> None:
-        try:
-            callback(*arguments)
-        except RCLError:
-            if node.context.ok():
-                raise
-
-    return guarded
-
-
 def take_waiting_messages(
         executor: Executor | None, subscriptions: Mapping[str, Any],
         take: Callable[[str, bytes], None], most: int) -> None:
@@ -272,16 +255,22 @@ def make_executor() -> Executor:
     return EventsExecutor()
 
 
-def spin(executor: Executor, stop: Future, stopped: Callable[[], bool]) -> None:
+def spin(executor: Executor, node: Node, stop: Future, stopped: Callable[[], bool]) -> None:
     """
-    Spin until a future is done, ROS is shut down or ``stopped`` is true.
+    Spin until a future is done; a timer of the node sets it to 0 once ``stopped`` is true.
 
-    In pieces of 10 s: without a timeout, rclpy's wait takes half a core and may not return
-    (no upstream issue; similar: https://github.com/ros2/rclpy/issues/1223). And a signal whose
-    KeyboardInterrupt was swallowed while the node was made is noticed then, by ``stopped``.
+    In pieces of 10 s: without a timeout, rclpy's wait takes half a core and may not return (no
+    upstream issue; similar: https://github.com/ros2/rclpy/issues/1223). A timeout alone would not
+    do: while another timer is always due, as in a simulator that is too slow for real time, the
+    events executor does not return, but still serves all timers.
     """
-    while rclpy.ok() and not stop.done() and not stopped():
-        executor.spin_until_future_complete(stop, _SPIN_SECONDS)
+    def look() -> None:
+        if stopped() and not stop.done():
+            stop.set_result(0)
+
+    node.create_timer(_LOOK, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    while not stop.done():
+        executor.spin_until_future_complete(stop, _PIECE)
 
 
 def shut_down(executor: Executor | None, node: Node | None) -> None:
@@ -298,5 +287,4 @@ def shut_down(executor: Executor | None, node: Node | None) -> None:
     if node is not None:
         node.destroy_node()
     gc.unfreeze()
-    with suppress(RCLError):  # a signal's own shutdown may come between check and call
-        rclpy.try_shutdown()
+    rclpy.try_shutdown()

@@ -32,12 +32,12 @@ class RepeatedLog:
     Parameters
     ----------
     logger : rclpy logger
-        It may be replaced at any time: ``logger``.
+        It writes the lines.
 
     """
 
     def __init__(self, logger: Any) -> None:
-        self.logger = logger
+        self._logger = logger
         self._series = {level: Series() for level in (OK, WARN, ERROR)}
 
     def write(self, lines: Iterable[LogLine]) -> None:
@@ -57,8 +57,8 @@ class RepeatedLog:
     def _write(self, level: int, text: str) -> None:
         # Each level its own call: rclpy takes a call's level for constant.
         if level == OK:
-            self.logger.info(text)
+            self._logger.info(text)
         elif level == WARN:
-            self.logger.warning(text)
+            self._logger.warning(text)
         else:
-            self.logger.error(text)
+            self._logger.error(text)

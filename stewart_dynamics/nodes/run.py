@@ -19,19 +19,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 import math
-import signal
 import sys
 from typing import Any, TypeVar
+import warnings
 
 from rcl_interfaces.msg import (
     FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult)
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
-from rclpy.exceptions import NameValidationException, ROSInterruptException
-from rclpy.executors import ExternalShutdownException
+from rclpy.exceptions import NameValidationException
 from rclpy.lifecycle import LifecycleNode
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
@@ -41,6 +42,7 @@ from stewart_dynamics.nodes.rclpy_workarounds import (
     describe_by, is_present, make_executor, reject_impossible_times, set_parameters_together,
     shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries
+from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.parameter_files import is_of_ros, other_nodes, parameters_of
 from stewart_dynamics.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters_yaml import read_document, read_value
@@ -180,21 +182,8 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         When it is done, its result is the exit code.
 
     """
-    stop = done or Future()
+    SIGNALS.watch()
     executor = node = None
-    starting = True
-    signals: list[int] = []
-
-    def on_signal(number: int, frame: Any) -> None:
-        # rclpy's handlers, which init sets, shut ROS down before they call this one, and that
-        # ends the spinning. An exception would be raised in whatever callback runs, and logged as
-        # an error of it.
-        signals.append(number)
-        if starting:
-            raise KeyboardInterrupt
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
     try:
         if parameter_files(sys.argv) and '--ros-args' not in sys.argv:
             raise ParameterError('--params-file is only read after --ros-args')
@@ -202,26 +191,22 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
             raise ParameterError(f'{stray}: unknown argument; see --help')
         warning = check_environment(sys.argv)
         reject_impossible_times()
-        rclpy.init()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        warnings.showwarning = lambda message, *_: get_logger(kind.node).warning(str(message))
         with without_security_libraries():
             node = make_node()
         if warning:
             node.get_logger().warning(warning)
         executor = make_executor()
         executor.add_node(node)
-        starting = False
-        spin(executor, stop, lambda: bool(signals))
-        return int(stop.result() or 0) if stop.done() else 0
-    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+        stop = done or Future()
+        spin(executor, node, stop, lambda: SIGNALS.received)
+        return int(stop.result())
+    except KeyboardInterrupt:  # of SIGNALS, while it compiled
         return 0
-    except Exception as exc:
-        starting = False
-        if signals and not rclpy.ok():
-            return 0  # a signal has shut ROS down in the middle of a call
-        if not isinstance(exc, _OF_THE_USER):
-            raise
+    except _OF_THE_USER as exc:
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
         return 1
     finally:
-        starting = False
+        SIGNALS.ignore()
         shut_down(executor, node)

@@ -35,8 +35,8 @@ from stewart_dynamics.mechanics import jit as compiled
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
-from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.nodes.simulator_messages import INPUT_TYPES, OUTPUT_TYPES, StateMessages
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
@@ -84,7 +84,8 @@ class SimulatorNode(Node):
         if compiled.HINT:
             self.get_logger().warning(compiled.HINT)
         begun = time.monotonic()
-        self._plant = Plant(self._settings)
+        with SIGNALS.interrupting():
+            self._plant = Plant(self._settings)
         self._state_messages = StateMessages(self._settings)
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
@@ -99,8 +100,8 @@ class SimulatorNode(Node):
                          for topic, kind in OUTPUT_TYPES.items()}
         for topic, take in (('commands', self._on_commands),
                             ('wrench', self._wrench_input.take)):
-            self.create_subscription(_TYPES[INPUT_TYPES[topic]], f'~/{topic}',
-                                     until_shutdown(self, take), qos, raw=True)
+            self.create_subscription(
+                _TYPES[INPUT_TYPES[topic]], f'~/{topic}', take, qos, raw=True)
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
@@ -118,9 +119,9 @@ class SimulatorNode(Node):
         gc.freeze()
 
     def _timer(self, seconds: float, callback: Any) -> Any:
-        # A steady clock: ROS time stands still until it is advanced here, or jumps.
-        return self.create_timer(seconds, until_shutdown(self, callback),
-                                 clock=RosClock(clock_type=ClockType.STEADY_TIME))
+        # ROS time stands still until it is advanced here, or jumps.
+        steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        return self.create_timer(seconds, callback, clock=steady)
 
     def _on_commands(self, data: bytes) -> None:
         try:

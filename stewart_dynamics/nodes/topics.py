@@ -33,7 +33,6 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH
-from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
@@ -144,8 +143,8 @@ class Topics:
     def _subscribe(self, kind: Any, topic: str, callback: Callable[[bytes], None],
                    depth: int = QUEUE) -> Any:
         subscription = self._node.create_subscription(
-            kind, f'~/{topic}', until_shutdown(self._node, callback), QoSProfile(depth=depth),
-            raw=True, qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            kind, f'~/{topic}', callback, QoSProfile(depth=depth), raw=True,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=partial(self._on_incompatible_qos, topic)))
         self._destroy.append(partial(self._node.destroy_subscription, subscription))

@@ -35,7 +35,6 @@ from stewart_dynamics.mechanics.reference_motion import motion_at, sample_count,
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.nodes.rclpy_workarounds import until_shutdown
 from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.runtime import input_topics as inputs
 
@@ -89,14 +88,14 @@ class TrajectoryNode(Node):
         self._begun = self._subscribed = False
         self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * 1e9)
         self._timer = self.create_timer(
-            1.0 / self._settings['rate'], until_shutdown(self, self._on_timer),
+            1.0 / self._settings['rate'], self._on_timer,
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._simulated = self.get_parameter('use_sim_time').value
         if self._simulated:
             self._jumps = self.get_clock().create_jump_callback(
                 JumpThreshold(min_forward=Duration(nanoseconds=1),
                               min_backward=Duration(nanoseconds=-1), on_clock_change=False),
-                post_callback=until_shutdown(self, self._on_clock))
+                post_callback=self._on_clock)
         motion, rate = self._settings['motion.type'], self._settings['rate']
         self.get_logger().info(
             f'{motion} motion at {rate:g} Hz to {target}' + (

@@ -147,6 +147,8 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
         Shapes do not fit, numbers are not finite or times not strictly increasing.
 
     """
+    if not isinstance(platform, StewartPlatform):
+        raise wrong_type('platform', platform, 'a StewartPlatform')
     if not isinstance(motion, Motion):
         raise wrong_type('motion', motion, 'a Motion')
     if len(motion.shape) != 1 or not motion.shape[0]:
