@@ -37,12 +37,7 @@ from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
-<<<<<<< HEAD
-from stewart_dynamics.replay.fingerprint import (
-    fingerprint, plain_parameters, software, VERSION)
-=======
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
->>>>>>> main
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable, Table
 from stewart_dynamics.replay.options import code_of, Options
 from stewart_dynamics.replay.output import OutputBag
