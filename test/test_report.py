@@ -229,13 +229,15 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
     plain = trajectory('clear')
     paths = tmp_path / 'hostile.html', tmp_path / 'plain.html'
     bag = '/a/</script><script>window.hacked=1</script>\udcff/<!--=plotly-->'
-    rejected = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2]}]
+    rejected = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2],
+                 'first_at_s': 1.0}]
     given.write(paths[0], bag=bag, notices=[HOSTILE[1]], complete=False, missing=[HOSTILE[0]],
                 rejected=rejected, run='<i>', inputs={
                     'node': '/n', 'topics': {'setpoint/pose': HOSTILE[0]},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
     plain.write(paths[1], bag='/a/b/c', notices=['n'], complete=False, missing=['m'],
-                rejected=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': ''}], run='r',
+                rejected=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': '',
+                           'first_at_s': 1.0}], run='r',
                 inputs={
                     'node': '/n', 'topics': {'setpoint/pose': '/p'},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
@@ -453,7 +455,7 @@ def test_the_slider_moves_platform_colors_and_cursor(opened: Callable[..., Opene
         assert place == pytest.approx(axis[0] + axis[1] * sample / 1000, abs=1.5)
         shown = report.page.locator('.plot:has(#plot_forces) .readout td').all_inner_texts()
         np.testing.assert_allclose(
-            [float(text.replace('−', '-')) for text in shown],
+            [float(text.replace('−', '-').replace('\u202f', '')) for text in shown],
             given.outputs.demanded_forces[sample], rtol=1e-4)
     report.check()
 
