@@ -31,6 +31,8 @@ endif
 unexport PYTHONPATH
 endif
 unexport PYTHONHOME
+# Compiled modules are kept in .cache whatever the shell says: it halves the start of a program.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Programs write here instead of into the home folder.
 CACHE := $(CURDIR)/.cache

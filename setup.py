@@ -104,7 +104,7 @@ setup(
         *[(f'{share}/{bag}', sorted(glob(f'{bag}/*'))) for bag in sorted(glob('bags/*/'))
           if not bag.startswith('bags/__')],
         (f'{share}/config', sorted(glob('config/*.*'))),
-        (f'{share}/config/controllers', sorted(glob('config/controllers/*.yaml'))),
+        (f'{share}/config/controllers', sorted(glob('config/controllers/*.*'))),
         (f'{share}/examples', sorted(glob('examples/*.py'))),
         # Not launch/*: after a launch file was compiled there is a folder __pycache__.
         (f'{share}/launch', sorted(glob('launch/*.launch.py'))),

@@ -28,7 +28,6 @@ import random
 import shutil
 import struct
 import subprocess
-import sys
 import time
 from typing import Any
 
@@ -39,6 +38,7 @@ from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.reference_motion import sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
@@ -129,8 +129,9 @@ def record(name: str) -> None:
     executor = rclpy.executors.SingleThreadedExecutor()
     for node in nodes:
         executor.add_node(node)
-    command = [Path(sys.executable).with_name('stewart_trajectory'), '--ros-args',
-               '--params-file', HERE.parent / 'config' / config, '-p', 'start_timeout:=60.0']
+    command = [executable('stewart_trajectory'), '--ros-args',
+               '--params-file', HERE.parent / 'config' / config, '-p', 'start_timeout:=60.0',
+               '-p', 'motion.hold_at_end:=false']
     if damaged:
         command += ['-p', 'target:=undamaged']
     with subprocess.Popen(command) as trajectory:

@@ -45,10 +45,6 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import (
-    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
-from visualization_msgs.msg import MarkerArray
-
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
@@ -56,6 +52,9 @@ from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
+from visualization_msgs.msg import MarkerArray
 
 PARAMETERS = Path(__file__).resolve().parents[1] / 'config' / 'platform.yaml'
 QOS = QoSProfile(depth=2000)

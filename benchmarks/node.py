@@ -44,6 +44,7 @@ import numpy as np
 from replay import table
 
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.nodes.markers import Markers
@@ -56,7 +57,7 @@ from stewart_dynamics.runtime.step import Setpoint, Step
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
 BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'
 BEGIN_LEGS, END_LEGS = '<!-- measured legs: begin -->', '<!-- measured legs: end -->'
-NODE = str(Path(sys.executable).with_name('stewart_dynamics'))
+NODE = str(executable('stewart_dynamics'))
 
 DOMAIN = '101'  # the tests have those below
 ROUNDS = 6
@@ -184,7 +185,7 @@ class Process:
 
     @property
     def memory(self) -> float:
-        """What it has in memory [kB]."""
+        """Return what it has in memory [kB]."""
         lines = Path(f'/proc/{self.process.pid}/status').read_text().splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith('VmRSS'))
 

@@ -48,6 +48,7 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.plant_dynamics import advance, STATE_TWIST
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.standard import float64_array
@@ -64,7 +65,7 @@ FILES = [HERE.parent / 'config' / name for name in ('platform.yaml', 'simulator.
 GIVEN: dict[str, Any] = {}
 for _file in FILES:
     GIVEN |= read_yaml(_file, 'stewart_simulator')
-SIMULATOR = str(Path(sys.executable).with_name('stewart_simulator'))
+SIMULATOR = str(executable('stewart_simulator'))
 
 ROUNDS = 15
 PERIODS = 2000  # in a turn

@@ -26,7 +26,6 @@ import os
 from pathlib import Path
 import signal
 import subprocess
-import sys
 import time
 from typing import Any
 
@@ -40,13 +39,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
-from tqdm import tqdm
-
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES, LENGTHS, MOTION, RATES, RESULT
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.step import Batch, Outputs
+from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parent.parent
 NODE = '/stewart_dynamics'
@@ -162,10 +161,10 @@ def main() -> None:
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(os.getpid() % 100 + 1))
     parameters = Parameters.from_yaml(options.params)
-    command = [Path(sys.executable).with_name('stewart_dynamics'), '--ros-args',
+    command = [executable('stewart_dynamics'), '--ros-args',
                '--params-file', options.params]
     replay = ' '.join(map(os.path.relpath, (
-        Path(sys.executable).with_name('stewart_replay'), options.bag))) + (
+        executable('stewart_replay'), options.bag))) + (
         f' --params {os.path.relpath(options.params)}')
     rclpy.init()
     with subprocess.Popen(command) as process:

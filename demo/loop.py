@@ -48,16 +48,16 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
-from tqdm import tqdm
-import yaml
-
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
 from stewart_dynamics.parameters import Parameters
+from tqdm import tqdm
+import yaml
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -76,10 +76,10 @@ LOOK = 0.1  # interval between checks of programs and progress [s]
 
 # Started in this order; the last one, which starts the motion, when the others are connected.
 PROGRAMS: dict[str, list[str | Path]] = {
-    'stewart_simulator': [Path(sys.executable).with_name('stewart_simulator')],
-    'stewart_dynamics': [Path(sys.executable).with_name('stewart_dynamics')],
+    'stewart_simulator': [executable('stewart_simulator')],
+    'stewart_dynamics': [executable('stewart_dynamics')],
     'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py'],
-    'stewart_trajectory': [Path(sys.executable).with_name('stewart_trajectory')]}
+    'stewart_trajectory': [executable('stewart_trajectory')]}
 
 UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position': 'um',
          'rotation': 'urad'}
@@ -158,7 +158,7 @@ class Recorder(Node):
 
     @property
     def time(self) -> int:
-        """Simulated time since its start [ns]."""
+        """Return the simulated time since its start [ns]."""
         last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
         return max(last - BEGIN, 0)
 
@@ -201,7 +201,7 @@ class Program:
 
     @property
     def last_line(self) -> str:
-        """The last line that it has printed."""
+        """Return the last line that it has printed."""
         return (self._output.read_text(errors='replace').splitlines() or ['no output'])[-1]
 
     def check(self) -> None:
@@ -247,7 +247,8 @@ class Loop:
     def __init__(self, hexapod: Path, motion: Path, seconds: float, bandwidth: float) -> None:
         parameters = Parameters.from_yaml(hexapod)
         trajectory = {'output': 'combined', 'rate': RATE, 'loop': False,
-                      'motion.duration': seconds, 'base_frame': parameters['base_frame']}
+                      'motion.hold_at_end': False, 'motion.duration': seconds,
+                      'base_frame': parameters['base_frame']}
         settings = ReferenceMotionParameters.from_yaml(motion).replaced(trajectory, str(motion))
         platform = StewartPlatform(parameters)
         self.times = sample_times(settings)

@@ -19,7 +19,8 @@ It is not a part of the package, which computes forces and controls nothing. For
 
     force = k_p (q_d - q) + k_d (v_d - v) + effort_d
 
-with measured length q and rate v, and q_d, v_d, effort_d as published by stewart_dynamics.
+with measured length q and rate v, and q_d, v_d, effort_d as published by stewart_dynamics. When
+these stop, it holds the last q_d at rest, with the forces that carry the weight there.
 """
 
 import math
@@ -37,14 +38,17 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from stewart_dynamics import Motion, StewartError, StewartPlatform
+
 
 class LegController(Node):
     """
     Answers each measured state of the legs with six forces.
 
-    In real time the controller follows the latest desired state, unless it is older than the
-    timeout. With use_sim_time the simulation waits for each command: the controller waits for
-    the desired state of the same stamp, and answers each stamp once.
+    In real time the controller follows the latest desired state that has forces; when none comes
+    for the timeout, it holds the last one. With use_sim_time the simulation waits for each
+    command: the controller waits for the desired state of the same stamp, and answers each stamp
+    once.
     """
 
     def __init__(self) -> None:
@@ -56,7 +60,9 @@ class LegController(Node):
         self.timeout = self.positive('timeout', 0.05, 'oldest desired state to follow [s]')
         self.feed_forward = self.constant('feed_forward', True, 'add the desired effort')
         self.stepped = self.get_parameter('use_sim_time').value
-        self.measured = self.desired = self.answered = None
+        self.platform = self.platform_of(self.constant(
+            'params_file', '', 'of the hexapod, for the forces at rest'))
+        self.measured = self.desired = self.answered = self.held = None
         self.commands = self.create_publisher(
             Float64MultiArray, 'stewart_simulator/commands', 1)
         self.create_subscription(
@@ -76,14 +82,46 @@ class LegController(Node):
             raise ValueError(f'{name}: {value}: must be finite and at least 0')
         return value
 
+    def platform_of(self, file: str) -> StewartPlatform | None:
+        """Return the hexapod of a parameter file, its code compiled; None without a file."""
+        if not file:
+            if not self.stepped:
+                self.get_logger().warning(
+                    'no params_file: when desired states stop, their last forces are held')
+            return None
+        platform = StewartPlatform.from_yaml(file)
+        self.zero_length = platform.parameters['geometry.zero_length']
+        self.guess = platform.home_pose()
+        lengths = platform.inverse_kinematics(self.guess)
+        platform.inverse_dynamics(
+            Motion.from_pose(platform.forward_kinematics(lengths, self.guess)))
+        return platform
+
     def on_measured(self, state: JointState) -> None:
         self.measured = state
         self.command()
 
     def on_desired(self, state: JointState) -> None:
-        self.desired, self.desired_at = state, time.monotonic()
+        if self.feed_forward and len(state.effort) != len(state.name):
+            return self.no_command('no desired effort: forces suppressed or not computable')
+        if self.held:
+            self.get_logger().warning('desired states are back: they are followed')
+        self.desired, self.desired_at, self.held = state, time.monotonic(), None
         if self.stepped:
             self.command()
+
+    def at_rest(self, desired: JointState) -> JointState:
+        """Return a desired state at rest in the position of another one."""
+        effort = desired.effort
+        try:
+            if self.platform:
+                pose = self.platform.forward_kinematics(
+                    np.add(desired.position, self.zero_length), self.guess)
+                effort = self.platform.inverse_dynamics(Motion.from_pose(pose)).forces
+        except StewartError as exc:
+            self.get_logger().error(f'the last forces are held: {exc}')
+        return JointState(name=desired.name, position=desired.position,
+                          velocity=[0.0] * len(desired.name), effort=effort)
 
     def command(self) -> None:
         """Publish the forces for the measured and the desired state, if both are there."""
@@ -97,14 +135,16 @@ class LegController(Node):
                 return
             self.answered = stamp
         elif time.monotonic() - self.desired_at > self.timeout:
-            return self.no_command(f'no desired state for {self.timeout} s')
+            if self.held is None:
+                self.get_logger().error(
+                    f'no desired state for {self.timeout} s: the last position is held')
+                self.held = self.at_rest(desired)
+            desired = self.held
         if measured.name != desired.name:
             return self.no_command(f'{measured.name} measured, {desired.name} desired')
         force = (self.k_p * np.subtract(desired.position, measured.position)
                  + self.k_d * np.subtract(desired.velocity, measured.velocity))
         if self.feed_forward:
-            if len(desired.effort) != len(force):
-                return self.no_command('no desired effort: forces suppressed or not computable')
             force += desired.effort
         if not np.isfinite(force).all():
             return self.no_command(f'the forces are {force}')
@@ -125,7 +165,7 @@ def main() -> None:
         executor.add_node(LegController())
         while not signals:
             executor.spin_once(timeout_sec=0.1)
-    except (InvalidParameterTypeException, ValueError) as exc:
+    except (InvalidParameterTypeException, StewartError, ValueError) as exc:
         sys.exit(f'leg_controller: {exc}')
     finally:
         executor.shutdown()

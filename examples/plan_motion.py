@@ -18,6 +18,8 @@ Example: get the leg trajectory of a planned trajectory from stewart_dynamics. C
 The trajectory leads from pose to pose, at rest at both ends. It is published as a whole on
 stewart_dynamics/platform_trajectory; the answer on stewart_dynamics/leg_trajectory is what a
 joint_trajectory_controller takes. A rejected one has no answer: /diagnostics states the reason.
+Where the node's topics are remapped, remap those of this program, too:
+--ros-args -r stewart_dynamics/leg_trajectory:=/leg_trajectory_controller/joint_trajectory
 Exit code: 0 accepted, 1 not.
 """
 
@@ -34,13 +36,12 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
-from trajectory_msgs.msg import (
-    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
-
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml
 
@@ -81,7 +82,7 @@ class Planner(Node):
         self.answers, self.connected, self.rejected, self.reason = [], False, 0, ''
         self.motions = self.create_publisher(
             MultiDOFJointTrajectory, 'stewart_dynamics/platform_trajectory', 1)
-        self.create_subscription(
+        self.answer = self.create_subscription(
             JointTrajectory, 'stewart_dynamics/leg_trajectory', self.answers.append, 1)
         self.create_subscription(DiagnosticArray, '/diagnostics', self.on_diagnostics, 10)
 
@@ -92,10 +93,13 @@ class Planner(Node):
                 values = {pair.key: pair.value for pair in status.values}
                 self.rejected, self.reason = int(values['rejected']), status.message
 
-    def ready(self) -> bool:
-        """Return whether both directions are connected: the node answers only once."""
-        return (self.connected and self.motions.get_subscription_count() > 0
-                and self.count_publishers('stewart_dynamics/leg_trajectory') > 0)
+    def missing(self) -> str:
+        """Return what is not connected yet: the node answers only once."""
+        if not self.motions.get_subscription_count():
+            return f'no subscriber on {self.motions.topic_name}'
+        if not self.count_publishers(self.answer.topic_name):  # which follows remaps
+            return f'no publisher on {self.answer.topic_name}'
+        return '' if self.connected else 'no diagnostics of stewart_dynamics'
 
     def until(self, done: Callable[[], bool], timeout: float) -> bool:
         end = time.monotonic() + timeout
@@ -106,8 +110,8 @@ class Planner(Node):
 
 def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> JointTrajectory:
     """Return the answer to a trajectory; exit with one line if there is none."""
-    if not planner.until(planner.ready, timeout):
-        sys.exit(f'stewart_dynamics was not found within {timeout:g} s')
+    if not planner.until(lambda: not planner.missing(), timeout):
+        sys.exit(f'{planner.missing()} within {timeout:g} s; are topics remapped? See --help')
     before = planner.rejected
     planner.motions.publish(motion)
     if not planner.until(lambda: planner.answers or planner.rejected > before, timeout):
@@ -118,7 +122,8 @@ def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> Jo
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     pose = {'nargs': 6, 'type': float, 'metavar': ('X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA')}
     parser.add_argument('--from', dest='start', default=HOME, help='[m, rad]', **pose)
     parser.add_argument('--to', default=[0.1, -0.05, 1.2, 0.0, 0.1, 0.3], help='[m, rad]', **pose)

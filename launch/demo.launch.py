@@ -19,7 +19,10 @@ Start reference motion, node, simulator and an example controller, in real time.
     ros2 launch stewart_dynamics demo.launch.py feed_forward:=false payload_factor:=1.3
 """
 
+import math
+from pathlib import Path
 import sys
+from typing import Any
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -31,36 +34,63 @@ from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.parameters import Parameters
 
+FILES = {
+    'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),
+    'trajectory_file': ('trajectory_loop.yaml',
+                        'YAML file with the parameters of the reference motion'),
+    'simulator_file': ('simulator.yaml', 'YAML file with the parameters of the simulation; the '
+                       'motion must begin at its initial_pose')}
 
-def simulator(context: LaunchContext) -> list[Node]:
-    """Return the simulator, its payload scaled by payload_factor."""
-    file = LaunchConfiguration('params_file').perform(context)
-    factor = float(LaunchConfiguration('payload_factor').perform(context))
-    parameters = Parameters.from_yaml(file)
-    return [Node(
-        package='stewart_dynamics',
-        executable='stewart_simulator',
-        name='stewart_simulator',
-        namespace=LaunchConfiguration('namespace'),
-        parameters=[file, LaunchConfiguration('simulator_file'), {
-            'platform.mass': factor * parameters['platform.mass'],
-            'platform.inertia': (factor * parameters['platform.inertia']).tolist()}],
-        output='screen')]
+
+def checked(context: LaunchContext) -> tuple[dict[str, str], float]:
+    """Return the files and the payload factor; raise RuntimeError before anything is started."""
+    files = {name: LaunchConfiguration(name).perform(context) for name in FILES}
+    for name, file in files.items():
+        if not Path(file).is_file():
+            raise RuntimeError(f'{name}: {file}: no such file')
+    text = LaunchConfiguration('payload_factor').perform(context)
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 0.0 < factor < math.inf:
+        raise RuntimeError(f'payload_factor: {text}: must be a number above 0')
+    return files, factor
+
+
+def nodes(context: LaunchContext) -> list[Node]:
+    """Return the four nodes, all in one namespace: setpoints go to stewart_dynamics/setpoint/."""
+    files, factor = checked(context)
+    parameters = Parameters.from_yaml(files['params_file'])
+    payload = {'platform.mass': factor * parameters['platform.mass'],
+               'platform.inertia': (factor * parameters['platform.inertia']).tolist()}
+    common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
+    package = FindPackageShare('stewart_dynamics')
+    return [
+        # With the measured legs of the simulator the node estimates the external wrench.
+        Node(package='stewart_dynamics', executable='stewart_dynamics', name='stewart_dynamics',
+             parameters=[files['params_file']],
+             remappings=[('~/measured_legs', 'stewart_simulator/leg_states')], **common),
+        Node(package='stewart_dynamics', executable='stewart_simulator', name='stewart_simulator',
+             parameters=[files['params_file'], files['simulator_file'], payload], **common),
+        # An example to copy, not an executable of the package.
+        Node(executable=sys.executable, name='leg_controller',
+             arguments=[PathJoinSubstitution([package, 'examples', 'leg_controller.py'])],
+             parameters=[{'params_file': files['params_file'],
+                          'feed_forward': ParameterValue(
+                              LaunchConfiguration('feed_forward'), value_type=bool)}],
+             condition=IfCondition(LaunchConfiguration('controller')), **common),
+        Node(package='stewart_dynamics', executable='stewart_trajectory',
+             name='stewart_trajectory', parameters=[files['trajectory_file']], **common)]
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the four nodes and the arguments."""
     share = FindPackageShare('stewart_dynamics')
     return LaunchDescription([
-        DeclareLaunchArgument(
-            'trajectory_file',
-            default_value=PathJoinSubstitution([share, 'config', 'trajectory_loop.yaml']),
-            description='YAML file with the parameters of the reference motion'),
-        DeclareLaunchArgument(
-            'simulator_file',
-            default_value=PathJoinSubstitution([share, 'config', 'simulator.yaml']),
-            description='YAML file with the parameters of the simulation; the motion must begin '
-                        'at its initial_pose'),
+        *(DeclareLaunchArgument(
+            name, default_value=PathJoinSubstitution([share, 'config', file]), description=text)
+          for name, (file, text) in FILES.items()),
         DeclareLaunchArgument(
             'payload_factor', default_value='1.0',
             description='mass and inertia of the simulated platform, relative to those in '
@@ -73,37 +103,6 @@ def generate_launch_description() -> LaunchDescription:
             'feed_forward', default_value='true', choices=['true', 'false'],
             description='let the example controller add the forces of the node'),
         DeclareLaunchArgument(
-            'params_file',
-            default_value=PathJoinSubstitution([share, 'config', 'platform.yaml']),
-            description='YAML file with the parameters of the hexapod'),
-        DeclareLaunchArgument(
             'namespace', default_value='', description='namespace of all nodes'),
-        # With the measured legs of the simulator the node estimates the external wrench.
-        Node(
-            package='stewart_dynamics',
-            executable='stewart_dynamics',
-            name='stewart_dynamics',
-            namespace=LaunchConfiguration('namespace'),
-            parameters=[LaunchConfiguration('params_file')],
-            remappings=[('~/measured_legs', 'stewart_simulator/leg_states')],
-            output='screen'),
-        OpaqueFunction(function=simulator),
-        # An example to copy, not an executable of the package.
-        Node(
-            executable=sys.executable,
-            arguments=[PathJoinSubstitution([share, 'examples', 'leg_controller.py'])],
-            name='leg_controller',
-            namespace=LaunchConfiguration('namespace'),
-            parameters=[{'feed_forward': ParameterValue(
-                LaunchConfiguration('feed_forward'), value_type=bool)}],
-            condition=IfCondition(LaunchConfiguration('controller')),
-            output='screen'),
-        # Setpoints go to stewart_dynamics/setpoint/..., hence the same namespace.
-        Node(
-            package='stewart_dynamics',
-            executable='stewart_trajectory',
-            name='stewart_trajectory',
-            namespace=LaunchConfiguration('namespace'),
-            parameters=[LaunchConfiguration('trajectory_file')],
-            output='screen'),
+        OpaqueFunction(function=nodes),
     ])

@@ -15,15 +15,37 @@
 
 """Start the node with its parameters from a file; it becomes active by itself."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
+TOPICS = {
+    'leg_forces': 'topic of the leg forces, as the commands of an effort controller',
+    'leg_trajectory': 'topic of the leg trajectories, as that of a joint_trajectory_controller',
+    'measured_legs': 'topic of the measured legs, as /joint_states'}
+
+
+def node(context: LaunchContext) -> list[Node]:
+    """Return the node, once its file is there."""
+    file = LaunchConfiguration('params_file').perform(context)
+    if not Path(file).is_file():
+        raise RuntimeError(f'params_file: {file}: no such file')
+    return [Node(
+        package='stewart_dynamics',
+        executable='stewart_dynamics',
+        name='stewart_dynamics',
+        namespace=LaunchConfiguration('namespace'),
+        parameters=[file],
+        remappings=[(f'~/{topic}', LaunchConfiguration(topic)) for topic in TOPICS],
+        output='screen')]
+
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the node and the arguments `params_file` and `namespace`."""
+    """Return the node and the arguments."""
     return LaunchDescription([
         DeclareLaunchArgument(
             'params_file',
@@ -32,11 +54,7 @@ def generate_launch_description() -> LaunchDescription:
             description='YAML file with the parameters of the hexapod'),
         DeclareLaunchArgument(
             'namespace', default_value='', description='namespace of the node and its topics'),
-        Node(
-            package='stewart_dynamics',
-            executable='stewart_dynamics',
-            name='stewart_dynamics',
-            namespace=LaunchConfiguration('namespace'),
-            parameters=[LaunchConfiguration('params_file')],
-            output='screen'),
+        *(DeclareLaunchArgument(topic, default_value=f'~/{topic}', description=text)
+          for topic, text in TOPICS.items()),
+        OpaqueFunction(function=node),
     ])

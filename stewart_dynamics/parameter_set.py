@@ -85,14 +85,14 @@ class Parameter(NamedTuple):
 
     @property
     def ros_type(self) -> str:
-        """The name of the type in ROS, as in the documents."""
+        """Return the name of the type in ROS, as in the documents."""
         if not self.sizes:
             return self.kind
         return f'{self.kind}[{" or ".join(map(str, self.sizes))}]'
 
     @property
     def rule(self) -> str:
-        """The accepted values, as text."""
+        """Return the accepted values, as text."""
         if self.choices:
             return 'one of ' + ', '.join(self.choices)
         rules = []
@@ -174,7 +174,7 @@ class ParameterSet(Mapping[str, Any]):
 
     @property
     def given(self) -> Mapping[str, Any]:
-        """The values that are not defaults, as they were given."""
+        """Return the values that are not defaults, as they were given."""
         return MappingProxyType(self._given)
 
     def _key(self) -> tuple[Any, ...]:

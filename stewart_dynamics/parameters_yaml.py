@@ -27,9 +27,8 @@ import re
 import stat
 from typing import Any
 
-import yaml  # type: ignore[import-untyped]
-
 from stewart_dynamics.errors import one_line, ParameterError, shown, shown_name
+import yaml  # type: ignore[import-untyped]
 
 # The file of a hexapod has 4 kB, that of a whole robot rarely more than 50. rcl needs at most 2 s
 # for a file of this size, but a minute for one list of 500 kB, whichever node it is for.

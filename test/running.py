@@ -67,14 +67,14 @@ from rclpy.time import Time
 from referees import ROOT
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
-from trajectory_msgs.msg import (
-    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
-import yaml
-
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 from stewart_dynamics.nodes.rclpy_workarounds import spin
+from trajectory_msgs.msg import (
+    JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
+import yaml
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 NODE = '/stewart_dynamics'
@@ -109,11 +109,6 @@ LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RT
 _DOMAINS = range(1, 101)
 _LOCKS: dict[int, int] = {}  # file descriptors
 _ENDLESS = 10_000_000
-
-
-def executable(name: str) -> str:
-    """Return the path of an executable of the package, that of this Python's environment."""
-    return str(Path(sys.executable).with_name(name))
 
 
 @contextmanager
@@ -488,7 +483,7 @@ class NodeProcess:
 
     @property
     def program(self) -> Program:
-        """The program, which has been started."""
+        """Return the program, which has been started."""
         assert self._program is not None
         return self._program
 
@@ -584,7 +579,7 @@ class DynamicsNode:
 
     @property
     def program(self) -> Program:
-        """The process in which the node runs."""
+        """Return the process in which the node runs."""
         return self._process.program
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -650,7 +645,7 @@ class DynamicsNode:
 
     @property
     def topics(self) -> list[str]:
-        """The topics that the node subscribes to, by its parameters."""
+        """Return the topics that the node subscribes to, by its parameters."""
         return [topic for topic in INPUTS if f'{topic}: writers' in self.values('setpoints')]
 
     def received(self, topic: str) -> list[Any]:
@@ -662,7 +657,7 @@ class DynamicsNode:
 
     @property
     def warning(self) -> bool | None:
-        """The last warning of a singularity, None before the first."""
+        """Return the last warning of a singularity, None before the first."""
         warnings = self.received('singularity_warning')
         return bool(warnings[-1].data) if warnings else None
 
@@ -819,7 +814,7 @@ class DynamicsNode:
 
     @property
     def state(self) -> str:
-        """The state of the lifecycle."""
+        """Return the state of the lifecycle."""
         return str(self.call('get_state', GetState.Request()).current_state.label)
 
     def _clean_up(self) -> None:

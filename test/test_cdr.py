@@ -31,15 +31,16 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, MultiArrayDimension
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
-
 from stewart_dynamics.messages.cdr import MalformedError, STAMPS_END
-from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.joint_state import (
+    JointStateError, JointStateReader, JointStateWriter)
 from stewart_dynamics.messages.setpoint import (
     combined, layout_of, pose, StampedWriter, twist, wrench)
 from stewart_dynamics.messages.standard import (
     boolean, clock, float64, float64_array, float64_values)
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 SECOND = 1_000_000_000
 READERS = {
@@ -272,6 +273,34 @@ def test_huge_counts_cost_no_time() -> None:
     with pytest.raises(MalformedError):
         combined(b'\0\1\0\0' + names + bytes(1_000_000))
     assert time.perf_counter() - begun < 5.0
+
+
+def test_many_entries_are_rejected_before_they_are_read() -> None:
+    many = 13_000_000
+    header = b'\0\1\0\0' + struct.pack('<iII4x', 0, 0, 1)
+    entries = struct.pack('<I', many) + bytes(8 * many)
+    no_name = struct.pack('<I', 0)
+    reader = JointStateReader(('leg_1',))
+    messages = {
+        'names': (reader.read_one, header + entries),
+        'positions': (reader.read_one, header + no_name + entries),
+        'efforts': (reader.read_one, header + 3 * no_name + entries),
+        'dimensions': (float64_values, b'\0\1\0\0' + entries),
+        'numbers': (float64_values, b'\0\1\0\0' + 2 * no_name + entries)}
+    for read, data in messages.values():
+        begun = time.process_time()
+        with pytest.raises(MalformedError, match='must be at most 1000'):
+            read(data)
+        assert time.process_time() - begun < 0.1
+
+
+def test_long_names_are_cut_in_the_details_of_a_rejection() -> None:
+    names = ['x' * 1_000_000, *map(str, range(100))]
+    data = serialize_message(JointState(name=names))
+    with pytest.raises(JointStateError) as caught:
+        JointStateReader(('leg_1',)).read_one(data)
+    assert caught.value.details == (
+        f'leg_1; there are {"x" * 60}, {", ".join(map(str, range(59)))}')
 
 
 @KINDS

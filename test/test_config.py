@@ -24,9 +24,8 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import ROOT
-import yaml
-
 from stewart_dynamics import Parameters, Pose, StewartPlatform
+import yaml
 
 CONFIG = ROOT / 'config'
 JOINTS = list(Parameters.from_yaml(CONFIG / 'platform.yaml')['joints'])

@@ -22,8 +22,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 from referees import symmetric_parameters
-from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
-
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity import Cause, Singularity
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
@@ -31,6 +29,7 @@ from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status
 from stewart_dynamics.runtime.input_topics import ACCEL, POSE, TWIST
 from stewart_dynamics.runtime.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
+from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})
 TOPICS = (POSE, TWIST, ACCEL)

@@ -1013,7 +1013,7 @@ def test_for_any_input_only_finite_numbers_are_published_and_a_setpoint_is_answe
 
 @pytest.mark.parametrize('program', ['stewart_dynamics', 'stewart_trajectory'])
 def test_help_is_printed_and_a_stray_argument_is_rejected(program: str) -> None:
-    path = Path(sys.executable).with_name(program)
+    path = executable(program)
     said = subprocess.run([path, '--help'], capture_output=True, text=True, check=True)
     assert said.stdout.startswith(f'usage: {program} --ros-args --params-file FILE')
     assert not said.stderr

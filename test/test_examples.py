@@ -25,10 +25,9 @@ from geometry_msgs.msg import WrenchStamped
 import numpy as np
 import pytest
 from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT
-from trajectory_msgs.msg import JointTrajectory
-
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'
 
@@ -55,12 +54,16 @@ def run(tmp_path: Path) -> Iterator[Run]:
 
 def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
         start: Callable[..., DynamicsNode], run: Run) -> None:
-    node = start()
+    # Its answers go to the topic of a joint_trajectory_controller.
+    topic = '/controller/joint_trajectory'
+    node = start(command=[executable('stewart_dynamics'), '--ros-args', '-r',
+                          f'~/leg_trajectory:={topic}'])
     node.until_active()
-    answers = node.peer.listen('/stewart_dynamics/leg_trajectory', JointTrajectory)
+    answers = node.peer.listen(topic, JointTrajectory)
 
     def planned(*arguments: object) -> Program:
-        return run('plan_motion.py', node.domain, '--timeout', '60.0', *arguments)
+        return run('plan_motion.py', node.domain, '--timeout', '60.0', *arguments, '--ros-args',
+                   '-r', f'stewart_dynamics/leg_trajectory:={topic}')
 
     settings = ReferenceMotionParameters({
         'motion.type': 'quintic', 'motion.initial': HOME, 'motion.final': THERE,
@@ -79,6 +82,10 @@ def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
         assert program.stdout == ('accepted: 201 points over 2 s, largest effort '
                                   f'{np.abs(expected.forces).max():.0f} N\n')
         node.until(lambda n=n: len(answers) == n + 1, 'the answer is heard here, too')
+    program = run('plan_motion.py', node.domain, '--timeout', '1.0')
+    assert program.wait() == 1
+    assert program.stderr == ('no publisher on /stewart_dynamics/leg_trajectory within 1 s; are '
+                              'topics remapped? See --help\n')
     program = planned('--duration', '-1.0')
     assert program.wait() == 1
     assert 'motion.duration: -1.0 s: must be more than 0' in program.stderr

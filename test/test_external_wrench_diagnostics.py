@@ -19,9 +19,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from referees import rotation_about
-from test_external_wrench import (
-    BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, UNFILTERED)
-
 from stewart_dynamics import Motion
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
@@ -30,6 +27,8 @@ from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
 from stewart_dynamics.runtime.rejections import Rejection
+from test_external_wrench import (
+    BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, UNFILTERED)
 
 TARGET = tuple(HOME.rows.tolist())
 

@@ -29,17 +29,16 @@ from rclpy.serialization import deserialize_message
 from referees import rng
 from running import DynamicsNode, executable, HOME, log_lines, nanoseconds, NODE, wrench_message
 from sensor_msgs.msg import JointState
-from test_external_wrench import BEGIN
-from test_external_wrench import HEXAPOD, LOAD, measured, MILLISECOND, resting, six, swing, times
-from test_external_wrench import HOME as AT_HOME
-from test_measured_legs import joint_state, JOINTS, message_of, ZERO_LENGTHS
-from test_simulator_node import Simulator, STEPPED
-
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.external_wrench import ExternalWrench, Measurement
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
 from stewart_dynamics.runtime.output_messages import OutputMessages
+from test_external_wrench import BEGIN
+from test_external_wrench import HEXAPOD, LOAD, measured, MILLISECOND, resting, six, swing, times
+from test_external_wrench import HOME as AT_HOME
+from test_measured_legs import joint_state, JOINTS, message_of, ZERO_LENGTHS
+from test_simulator_node import Simulator, STEPPED
 
 Start = Callable[..., DynamicsNode]
 

@@ -40,9 +40,8 @@ from rosgraph_msgs.msg import Clock
 from running import (
     bits, DEADLINE, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
     Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, SEPARATE, STEP, wrench_message)
-import yaml
-
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+import yaml
 
 Start = Callable[..., DynamicsNode]
 
@@ -556,7 +555,7 @@ def test_a_killed_node_answers_again_after_a_restart(start: Start, tmp_path: Pat
         node.at_work()
 
 
-def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
+def test_lifecycles_under_load_leave_nothing_behind(
         begin: Start, tmp_path: Path) -> None:
     node = begin()
     feeder = Feeder(node, tmp_path, 200)
@@ -578,16 +577,16 @@ def test_a_hundred_lifecycles_under_load_leave_nothing_behind(
     for _ in range(20):
         cycle()
     before, publishers = held()
-    for _ in range(100):
+    for _ in range(40):
         cycle()
     after, publishers_after = held()
     feeder.end()
-    assert node.program.stderr.count('dynamics ready after') == 121
+    assert node.program.stderr.count('dynamics ready after') == 61
     assert publishers_after == publishers == dict.fromkeys(OUTPUTS, 1)
     for what in ('descriptors', 'threads'):
         assert after[what] == before[what]
     # A publisher that is left behind takes 30 kB; with none the middleware takes 3 to 7 a time.
-    assert after['memory'] - before['memory'] < 2000
+    assert after['memory'] - before['memory'] < 800
     _expect_what_was_cut_off(node)
 
 

@@ -26,12 +26,11 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
-from test_cdr import same, SECOND, sixes, stamps, texts
-from test_recorded_efforts import joined, joint_state, JOINTS
-
 from stewart_dynamics.messages.cdr import MALFORMED, MalformedError
 from stewart_dynamics.messages.joint_state import (
     FIELDS, JointStateError, JointStateReader, JointStateWriter)
+from test_cdr import same, SECOND, sixes, stamps, texts
+from test_recorded_efforts import joined, joint_state, JOINTS
 
 # Writing
 

@@ -29,13 +29,12 @@ from numpy.typing import NDArray
 import pyarrow.parquet
 import pytest
 from scipy.spatial.transform import Rotation
-from test_output import LEGS, turning
-
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
 from stewart_dynamics.runtime.step import Outputs
+from test_output import LEGS, turning
 
 RESULTS = 27
 

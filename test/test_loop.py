@@ -35,6 +35,8 @@ from running import assert_only_log_lines, executable, own_domain, Peer, PLATFOR
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from stewart_dynamics import Motion, StewartPlatform
+
 SECONDS = 0.5
 MOTION = ROOT / 'config' / 'trajectory_loop.yaml'
 CONTROLLER = ROOT / 'examples' / 'leg_controller.py'
@@ -133,7 +135,8 @@ def test_what_cannot_be_run_is_reported_in_one_line(
     assert said in line
 
 
-def test_in_real_time_the_legs_follow_as_well(domain: int, tmp_path: Path) -> None:
+def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
+        domain: int, tmp_path: Path) -> None:
     simulator = ROOT / 'config' / 'simulator.yaml'
     peer = Peer(domain)
     measured, desired, commands = (peer.listen(topic, kind) for topic, kind in (
@@ -145,8 +148,9 @@ def test_in_real_time_the_legs_follow_as_well(domain: int, tmp_path: Path) -> No
                     ([executable('stewart_simulator')],
                      ['--params-file', PLATFORM, '--params-file', simulator]),
                     ([executable('stewart_dynamics')], ['--params-file', PLATFORM]),
-                    # A loaded computer may be late: what is late is old, and not wrong.
-                    ([sys.executable, CONTROLLER], ['-p', 'timeout:=10.0']),
+                    # A loaded computer may be late.
+                    ([sys.executable, CONTROLLER],
+                     ['-p', 'timeout:=1.0', '-p', f'params_file:={PLATFORM}']),
                     ([executable('stewart_trajectory')],
                      ['--params-file', MOTION, '-p', 'start_timeout:=1000.0'])))]
     try:
@@ -157,9 +161,28 @@ def test_in_real_time_the_legs_follow_as_well(domain: int, tmp_path: Path) -> No
         # It has gone a way, and is near where it was to be at some time.
         assert np.abs(last - first).max() > 5e-3
         assert min(np.abs(last - each).max() for each in wanted) < 5e-3
+        assert programs[-1].stop() == 0, programs[-1].stderr
+        peer.until(lambda: 'the last position is held' in programs[2].stderr, 'it holds')
+        held = np.array(deserialize_message(desired[-1], JointState).position)
+
+        def errors() -> Any:
+            state = deserialize_message(measured[-1], JointState)
+            return np.abs([state.position - held, state.velocity]).max(axis=1)
+
+        # Friction may stop it at a distance of friction / gain.
+        peer.until(lambda: (errors() < [5e-4, 1e-3]).all(), 'it comes to rest there')
+        many = len(commands)
+        peer.until(lambda: len(commands) > many + 500, 'commands go on')
+        assert (errors() < [5e-4, 1e-3]).all()
+        # The forces at rest, to what friction keeps of the position's error.
+        platform = StewartPlatform.from_yaml(PLATFORM)
+        pose = platform.forward_kinematics(held + 0.95, platform.home_pose())
+        forces = deserialize_message(commands[-1], Float64MultiArray).data
+        assert forces == pytest.approx(
+            platform.inverse_dynamics(Motion.from_pose(pose)).forces, abs=200.0)
         for data in commands:
             assert np.isfinite(deserialize_message(data, Float64MultiArray).data).all()
-        for program in reversed(programs):
+        for program in reversed(programs[:-1]):
             assert program.stop() == 0, program.stderr
             assert_only_log_lines(program.stderr)
     finally:

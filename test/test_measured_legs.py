@@ -25,9 +25,6 @@ from hypothesis import strategies as st
 from messages import STORE
 import numpy as np
 import pytest
-from test_external_wrench import (
-    BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, six, swing)
-
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
@@ -36,6 +33,8 @@ from stewart_dynamics.runtime.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
 from stewart_dynamics.runtime.rejections import (
     MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
+from test_external_wrench import (
+    BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, six, swing)
 
 KIND = 'sensor_msgs/msg/JointState'
 JOINTS = list(HEXAPOD['joints'])

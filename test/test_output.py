@@ -34,13 +34,12 @@ import pytest
 from referees import ROOT
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
-import yaml  # type: ignore[import-untyped]
-
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
+import yaml  # type: ignore[import-untyped]
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(
     {'singularity.action': 'suppress_forces'})

@@ -24,14 +24,13 @@ from hypothesis import strategies as st
 from messages import STORE
 import numpy as np
 import pytest
-from test_step import (
-    answered, FLAT, HOME, PARAMETERS, QUARTER, REST, rotations, rows, sizes, STAMP, STEP, UPRIGHT)
-
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.runtime.external_wrench import Estimate
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Batch, Setpoint, Step
+from test_step import (
+    answered, FLAT, HOME, PARAMETERS, QUARTER, REST, rotations, rows, sizes, STAMP, STEP, UPRIGHT)
 
 MESSAGES = OutputMessages(PARAMETERS)
 

@@ -17,6 +17,7 @@
 
 import ast
 from collections.abc import Iterable, Iterator
+import configparser
 import importlib.metadata
 import os
 from pathlib import Path
@@ -172,7 +173,7 @@ def check_share(share: Path) -> None:
     """Check that the files are there which ROS and the launch files look up."""
     assert (share / 'ament_index/resource_index/packages' / NAME).is_file()
     assert (share / NAME / 'package.xml').is_file()
-    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.yaml', 'examples/*.py',
+    for pattern in ('bags/*.mcap', 'config/*.*', 'config/controllers/*.*', 'examples/*.py',
                     'launch/*.launch.py', 'security/*'):
         expected = {path.name for path in ROOT.glob(pattern)}
         folder, _, files = pattern.rpartition('/')
@@ -197,6 +198,29 @@ def test_colcon_result_runs(install: Path) -> None:
     where = call(['bash', '-c', f'{setup}"{sys.executable}" -c '
                   f'"import {NAME}; print({NAME}.__file__)"'], cwd=install)
     assert str(install) in where
+    # With the Python that a workspace has, where no executable is beside it.
+    python = Path(sys.base_prefix, 'bin', 'python3')
+    found = call(['bash', '-c', f'{setup}"{python}" -c "from {NAME}.executables import '
+                  'executable; print(executable(\'stewart_replay\'))"'], cwd=install)
+    assert found.strip() == str(script)
+
+
+# As launch_testing 3.4 and launch_testing_ros 0.26 have it: pytest 9 rejects the argument path.
+OLD_PLUGIN = 'def pytest_pycollect_makemodule(path, parent): pass\n'
+
+
+def test_pytest_starts_beside_the_plugins_of_launch(tmp_path: Path) -> None:
+    info = tmp_path / 'old_plugins-1.0.dist-info'
+    info.mkdir()
+    (info / 'METADATA').write_text('Metadata-Version: 2.1\nName: old_plugins\nVersion: 1.0\n')
+    names = 'launch_testing', 'launch_ros', 'launch_pytest'
+    (info / 'entry_points.txt').write_text('\n'.join(
+        ['[pytest11]', *(f'{name} = old_{name}' for name in names)]))
+    for name in names:
+        (tmp_path / f'old_{name}.py').write_text(OLD_PLUGIN)
+    paths = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get('PYTHONPATH')]))
+    call([sys.executable, '-m', 'pytest', '--markers'], cwd=ROOT,
+         env={**os.environ, 'PYTHONPATH': paths})
 
 
 def test_wheel_has_entry_points_and_no_scripts(
@@ -215,6 +239,33 @@ def test_pip_puts_executables_on_the_path(wheel: Path, tmp_path: Path) -> None:
           '--prefix', tmp_path, wheel])
     assert {path.name for path in (tmp_path / 'bin').iterdir()} == set(EXECUTABLES)
     check_share(tmp_path / 'share')
+
+
+def test_flake8_has_the_settings_of_ament_and_no_milder_ones() -> None:
+    settings = configparser.ConfigParser()
+    settings.read(ROOT / 'setup.cfg')
+    # ament_flake8.ini of Jazzy; where docstrings are those of ament_pep257, properties included.
+    assert dict(settings['flake8']) == {
+        'extend-ignore': 'B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202',
+        'import-order-style': 'google', 'max-line-length': '99', 'show-source': 'true',
+        'statistics': 'true', 'docstring-convention': 'all', 'property-decorators': '',
+        'exclude': '.cache,.git,.venv,build,install,log'}
+
+
+def test_no_module_has_the_name_of_one_of_python() -> None:
+    for path in python_files(NAME):  # A005 of flake8-builtins
+        assert path.stem not in sys.stdlib_module_names, path
+
+
+def test_contributing_is_the_text_that_ament_copyright_knows() -> None:
+    text = (ROOT / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    begin, section, end = text.split('~~~')
+    assert begin == (
+        'Any contribution that you make to this repository will\nbe under the Apache 2 License, '
+        'as dictated by that\n[license](http://www.apache.org/licenses/LICENSE-2.0.html):\n\n')
+    license_ = (ROOT / 'LICENSE').read_text(encoding='utf-8')
+    assert ' '.join(section.split()) in ' '.join(license_.split())
+    assert end == '\n'
 
 
 @pytest.mark.parametrize('name', EXECUTABLES)

@@ -26,8 +26,6 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from referees import ROOT
-import yaml
-
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, Pose, PoseError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
@@ -35,6 +33,7 @@ from stewart_dynamics.parameter_files import flat, other_nodes, read_yaml
 from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.parameters_yaml import read_document
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+import yaml
 
 GOOD = """\
 /**:

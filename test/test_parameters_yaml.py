@@ -24,10 +24,9 @@ import subprocess
 import sys
 
 import pytest
-import yaml
-
 from stewart_dynamics import ParameterError
 from stewart_dynamics.parameters_yaml import no_space, read_document, read_value
+import yaml
 
 # Each as written in a file, and the value that both readers return.
 VALUES = {

@@ -24,9 +24,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
-from trajectories import (
-    Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
-
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics.interpolation import Interpolation
@@ -37,6 +34,8 @@ from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
 from stewart_dynamics.runtime.planned_trajectory_checks import LIMIT, SINGULAR
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.step import Setpoint, Step
+from trajectories import (
+    Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
 
 Trajectory = tuple[Sequence[int], Array]  # times [ns], and rows as in trajectories
 

@@ -25,15 +25,14 @@ from hypothesis import strategies as st
 import messages
 import numpy as np
 import pytest
-from trajectories import (
-    Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP, UNBOUND)
-
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.runtime import planned_trajectory
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.planned_trajectory import NOT_INCREASING, PIECE, TOO_FAR
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+from trajectories import (
+    Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP, UNBOUND)
 
 
 def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = NO_WRENCH,

@@ -23,9 +23,8 @@ from lifecycle_msgs.msg import Transition
 import numpy as np
 from running import (
     bits, DynamicsNode, HOME, log_lines, nanoseconds, NODE, Planner, Sample, wrench_message)
-from trajectory_msgs.msg import JointTrajectory
-
 from stewart_dynamics import StewartPlatform
+from trajectory_msgs.msg import JointTrajectory
 
 Start = Callable[..., DynamicsNode]
 

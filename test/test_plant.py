@@ -286,6 +286,19 @@ def test_actuators_saturate() -> None:
     assert other.advance((6000.0, -6000.0, 5000.0, 6000.0, -6000.0, 6000.0), ZERO) == state
 
 
+def test_brakes_stop_it_where_it_is() -> None:
+    plant = Plant(simulated())
+    for _ in range(100):
+        moving = plant.advance((600.0, 500.0, 600.0, 500.0, 600.0, 500.0), ZERO)
+    assert any(moving.twist)
+    braked = plant.brake()
+    assert braked.pose == moving.pose
+    assert braked.lengths == moving.lengths
+    for rest in (braked.twist, braked.rates, braked.forces, braked.acceleration):
+        assert rest == (0.0,) * 6
+    assert plant.advance((600.0, 500.0, 600.0, 500.0, 600.0, 500.0), ZERO).twist != (0.0,) * 6
+
+
 # Stiff hexapods
 
 @pytest.mark.parametrize('changes', [

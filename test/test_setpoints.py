@@ -88,7 +88,7 @@ class Feed:
 
     @property
     def counts(self) -> dict[tuple[str, str], int]:
-        """What is rejected; the callback must have got each."""
+        """Return what is rejected; the callback must have got each."""
         assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
         return {tuple(rejection): n for rejection, n in self.setpoints.counts.items()}
 

@@ -89,7 +89,8 @@ class Simulator:
         self._wrench = self.peer.writer(f'{SIMULATOR}/wrench', WrenchStamped)
         arguments = ['--ros-args', *(
             part for path in files or (PLATFORM, FILE) for part in ('--params-file', path)), *(
-            part for override in overrides for part in ('-p', override))]
+            part for override in ('command_timeout:=1.0e+6', *overrides)
+            for part in ('-p', override))]
         self._stepped = STEPPED in overrides
         try:
             self.program: Any = Inside(SimulatorNode, arguments, domain) if inside else (
@@ -348,6 +349,26 @@ def test_in_real_time_the_brakes_hold_it_until_the_first_command(begin: Start) -
     assert all(simulator.stamps(topic) == stamps for topic in TYPES)
     assert abs(stamps[0] - time.time_ns()) < 1_000_000_000_000
     assert bits(simulator.last().effort) == bits(up)
+
+
+def test_when_commands_stop_the_brakes_engage_until_the_next(begin: Start) -> None:
+    simulator = begin('rate:=250.0', 'command_timeout:=0.1')
+    up = (np.array(holding()) + 100.0).tolist()
+    for _ in range(2):
+        simulator.command(up)
+        before = simulator.last('pose').pose.position.z
+        simulator.until(lambda before=before: simulator.last('pose').pose.position.z > before,
+                        'it rises')
+        simulator.until(lambda: not any([*simulator.last().velocity, *simulator.last().effort]),
+                        'it is at rest')
+        height = simulator.last('pose').pose.position.z
+        many = len(simulator.raw['twist'])
+        simulator.until(lambda many=many: len(simulator.raw['accel']) > many + 50, 'it goes on')
+        assert simulator.last('pose').pose.position.z == height
+        assert not np.any(numbers_of(simulator.last('twist')))
+        assert not np.any(numbers_of(simulator.last('accel')))
+    assert len(simulator.said('WARN', 'no command for 0.1 s: brakes engaged')) == 2
+    assert len(simulator.said('INFO', 'a command came: brakes released')) == 1
 
 
 def test_a_load_moves_it(begin: Start) -> None:

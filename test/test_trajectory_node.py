@@ -113,6 +113,10 @@ class Trajectory:
 
 Start = Callable[..., Trajectory]
 
+SECOND = 1_000_000_000
+PERIOD = 5_000_000  # at 200 Hz
+ENDS = 'motion.hold_at_end:=false'
+
 
 @pytest.fixture
 def start(domain: int, tmp_path: Path) -> Iterator[Start]:
@@ -182,7 +186,7 @@ def _expected(parameters: ReferenceMotionParameters, times: Any) -> NDArray[np.f
     ('separate', 'paper'), ('separate', 'quintic'), ('separate', 'sine'), ('combined', 'paper')])
 def test_the_motion_is_published_and_then_it_ends(
         begin: Start, tmp_path: Path, output: str, kind: str) -> None:
-    trajectory = begin(MOTION.format(kind=kind, more=f'output: {output}'))
+    trajectory = begin(MOTION.format(kind=kind, more=f'output: {output}'), ENDS)
     parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
     times = sample_times(parameters)
     assert len(times) == 301
@@ -198,6 +202,28 @@ def test_the_motion_is_published_and_then_it_ends(
     assert f'{kind} motion at 200 Hz to stewart_dynamics, 301 setpoints' in lines[0]
     assert '301 setpoints published' in lines[1]
     assert_only_log_lines(trajectory.program.stderr)
+
+
+@pytest.mark.parametrize('kind', ['quintic', 'sine'])
+def test_the_final_pose_is_held_until_a_signal(begin: Start, tmp_path: Path, kind: str) -> None:
+    trajectory = begin(MOTION.format(kind=kind, more='output: combined'), 'use_sim_time:=true')
+    parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
+    topics = ('setpoint/combined',)
+    trajectory.at(SECOND, 1, topics)
+    trajectory.at(SECOND + 300 * PERIOD, 301, topics)
+    trajectory.at(SECOND + 301 * PERIOD, 302, topics)
+    # Of those that are due at once while it holds, the last one is published.
+    trajectory.at(1000 * SECOND, 303, topics)
+    trajectory.program.kill()
+    stamps, rows = _combined(trajectory)
+    assert stamps[-3:] == [SECOND + 300 * PERIOD, SECOND + 301 * PERIOD, 1000 * SECOND]
+    final = _expected(parameters, np.array([300 * PERIOD]))[0]
+    np.testing.assert_allclose(rows[300], final, rtol=0.0, atol=1e-15)
+    for row in rows[301:]:
+        np.testing.assert_allclose(row[:7], final[:7], rtol=0.0, atol=1e-15)
+        assert not row[7:].any()
+    assert '301 setpoints published; holds the final pose until stopped' in (
+        trajectory.program.stderr)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
@@ -226,7 +252,7 @@ def test_it_begins_without_subscribers_after_start_timeout(
         domain: int, tmp_path: Path, start: Start) -> None:
     # They are on another node's topics: these have no subscribers.
     trajectory = start(MOTION.format(kind='hold', more='start_timeout: 0.1'),
-                       'target:=nobody', 'motion.duration:=0.1')
+                       'target:=nobody', 'motion.duration:=0.1', ENDS)
     assert trajectory.program.wait() == 0
     assert 'hold motion at 200 Hz to nobody, 21 setpoints' in trajectory.program.stderr
     assert '21 setpoints published' in trajectory.program.stderr
@@ -240,13 +266,9 @@ def test_a_signal_ends_it_while_it_waits_for_subscribers(start: Start) -> None:
     assert_only_log_lines(trajectory.program.stderr)
 
 
-SECOND = 1_000_000_000
-PERIOD = 5_000_000  # at 200 Hz
-
-
 def test_in_simulated_time_what_is_due_comes_with_the_clock(begin: Start, tmp_path: Path) -> None:
     trajectory = begin(MOTION.format(kind='sine', more='output: combined'), 'use_sim_time:=true',
-                       'motion.duration:=0.1')
+                       'motion.duration:=0.1', ENDS)
     topics = ('setpoint/combined',)
     # It begins where the clock stands, by itself, and waits for it at each sample.
     trajectory.at(SECOND, 1, topics)
@@ -285,7 +307,7 @@ def test_it_restarts_with_the_clock(begin: Start, tmp_path: Path) -> None:
     np.testing.assert_allclose(rows, _expected(parameters, times), rtol=0.0, atol=1e-15)
     warnings = log_lines(trajectory.program.stderr, 'WARN')
     assert len(warnings) == 2
-    assert all('it begins anew' in warning for warning in warnings)
+    assert all('it restarts' in warning for warning in warnings)
 
 
 def test_it_waits_for_the_clock(begin: Start) -> None:

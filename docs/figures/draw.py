@@ -75,7 +75,7 @@ class Recorded(NamedTuple):
 
     @property
     def crossing(self) -> tuple[int, float]:
-        """The last sample before det(J) is zero, and the time of the zero [s]."""
+        """Return the last sample before det(J) is zero, and the time of the zero [s]."""
         det, time = self.outputs.determinants, self.seconds
         at = int(np.flatnonzero(np.sign(det[:-1]) != np.sign(det[1:]))[0])
         return at, float(time[at] + det[at] / (det[at] - det[at + 1]) * (time[at + 1] - time[at]))

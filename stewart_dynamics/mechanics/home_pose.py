@@ -57,7 +57,7 @@ class Shape(NamedTuple):
 
     @property
     def radius(self) -> float:
-        """The larger one [m]."""
+        """Return the larger one [m]."""
         return max(self.base_radius, self.platform_radius)
 
 
@@ -82,7 +82,7 @@ class Home(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The pose in words."""
+        """Return the pose in words."""
         turned = f'turned by {math.degrees(self.yaw):.0f} degrees' if self.yaw else (
             'the axes parallel')
         return (f'{turned}, at any height' if self.length is None

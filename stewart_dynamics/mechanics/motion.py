@@ -150,7 +150,7 @@ class Motion(Samples):
 
     @property
     def pose(self) -> Pose:
-        """The pose alone; it shares the motion's memory."""
+        """Return the pose alone; it shares the motion's memory."""
         return Pose.of_rows(self.rows[..., POSE])
 
     @property

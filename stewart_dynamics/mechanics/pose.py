@@ -68,7 +68,7 @@ class Samples:
 
     @property
     def quaternion(self) -> Array:
-        """The rotation as unit quaternions x y z w, (..., 4), w >= 0."""
+        """Return the rotation as unit quaternions x y z w, (..., 4), w >= 0."""
         return rotations.to_quaternion(self.rotation)
 
     def _part(self, which: slice) -> Array:

@@ -45,6 +45,8 @@ REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name:
               'hold: at initial', default='paper', choices=('paper', 'quintic', 'sine', 'hold')),
     Parameter('motion.duration', 'double', 'duration of the motion, one way', 's', 10.0,
               minimum=0.0, maximum=86400.0, above=True),
+    Parameter('motion.hold_at_end', 'bool', 'without loop, go on with setpoints at rest in the '
+              'final pose until stopped; false: exit after the motion', default=True),
     Parameter('motion.initial', 'double', f'{_POSE} at the start; the center of a sine',
               'm, rad', required=True, sizes=(6,)),
     Parameter('motion.final', 'double', f'{_POSE} at the end; required for paper and quintic',

@@ -52,7 +52,7 @@ class Cause(IntEnum):
 
     @property
     def text(self) -> str:
-        """The cause as text."""
+        """Return the cause as text."""
         return _TEXTS[self]
 
 
@@ -155,7 +155,7 @@ class Singularity(NamedTuple):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The state as numbers, in the order of an array (STATE,)."""
+        """Return the state as numbers, in the order of an array (STATE,)."""
         return self.cause, self.stopped, self.determinant, self.time_to_crossing, self.crossings
 
     def after(self, parameters: Parameters, determinant: float, determinant_rate: float,

@@ -44,6 +44,10 @@ SEVEN = {0: Struct('>7d'), 1: Struct('<7d')}
 READ_ERRORS = IndexError, KeyError, StructError
 
 
+# Names, dimensions or numbers in a message of six legs: reading millions of them would delay all
+# messages after it.
+MOST_ENTRIES = 1000
+
 # Why a message of any type is rejected.
 MALFORMED = 'malformed'
 NOT_FINITE = 'not finite'
@@ -112,6 +116,14 @@ def sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[in
     if number > len(data):
         raise MalformedError(f'a sequence of {number} in {len(data)} bytes')
     return number, begin + 4
+
+
+def short_sequence(data: bytes, at: int, count: Struct, gaps: list[slice]) -> tuple[int, int]:
+    """Do the same as ``sequence``, for one of at most MOST_ENTRIES."""
+    number, begin = sequence(data, at, count, gaps)
+    if number > MOST_ENTRIES:
+        raise MalformedError(f'a sequence of {number}: must be at most {MOST_ENTRIES}')
+    return number, begin
 
 
 def stamped(data: bytes, numbers: dict[int, Struct]) -> Stamped:

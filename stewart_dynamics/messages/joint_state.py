@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, finite, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds, NOT_FINITE,
-    READ_ERRORS, sequence, text, TIME_AND_LENGTH)
+    READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH)
 from stewart_dynamics.messages.layout import Layout
 
 FIELDS = ('position', 'velocity', 'effort')
@@ -41,6 +41,9 @@ FIELDS = ('position', 'velocity', 'effort')
 # Why a message is rejected, beside being malformed or not finite, or 'without effort'.
 MISSING_JOINTS = 'lacks one of the joints'
 UNEVEN = 'not as many numbers as names'
+
+# So many names are shown in the details of a rejection, and so many characters of each.
+_SHOWN = 60
 
 # Layouts that are remembered, the newest ones.
 _MOST_LAYOUTS = 8
@@ -90,13 +93,13 @@ def _fields(data: bytes) -> _Fields:
         sec, nanosec, size = TIME_AND_LENGTH[data[1]].unpack_from(data, 4)
         stamp = nanoseconds(data, sec, nanosec)
         text(data, 16, size)
-        number, at = sequence(data, 16 + size, count, gaps)
+        number, at = short_sequence(data, 16 + size, count, gaps)
         for _ in range(number):
             size, at = sequence(data, at, count, gaps)
             names.append(text(data, at, size).decode(errors='replace'))
             at += size
         for _ in range(3):
-            number, end = sequence(data, at, count, gaps)
+            number, end = short_sequence(data, at, count, gaps)
             # An empty sequence has nothing to align.
             at = aligned8(end) if number else end
             gaps.append(slice(end, at))
@@ -244,7 +247,8 @@ class JointStateReader:
         reason = details = ''
         if missing := [joint for joint in self._joints if joint not in names]:
             reason = MISSING_JOINTS
-            details = f'{", ".join(missing)}; there are {", ".join(names) or "none"}'
+            there = ', '.join(name[:_SHOWN] for name in names[:_SHOWN]) or 'none'
+            details = f'{", ".join(missing)}; there are {there}'
         elif empty := [field for field, (_, count) in wanted.items() if not count]:
             reason = f'without {" and ".join(empty)}'
             details = f'{many} names'

@@ -25,8 +25,6 @@ from collections.abc import Sequence
 from struct import pack, Struct
 
 import numpy as np
-from visualization_msgs.msg import Marker
-
 from stewart_dynamics.arrays import Array, Six
 from stewart_dynamics.mechanics.home_pose import level_axes
 from stewart_dynamics.mechanics.rotation import quaternion_of
@@ -35,6 +33,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, WARN
 from stewart_dynamics.runtime.diagnostics.singularity import singularity_state
 from stewart_dynamics.runtime.step import Output
+from visualization_msgs.msg import Marker
 
 Color = tuple[float, float, float, float]
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 import gc
+import math
 import time
 from typing import Any
 
@@ -67,6 +68,8 @@ class SimulatorNode(Node):
     """
     Moves the hexapod under the commanded forces, and publishes its state.
 
+    Brakes hold it until the first command, and when none comes for ``command_timeout``.
+
     In real time it takes the periods that are due by a steady clock, several where it is late;
     what is later than 0.1 s is skipped. With ``use_sim_time`` each command is one period, and
     nothing else advances time.
@@ -94,6 +97,10 @@ class SimulatorNode(Node):
         self._commands: Six | None = None
         self._stamp = _BEGIN
         self._index = 0
+        self._braked = False
+        self._commanded = 0  # the index at the last command
+        timeout = self._settings['command_timeout']
+        self._patience = math.inf if timeout is None else timeout * self._settings['rate']
         self._rate: float = self._settings['rate']
         qos = QoSProfile(depth=_QUEUE)
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
@@ -136,7 +143,11 @@ class SimulatorNode(Node):
             self._rejections.reject('commands', NOT_FINITE, str(values))
             return
         first, second, third, fourth, fifth, sixth = values
+        if self._braked:
+            self.get_logger().info('a command came: brakes released')
+            self._braked = False
         self._commands = first, second, third, fourth, fifth, sixth
+        self._commanded = self._index
         if self._stepped:
             self._announcing.reset()
             self._advance()
@@ -160,9 +171,11 @@ class SimulatorNode(Node):
         return round(index * 1e9 / self._rate)
 
     def _advance(self) -> None:
-        """Take one period, with the brakes on until there is a command."""
+        """Take one period, with the brakes on until there is a command, and when they stop."""
         self._index += 1
-        if self._commands is not None and not self._plant.fault:
+        if self._commands is not None and self._index - self._commanded > self._patience:
+            self._brake()
+        if self._commands is not None and not self._plant.fault and not self._braked:
             state = self._plant.advance(self._commands, self._wrench_input.wrench)
             if self._plant.fault:
                 self.get_logger().error(self._plant.fault)
@@ -170,6 +183,13 @@ class SimulatorNode(Node):
                 self._log_saturated(self._commands, state.forces)
         self._messages = self._messages_now()
         self._publish()
+
+    def _brake(self) -> None:
+        if not self._braked:
+            self._braked = True
+            self._plant.brake()
+            self.get_logger().warning(
+                f'no command for {self._settings["command_timeout"]:g} s: brakes engaged')
 
     def _messages_now(self) -> list[tuple[str, bytes]]:
         return list(self._state_messages.write(

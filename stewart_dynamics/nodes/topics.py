@@ -29,9 +29,6 @@ from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
-from visualization_msgs.msg import MarkerArray
-
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
@@ -39,6 +36,8 @@ from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
 from stewart_dynamics.runtime.input_topics import INPUT_TYPES, SOURCES
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
 
 # Publishers, beside those of OUTPUT_TYPES.
 DIAGNOSTICS, MARKERS, LEG_TRAJECTORY = 'diagnostics', 'markers', planned.OUTPUT

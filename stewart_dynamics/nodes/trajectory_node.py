@@ -29,14 +29,13 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from rclpy.time import Time
 from std_msgs.msg import Header
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
-
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_count, sample_time
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes.run import declare_parameters, run
 from stewart_dynamics.runtime import input_topics as inputs
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 # Samples are computed so many at once: one by one they cost more than to publish.
 _BLOCK = 256
@@ -46,7 +45,7 @@ _SETTLE = 500_000_000  # [ns]
 
 class TrajectoryNode(Node):
     """
-    Publishes the motion's samples when they are due, then is done.
+    Publishes the motion's samples when they are due, then holds the final pose or is done.
 
     With ``use_sim_time`` they are due by /clock and published as soon as it comes: a simulation
     may run as fast or as slowly as it can, or wait for what it is answered.
@@ -71,6 +70,7 @@ class TrajectoryNode(Node):
         self._frame = self._settings['base_frame']
         self._index = 0
         self._block: Any = None
+        self._held: list[list[float]] | None = None
         self._row()  # an error in it is raised before anything moves
         target = self._settings['target']
         qos = QoSProfile(depth=1000)
@@ -119,22 +119,35 @@ class TrajectoryNode(Node):
         now = self.get_clock().now().nanoseconds - self._stamp
         # A simulation that starts anew begins where the motion began.
         if now < 0 or (now == 0 and jump.delta.nanoseconds < 0):
-            self.get_logger().warning('/clock is back at the start of the motion: it begins anew')
+            self.get_logger().warning('/clock is back at the start of the motion: it restarts')
             self._stamp += now
             self._index = now = 0
+            self._held = None
         self._publish_due(now)
 
     def _publish_due(self, now: int) -> None:
         """Publish what is due, each sample with its own stamp, however late it is [ns]."""
+        if self._held:  # of these the last one is enough
+            self._index = max(self._index, int(now * 1e-9 * self._settings['rate']))
         while not self._done.done():
             due = int(sample_time(self._settings, self._index))
             if due > now:
                 return
-            self._publish(self._row(), Time(nanoseconds=self._stamp + due).to_msg())
+            row = self._row()
+            self._publish(row, Time(nanoseconds=self._stamp + due).to_msg())
             self._index += 1
             if not self._loop and self._index == self._samples:
-                self.get_logger().info(f'{self._samples} setpoints published')
-                self._done.set_result(0)
+                self._end(*row[:2])
+
+    def _end(self, position: list[float], quaternion: list[float]) -> None:
+        """Hold the pose of the last sample, or end."""
+        log = self.get_logger()
+        if self._settings['motion.hold_at_end']:
+            self._held = [position, quaternion, *[[0.0] * 3] * 4]
+            log.info(f'{self._samples} setpoints published; holds the final pose until stopped')
+        else:
+            log.info(f'{self._samples} setpoints published')
+            self._done.set_result(0)
 
     def _wait(self, now: int) -> None:
         """Begin when it is time, which comes sooner once all topics have subscribers."""
@@ -158,6 +171,8 @@ class TrajectoryNode(Node):
 
     def _row(self) -> list[list[float]]:
         """Return position, quaternion and the four rates of the sample that is due."""
+        if self._held:
+            return self._held
         at = self._index % _BLOCK
         if at == 0:
             times = sample_time(self._settings, range(self._index, self._index + _BLOCK)) * 1e-9

@@ -20,10 +20,9 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-import zstandard
-
 from stewart_dynamics.errors import BagError, one_line, ParameterError
 from stewart_dynamics.parameters_yaml import read_document
+import zstandard
 
 # Suffixes of the files of a bag, also of files compressed as a whole.
 STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd', '.bag')

@@ -39,8 +39,10 @@ from stewart_dynamics.replay.bag_task import (
     Cancelled, counted, Ended, failed, finished, LOCAL_INTERVAL, replay_task, Results, Task)
 from stewart_dynamics.replay.progress_bar import ProgressBar
 
-# Not forked: a fork of a process with threads is not safe.
-_CONTEXT = multiprocessing.get_context('spawn')
+# Forked by a process that has imported the replay once and has no threads of ours: a fork of this
+# process, which may have some, is not safe.
+_CONTEXT = multiprocessing.get_context('forkserver')
+_CONTEXT.set_forkserver_preload(['stewart_dynamics.replay.one_bag'])
 
 
 def replay_in_processes(tasks: Sequence[Task], jobs: int, bar: ProgressBar) -> Results:

@@ -28,9 +28,8 @@ import zlib
 import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.records import Chunk
-import zstandard
-
 from stewart_dynamics.replay.mcap_layout import INCONSISTENT, LARGEST_CHUNK
+import zstandard
 
 
 def decompressed(record: bytes) -> tuple[bytes, bool]:

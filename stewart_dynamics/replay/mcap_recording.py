@@ -75,7 +75,7 @@ class McapRecording:
 
     @property
     def topics(self) -> dict[str, str]:
-        """The type of each topic, and its encoding if that is not CDR."""
+        """Return the type of each topic, and its encoding if that is not CDR."""
         kinds: dict[str, set[str]] = {}
         for channel in filter(None, self._layout.channels.values()):
             kind = self._layout.schemas.get(channel.schema) or 'message without a type'

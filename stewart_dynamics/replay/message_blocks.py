@@ -21,10 +21,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import zstandard
-
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.mechanics.jit import entry_point
+import zstandard
 
 # Messages in a block: enough that the overhead of a numpy call is small, few enough that they fit
 # into the processor's cache.
@@ -76,7 +75,7 @@ class Source(Protocol):
 
     @property
     def topics(self) -> dict[str, str]:
-        """The type of each topic."""
+        """Return the type of each topic."""
 
     def blocks(self, topics: Mapping[str, int]) -> Iterator[tuple[Block, int]]:
         """

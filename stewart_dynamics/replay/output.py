@@ -29,13 +29,12 @@ from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
-import yaml  # type: ignore[import-untyped]
-
 from stewart_dynamics.arrays import Bytes, Stamps
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Outputs
+import yaml  # type: ignore[import-untyped]
 
 _LIBRARY = 'stewart_dynamics'
 # Of a message record: opcode, length, channel, sequence, log time and publish time.

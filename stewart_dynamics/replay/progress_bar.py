@@ -22,9 +22,8 @@ import sys
 import threading
 import time
 
-from tqdm import tqdm
-
 from stewart_dynamics.replay.bag_task import Ended
+from tqdm import tqdm
 
 
 class ProgressBar:

@@ -101,7 +101,7 @@ class Recording:
 
     @property
     def damage(self) -> list[str]:
-        """What could not be read so far, of all files."""
+        """Return what could not be read so far, of all files."""
         return self.missing + [f'{file.name}: {what}' for file, source in self._sources
                                for what in source.missing]
 

@@ -82,7 +82,7 @@ class RosbagsRecording:
 
     @property
     def topics(self) -> dict[str, str]:
-        """The type of each topic, and its encoding if that is not CDR."""
+        """Return the type of each topic, and its encoding if that is not CDR."""
         kinds: dict[str, set[str]] = {}
         for of in self._reader.connections:
             kinds.setdefault(of.topic, set()).add(self._kinds[of.id])

@@ -124,6 +124,14 @@ class Plant:
             self.state = self._run(self.steps)
         return self.state
 
+    def brake(self) -> State:
+        """Return the state at rest in the present pose: the brakes take all speed at once."""
+        if not self.fault:
+            self._state[STATE_TWIST] = 0.0
+            self._loads[:] = 0.0
+            self.state = self._run(0)._replace(acceleration=NO_WRENCH)
+        return self.state
+
     def measured(self) -> State:
         """
         Return the present state as it is measured: noise on lengths, rates and forces.

@@ -112,12 +112,12 @@ class Setpoints:
 
     @property
     def counts(self) -> Counter[Rejection]:
-        """What was rejected so far, and how often."""
+        """Return what was rejected so far, and how often."""
         return self._rejections.counts
 
     @property
     def wrench(self) -> Six:
-        """The known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
+        """Return the known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
         return self._wrench_input.wrench
 
     def take_wrench(self, data: bytes) -> None:
