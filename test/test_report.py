@@ -38,9 +38,11 @@ from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURC
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_euler
-from stewart_dynamics.replay.report import Report
+from stewart_dynamics.replay.html_pages import digits, number, thousands
+from stewart_dynamics.replay.report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 if TYPE_CHECKING:
@@ -138,7 +140,9 @@ def write_measured(given: Given, path: Path) -> None:
             comparison.add_setpoints(given.seconds, given.setpoints, given.outputs),
             comparison.finish()):
         report.add_measured(*compared)
-    report.write(path, given.summary(measured=comparison.values()))
+    values = comparison.values()
+    report.write(path, given.summary(measured={
+        'headline': measured_headline(values), **values}))
 
 
 def data_text(path: Path) -> str:
@@ -225,13 +229,15 @@ def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
     plain = trajectory('clear')
     paths = tmp_path / 'hostile.html', tmp_path / 'plain.html'
     bag = '/a/</script><script>window.hacked=1</script>\udcff/<!--=plotly-->'
-    rejected = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2]}]
+    rejected = [{'topic': HOSTILE[0], 'reason': HOSTILE[1], 'count': 2, 'first': HOSTILE[2],
+                 'first_at_s': 1.0}]
     given.write(paths[0], bag=bag, notices=[HOSTILE[1]], complete=False, missing=[HOSTILE[0]],
                 rejected=rejected, run='<i>', inputs={
                     'node': '/n', 'topics': {'setpoint/pose': HOSTILE[0]},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
     plain.write(paths[1], bag='/a/b/c', notices=['n'], complete=False, missing=['m'],
-                rejected=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': ''}], run='r',
+                rejected=[{'topic': 't', 'reason': 'r', 'count': 2, 'first': '',
+                           'first_at_s': 1.0}], run='r',
                 inputs={
                     'node': '/n', 'topics': {'setpoint/pose': '/p'},
                     'differentiated_cutoff_hz': 5.0, 'measured': None})
@@ -251,13 +257,46 @@ def test_the_report_shows_what_is_wrong_with_a_bag(tmp_path: Path) -> None:
         tmp_path / 'report.html', complete=False, missing=['chunk 3: its CRC is wrong'],
         notices=['the bag has no checksums'],
         rejected=[{'topic': 'setpoint/pose', 'reason': 'not finite', 'count': 1234,
-                  'first': 'nan'}])
+                  'first': 'nan', 'first_at_s': 0.25}, {
+                      'topic': 'setpoint/twist', 'reason': 'same stamp twice', 'count': 1,
+                      'first': 'stamp 1700000000500000000 ns', 'first_at_s': 0.5}])
     text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
     for shown in ('The bag could not be read completely', 'chunk 3: its CRC is wrong',
-                  'not finite', '1,234',
+                  'not finite', '1\u202f234',
                   'Limits are exceeded', 'limits.force_max', 'A singularity is reached',
                   'crosses zero once', 'the bag has no checksums', 'reflected_mass'):
         assert shown in text, shown
+
+
+def test_rejected_messages_have_seconds_since_the_start(tmp_path: Path) -> None:
+    trajectory('clear').write(tmp_path / 'report.html', rejected=[{
+        'topic': 'setpoint/accel', 'reason': reason, 'count': 1, 'first': first,
+        'first_at_s': seconds} for reason, first, seconds in (
+            ('same stamp twice', 'stamp 1700000000500000000 ns', 0.5),
+            ('older', 'stamp 1700000000500000000 ns is 0.1 s older than the last used', 12.25),
+            ('quaternion', 'length 1.01, must be within 0.001 of 1', None))])
+    text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
+    assert '1700000000500000000' not in text
+    for shown in ('0.500', '12.250', '0.1 s older than the last used', 'length 1.01, must be'):
+        assert shown in text, shown
+
+
+def test_figures_are_those_of_the_paper_by_name(tmp_path: Path) -> None:
+    given = trajectory('clear')
+    given.write(tmp_path / 'report.html')
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert 'figure ${spec.figure} of the paper' in page
+    assert 'figure 16 of the paper' in page
+    assert 'Fig. ' not in page[page.index('<script id="own">'):]
+
+
+def test_numbers_have_one_style_of_thousands() -> None:
+    space = '\u202f'
+    assert [number(value, 1) for value in (-999.96, 1000.0, 12345.67, -1234567.8, 0.04)] == [
+        f'−1{space}000.0', f'1{space}000.0', f'12{space}345.7', f'−1{space}234{space}568', '0.0']
+    assert [digits(value) for value in (8064.14, -23456.7, 123456.7, 0.25814, 1e12)] == [
+        f'8{space}064.1', f'−23{space}457', f'123{space}457', '0.25814', '1e+12']
+    assert thousands(1001) == f'1{space}001'
 
 
 def test_measured_forces_and_contacts_are_shown_and_drawn(tmp_path: Path) -> None:
@@ -416,7 +455,7 @@ def test_the_slider_moves_platform_colors_and_cursor(opened: Callable[..., Opene
         assert place == pytest.approx(axis[0] + axis[1] * sample / 1000, abs=1.5)
         shown = report.page.locator('.plot:has(#plot_forces) .readout td').all_inner_texts()
         np.testing.assert_allclose(
-            [float(text.replace('−', '-')) for text in shown],
+            [float(text.replace('−', '-').replace('\u202f', '')) for text in shown],
             given.outputs.demanded_forces[sample], rtol=1e-4)
     report.check()
 
@@ -485,6 +524,74 @@ def test_a_click_on_a_time_moves_the_cursor_there(opened: Callable[..., Opened])
     report.until(f'time.cursor === {at!r}')
     report.until(f"document.getElementById('now').textContent.startsWith('t = {at:.3f} s')")
     report.check()
+
+
+def test_a_click_on_a_time_scrolls_to_its_plot(opened: Callable[..., Opened]) -> None:
+    report = opened(trajectory('singular'))
+    report.see('plot_lengths')
+    report.page.evaluate('zoomTo([1.0, 2.0])')
+    button = report.page.locator('#peaks button.at').nth(1)
+    when = float(button.get_attribute('data-at') or '')
+    assert when > 2.0
+    button.click()
+    report.until("inView.has(byCanvas.get(document.getElementById('plot_forces')))")
+    report.until("(() => { const box = document.getElementById('plot_forces')"
+                 '.getBoundingClientRect();'
+                 ' return box.top >= 0 && box.bottom <= innerHeight; })()')
+    assert report.page.evaluate('time.cursor') == when
+    begin, end = report.page.evaluate('time.range')
+    assert begin < when < end and end - begin == pytest.approx(1.0)
+    report.check()
+
+
+def test_hover_shows_the_time_at_the_cursor_of_every_plot(opened: Callable[..., Opened]) -> None:
+    report = opened(trajectory('clear'))
+    report.see('plot_position')
+    report.see('plot_lengths')
+    box = report.page.locator('#plot_lengths .nsewdrag').first.bounding_box()
+    assert box
+    report.page.mouse.move(box['x'] + 0.25 * box['width'], box['y'] + 0.5 * box['height'])
+    shown = "document.querySelector('#plot_lengths .cursor span').textContent"
+    report.until(f'Math.abs(parseFloat({shown}) - 2.5) < 0.05')
+    assert report.page.evaluate('time.cursor') == 0.0
+    report.page.mouse.move(5, 5)
+    report.until(f"{shown} === '0.000 s'")
+    report.check()
+
+
+def test_nothing_is_wider_than_a_phone_or_paper(opened: Callable[..., Opened]) -> None:
+    report = opened(trajectory('clear'))
+    report.page.set_viewport_size({'width': 390, 'height': 800})
+    report.see('platform')
+    assert report.page.evaluate('document.documentElement.scrollWidth') == 390
+    box = report.page.locator('#platform').bounding_box()
+    scene = report.page.locator('#platform .svg-container').bounding_box()
+    assert box and scene
+    assert scene['width'] <= box['width'] <= 390
+    report.page.set_viewport_size({'width': 696, 'height': 1000})
+    report.page.emulate_media(media='print')
+    report.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    report.until('[...byCanvas.values()].every(drawing => drawing.drawn)')
+    assert report.page.evaluate('document.documentElement.scrollWidth') == 696
+    report.check()
+
+
+def test_reports_share_a_file_of_plotly(opened: Callable[..., Opened], tmp_path: Path) -> None:
+    given = trajectory('clear')
+    shared = share_plotly(tmp_path / 'all bags')
+    assert share_plotly(tmp_path / 'all bags') == shared
+
+    def write(path: Path) -> None:
+        given.report().write(path, given.summary(), shared)
+
+    report = opened(given, write)
+    assert (tmp_path / 'report_0.html').stat().st_size < 2_000_000
+    report.see('plot_forces')
+    assert report.faults == []
+    assert report.requests == [report.url, shared.as_uri()]
+    shared.rename(tmp_path / 'moved')
+    report.page.reload()
+    report.until("document.getElementById('plots').textContent.includes('need the file plotly')")
 
 
 def test_the_leg_can_be_selected_and_a_curve_hidden(opened: Callable[..., Opened]) -> None:

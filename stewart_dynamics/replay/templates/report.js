@@ -460,7 +460,7 @@ function scene(numbers, width) {
     }
   }
   const pad = 0.06 * Math.max(...high.map((value, k) => value - low[k]), 1e-9);
-  const far = Math.max(1, 620 / width);
+  const far = Math.max(1, 620 / width, width < NARROW ? 720 / width : 0);
   const axis = (name, k) => ({title: {text: `${name} [m]`}, range: [low[k] - pad, high[k] + pad],
     gridcolor: '#dde2e8', zerolinecolor: '#c3cad3', backgroundcolor: '#fff', showbackground: false,
     showspikes: false, tickfont: {size: 11}});
@@ -761,7 +761,7 @@ document.addEventListener('click', event => {
 });
 
 // For printing all plots are drawn, in the width of the paper.
-const PAPER = 560;  // [px]
+const PAPER = 500;  // [px], beside the values in 186
 window.addEventListener('beforeprint', () => {
   for (const drawing of byCanvas.values()) {
     inView.add(drawing);
