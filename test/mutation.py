@@ -17,8 +17,8 @@ Mutation testing: how many wrong lines of the package the tests notice.
 
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
-the tests that import the module, quick ones first, until one fails. It prints the share killed,
-every survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run
+the test modules that name the module, quick tests first, until one fails. It prints the share
+killed, every survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run
 uncompiled, so that they need no compilation. Tests that need ROS, that fail uncompiled or that
 take long are left out, and of each property few examples are tried (``mutation_plugin``): the
 share killed is a lower bound.
@@ -183,9 +183,10 @@ def mutants(paths: list[Path]) -> Iterator[Mutant]:
 
 
 def modules_of(path: Path, tests: list[Path]) -> list[str]:
-    """Return the names of the test modules that import a module."""
-    imported = re.compile(rf'^(from|import) .*\b{path.stem}\b', re.MULTILINE)
-    return [test.name for test in tests if imported.search(test.read_text(encoding='utf-8'))]
+    """Return the names of the test modules that name a module, or its folder within a layer."""
+    names = [path.stem, *path.relative_to(ROOT / PACKAGE).parts[1:-1]]
+    named = re.compile(rf'\b({"|".join(names)})\b')
+    return [test.name for test in tests if named.search(test.read_text(encoding='utf-8'))]
 
 
 class Suite:
