@@ -565,6 +565,7 @@ def test_a_small_example() -> None:
         'worst',
         'limits.force_max, 25, exceeded by front left in 1 setpoint from t = 1.00 s on: -30 at '
         'worst',
+        'limits.force_max could not be checked in 1 setpoint: J_inv cannot be solved',
         '',
         'det(J) crossed zero at t = 1.500 s: forces grow without bound there',
         'det(J) nearest zero: 1 m^3 at t = 1.00 s',
