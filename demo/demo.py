@@ -44,6 +44,7 @@ from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES, LENGTHS, MOTION
 from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.runtime.step import Batch, Outputs
 from tqdm import tqdm
 
@@ -148,7 +149,7 @@ def report(demo: Demo, parameters: Parameters) -> str:
         Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
               stamps),
         Outputs(every, stamps, results, forces, states, none, none))
-    return summary.table()
+    return '\n'.join(summary_lines(summary.values(), parameters))
 
 
 def main() -> None:
