@@ -20,10 +20,10 @@ The console scripts of the nodes: what needs no ROS is answered before rclpy is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any, NoReturn, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.nodes.signals import SIGNALS
@@ -93,8 +93,8 @@ def _run(module: str, name: str, node: str) -> int:
         print(f'{kind.node}: needs ROS 2: {reason}: source its setup file, or pip install '
               '"stewart_dynamics[ros]"', file=sys.stderr)
         return 1
-    code: int = program.main()
-    return code
+    end_process: Callable[[int], NoReturn] = _imported('nodes.rclpy_workarounds').end_process
+    end_process(program.main())
 
 
 def _imported(module: str) -> Any:
