@@ -154,7 +154,7 @@ def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
                     ([executable('stewart_trajectory')],
                      ['--params-file', MOTION, '-p', 'start_timeout:=1000.0'])))]
     try:
-        peer.until(lambda: len(desired) > 300 and len(commands) > 300, 'the loop runs')
+        peer.until(lambda: min(map(len, (measured, desired, commands))) > 300, 'the loop runs')
         first, last = (np.array(deserialize_message(data, JointState).position)
                        for data in (measured[0], measured[-1]))
         wanted = [np.array(deserialize_message(data, JointState).position) for data in desired]
