@@ -168,8 +168,7 @@ class DynamicsNode(LifecycleNode):
     def _configure(self) -> None:
         begun = time.monotonic()
         self._models = _Models.of(self._settings)
-        with SIGNALS.interrupting():
-            self._models.compile_ahead()
+        SIGNALS.interruptible(self._models.compile_ahead)
         how = 'compiled ' if jit.COMPILED else ''
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
         for mistake in likely_mistakes(self._settings):

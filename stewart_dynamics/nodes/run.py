@@ -202,7 +202,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         stop = done or Future()
         spin(executor, node, stop, lambda: SIGNALS.received)
         return int(stop.result())
-    except KeyboardInterrupt:  # of SIGNALS, while it compiled
+    except KeyboardInterrupt:  # while it compiled
         return 0
     except _OF_THE_USER as exc:
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-SIGINT and SIGTERM: a flag that a program looks at, and an exception nowhere but in compilation.
+SIGINT and SIGTERM set a flag that a program looks at; they raise no exception.
 
 An exception that a handler raises appears in whatever code runs at that time. Where this is a
 finalizer, a callback from C or another library's ``except``, the exception is lost, and the signal
@@ -23,13 +23,17 @@ whose calls of ROS then raise RCLError (https://github.com/ros2/rclpy/issues/128
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import Future
 import os
 import signal
-from typing import Any
+from threading import Thread
+from typing import Any, TypeVar
+
+Result = TypeVar('Result')
 
 _NUMBERS = (signal.SIGINT, signal.SIGTERM)
+_LOOK = 0.1  # [s]
 
 
 class Signals:
@@ -37,7 +41,7 @@ class Signals:
 
     def __init__(self) -> None:
         self.received = False
-        self._ends = self._interrupts = False
+        self._ends = False
 
     def watch(self, end_at_once: bool = False) -> None:
         """
@@ -55,23 +59,32 @@ class Signals:
         for number in _NUMBERS:
             signal.signal(number, signal.SIG_IGN)
 
-    @contextmanager
-    def interrupting(self) -> Iterator[None]:
-        """Raise KeyboardInterrupt in what runs inside: it takes long, and calls no ROS."""
-        self._interrupts = True
-        try:
+    def interruptible(self, compute: Callable[[], Result]) -> Result:
+        """
+        Return what a long computation gives, or raise KeyboardInterrupt soon after a signal.
+
+        It runs in a thread of its own, which goes on after a signal until the process ends.
+        """
+        future: Future[Result] = Future()
+
+        def run() -> None:
+            try:
+                future.set_result(compute())
+            except BaseException as exc:
+                future.set_exception(exc)
+
+        thread = Thread(target=run, daemon=True)
+        thread.start()
+        while thread.is_alive():
             if self.received:
                 raise KeyboardInterrupt
-            yield
-        finally:
-            self._interrupts = False
+            thread.join(_LOOK)
+        return future.result()
 
     def _handle(self, number: int, frame: Any) -> None:
         self.received = True
         if self._ends:
             os._exit(0)
-        if self._interrupts:
-            raise KeyboardInterrupt
 
 
 SIGNALS = Signals()

@@ -87,8 +87,7 @@ class SimulatorNode(Node):
         if compiled.HINT:
             self.get_logger().warning(compiled.HINT)
         begun = time.monotonic()
-        with SIGNALS.interrupting():
-            self._plant = Plant(self._settings)
+        self._plant = SIGNALS.interruptible(lambda: Plant(self._settings))
         self._state_messages = StateMessages(self._settings)
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
