@@ -116,10 +116,10 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'stewart_dynamics = stewart_dynamics.nodes.programs:dynamics',
+            'stewart_dynamics = stewart_dynamics.nodes.console_scripts:dynamics',
             'stewart_replay = stewart_dynamics.replay:main',
-            'stewart_simulator = stewart_dynamics.nodes.programs:simulator',
-            'stewart_trajectory = stewart_dynamics.nodes.programs:trajectory',
+            'stewart_simulator = stewart_dynamics.nodes.console_scripts:simulator',
+            'stewart_trajectory = stewart_dynamics.nodes.console_scripts:trajectory',
         ],
     },
 )

@@ -237,15 +237,16 @@ class ParameterSet(Mapping[str, Any]):
                 _checked(parameter, value, source)
 
     @classmethod
-    def check_value(cls, name: str, text: str, source: str) -> None:
-        """Raise ParameterError if a value, as text on a command line, breaks a rule."""
-        given = {name: read_value(text, f'{source}: {shown_name(name)}')}
-        for _, value in flat(given, '', source):
+    def read_value(cls, name: str, text: str, source: str) -> Any:
+        """Return a value that is text on a command line; ParameterError if it breaks a rule."""
+        given = read_value(text, f'{source}: {shown_name(name)}')
+        for _, value in flat({name: given}, '', source):
             check_given(name, value, source)
             if value is None:
                 raise ParameterError(f'{source}: {shown_name(name)}: has no value')
             if not is_of_ros(name):
                 _checked(cls.declared(name, value, source), value, source)
+        return given
 
     @classmethod
     def declared(cls, name: str, value: Any = None, source: str = 'parameters') -> Parameter:

@@ -71,7 +71,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
-from stewart_dynamics.nodes.rclpy_workarounds import spin
+from stewart_dynamics.nodes.rclpy_workarounds import shut_down, spin
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 import yaml
@@ -128,12 +128,26 @@ def own_domain() -> Iterator[int]:
             except BlockingIOError:
                 continue
             _LOCKS[domain] = file.fileno()
+            for path in of_shared_memory(domain):  # of programs that were killed
+                path.unlink(missing_ok=True)
             try:
                 yield domain
             finally:
                 del _LOCKS[domain]
             return
     raise RuntimeError('all ROS domains are taken')
+
+
+def of_shared_memory(domain: int) -> list[Path]:
+    """Return the files in shared memory that are of Fast DDS's ports of a domain."""
+    first = 7400 + 250 * domain
+    return [path for path in Path('/dev/shm').glob('*fastrtps_port*')
+            if 0 <= int(re.findall(r'port(\d+)', path.name)[0]) - first < 250]
+
+
+def participants(domain: int) -> int:
+    """Return the number of participants on this computer, with those that did not leave."""
+    return sum(path.name.endswith('_el') for path in of_shared_memory(domain))
 
 
 def log_lines(text: str, level: str = '') -> list[str]:
@@ -290,8 +304,8 @@ class Inside:
             stop = Event()
             self._thread = Thread(target=spin, args=(
                 self._executor, node, done or Future(), stop.is_set))
-            for end in (rclpy.try_shutdown, gc.unfreeze, node.destroy_node,
-                        self._executor.shutdown, self._thread.join, stop.set):
+            for end in (partial(shut_down, self._executor, node), gc.unfreeze,
+                        self._thread.join, stop.set):
                 stack.callback(end)  # the last one first
             self._thread.start()
             self._stack = stack.pop_all()

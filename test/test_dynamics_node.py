@@ -39,7 +39,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
     assert_only_log_lines, bits, DynamicsNode, executable, HOME, LATCHED, log_lines, nanoseconds,
-    NODE, OUTPUTS, Peer, PLATFORM, raw, rejected, ROOT, Sample, SEPARATE, wrench_message)
+    NODE, OUTPUTS, participants, Peer, PLATFORM, raw, rejected, ROOT, Sample, SEPARATE,
+    wrench_message)
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Parameters, Pose, StewartPlatform
@@ -883,6 +884,7 @@ def test_a_signal_ends_it_with_exit_code_0(
             node.send(MOVING)
             node.peer.spin(0.0)
     node.stop(number)
+    assert participants(node.domain) == 1, 'it did not leave; the one is in this process'
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])

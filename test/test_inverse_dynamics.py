@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import copy
 import os
 from pathlib import Path
@@ -30,6 +31,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 import pytest
 from referees import (
@@ -51,6 +53,13 @@ Array = NDArray[np.float64]
 PACKAGE = Path(stewart_dynamics.__file__).parent
 HEXAPODS = 12
 STATES = 15
+
+
+def hexapods(random: Generator) -> Iterator[tuple[StewartPlatform, Motion]]:
+    """Draw hexapods, each with a batch of motions."""
+    for _ in range(HEXAPODS):
+        parameters = random_parameters(random)
+        yield StewartPlatform(parameters), random_motion(parameters, random, STATES)
 
 
 def sample(motion: Motion, n: int) -> Motion:
@@ -124,10 +133,8 @@ def test_forces_near_a_singularity_are_those_of_pinocchio() -> None:
 
 def test_forces_are_those_of_the_lagrange_matrices() -> None:
     random = rng()
-    for _ in range(HEXAPODS):
-        p = random_parameters(random)
-        platform = StewartPlatform(p)
-        motion = random_motion(p, random, STATES)
+    for platform, motion in hexapods(random):
+        p = platform.parameters
         # in some samples the legs are as slow as where Coulomb friction is linear
         slowed = np.where(np.arange(STATES) % 3 == 0, 1e-4, 1.0)[:, None]
         motion = Motion(motion.position, motion.rotation, slowed * motion.linear_velocity,
@@ -192,10 +199,7 @@ def test_lengths_are_the_distances_of_the_joints_and_rates_their_derivatives() -
 
 def test_rates_are_j_inv_times_the_twist() -> None:
     random = rng()
-    for _ in range(HEXAPODS):
-        p = random_parameters(random)
-        platform = StewartPlatform(p)
-        motion = random_motion(p, random, STATES)
+    for platform, motion in hexapods(random):
         twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)
         rates = np.einsum(
             'nij,nj->ni', platform.inverse_jacobian(motion), twist)
@@ -204,10 +208,7 @@ def test_rates_are_j_inv_times_the_twist() -> None:
 
 def test_forces_at_rest_balance_the_gravity_vector() -> None:
     random = rng()
-    for _ in range(HEXAPODS):
-        p = random_parameters(random)
-        platform = StewartPlatform(p)
-        moving = random_motion(p, random, STATES)
+    for platform, moving in hexapods(random):
         rest = Motion(moving.position, moving.rotation)
         forces = platform.inverse_dynamics(rest).forces
         j_inv = platform.inverse_jacobian(rest)
@@ -255,10 +256,7 @@ def test_a_wrench_changes_the_forces_by_those_that_balance_it() -> None:
 
 def test_determinant_and_its_rate_are_those_of_j_inv() -> None:
     random = rng()
-    for _ in range(HEXAPODS):
-        p = random_parameters(random)
-        platform = StewartPlatform(p)
-        motion = random_motion(p, random, STATES)
+    for platform, motion in hexapods(random):
         result = platform.inverse_dynamics(motion)
         det = np.linalg.det(platform.inverse_jacobian(motion))
         assert relative(result.determinant, det) < 1e-13
@@ -288,10 +286,7 @@ def test_determinant_rate_is_exact_near_a_singularity() -> None:
 
 def test_condition_number_and_unit_load_forces_are_those_of_numpy() -> None:
     random = rng()
-    for _ in range(HEXAPODS):
-        p = random_parameters(random)
-        platform = StewartPlatform(p)
-        motion = random_motion(p, random, STATES)
+    for platform, motion in hexapods(random):
         result = platform.inverse_dynamics(motion)
         j = scaled_jacobian(platform, motion)
         assert np.allclose(result.condition_number, np.linalg.cond(j), rtol=1e-12, atol=0.0)
@@ -537,9 +532,8 @@ def test_where_machine_code_cannot_be_kept_it_is_compiled_at_every_start(
     code = """
 import numba.core.caching as caching
 caching.CacheImpl._locator_classes = []
-from stewart_dynamics.mechanics import jit as compiled
-from stewart_dynamics.mechanics import inverse_dynamics
-print(compiled.HINT)
+from stewart_dynamics.mechanics import inverse_dynamics, jit
+print(jit.HINT)
 print(inverse_dynamics.solve.py_func.__name__)
 """
     printed = run(code, path=tmp_path).splitlines()
@@ -660,7 +654,7 @@ def test_any_motion_gives_finite_results_or_an_error_of_the_package(
     assert result.condition_number >= 1.0
 
 
-def hexapods(amount: Any) -> Any:
+def _random_hexapods(amount: Any) -> Any:
     """Return a strategy for hexapods whose masses and inertias are such amounts."""
     moments = st.lists(amount, min_size=3, max_size=3)
     return st.fixed_dictionaries({
@@ -678,7 +672,7 @@ def hexapods(amount: Any) -> Any:
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)
-@given(st.one_of(hexapods(st.floats(0.01, 100.0)), hexapods(positive)))
+@given(st.one_of(_random_hexapods(st.floats(0.01, 100.0)), _random_hexapods(positive)))
 @np.errstate(all='ignore')
 def test_any_hexapod_gives_finite_results_or_an_error_of_the_package(values: Any) -> None:
     try:

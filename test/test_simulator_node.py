@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+import gc
 import math
 from pathlib import Path
 import re
@@ -35,8 +36,8 @@ from rclpy.serialization import deserialize_message
 from referees import rng
 from rosgraph_msgs.msg import Clock
 from running import (
-    assert_only_log_lines, bits, executable, Inside, log_lines, nanoseconds, Peer, PLATFORM,
-    Program, ROOT, wrench_message)
+    assert_only_log_lines, bits, executable, Inside, log_lines, nanoseconds, participants, Peer,
+    PLATFORM, Program, ROOT, wrench_message)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -513,9 +514,11 @@ def test_what_it_cannot_simulate_is_reported_in_one_line(
     for overrides, words in CANNOT:
         with pytest.raises(StewartError, match=re.escape(words)):
             Simulator(domain, tmp_path / 'inside', *overrides, inside=True)
+    gc.collect()  # what these leave
     for overrides, words in (CANNOT[0], CANNOT[-1]):
         program = start(*overrides).program
         assert program.wait() == 1, program.stderr
+        assert participants(domain) == 1, 'it did not leave; the one is in this process'
         lines = [line for line in program.stderr.splitlines() if not line.startswith('[WARN]')]
         assert len(lines) == 1, program.stderr
         assert lines[0].startswith('stewart_simulator: ')

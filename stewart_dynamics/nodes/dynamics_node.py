@@ -32,13 +32,14 @@ from stewart_dynamics.mechanics import jit
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes import parameter_changes
+from stewart_dynamics.nodes.declared_parameters import declare_parameters
 from stewart_dynamics.nodes.diagnostics_publisher import DiagnosticsPublisher
 from stewart_dynamics.nodes.markers_publisher import MarkersPublisher
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.nodes.rclpy_workarounds import (
     answer_impossible_transitions, set_parameters_together, take_waiting_messages)
 from stewart_dynamics.nodes.repeated_log import RepeatedLog
-from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.nodes.run import run
 from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
 from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics

@@ -32,11 +32,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import Six
-from stewart_dynamics.mechanics import jit as compiled
+from stewart_dynamics.mechanics import jit
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
-from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.nodes.declared_parameters import declare_parameters
+from stewart_dynamics.nodes.run import run
 from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.nodes.simulator_messages import INPUT_TYPES, OUTPUT_TYPES, StateMessages
 from stewart_dynamics.runtime.plant import Plant
@@ -84,8 +85,8 @@ class SimulatorNode(Node):
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = bool(self.get_parameter('use_sim_time').value)
         self._series = Series()
-        if compiled.HINT:
-            self.get_logger().warning(compiled.HINT)
+        if jit.HINT:
+            self.get_logger().warning(jit.HINT)
         begun = time.monotonic()
         self._plant = SIGNALS.interruptible(lambda: Plant(self._settings))
         self._state_messages = StateMessages(self._settings)

@@ -33,7 +33,8 @@ from stewart_dynamics.mechanics.reference_motion import motion_at, sample_count,
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.nodes.run import declare_parameters, run
+from stewart_dynamics.nodes.declared_parameters import declare_parameters
+from stewart_dynamics.nodes.run import run
 from stewart_dynamics.runtime import input_topics as inputs
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 

@@ -27,6 +27,7 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.fingerprint import fingerprint, VERSION
 from stewart_dynamics.replay.index import Cell, row_of
+from stewart_dynamics.replay.legs_table import kind_of_table
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import BAD_INPUT, code_of, Options
 from stewart_dynamics.replay.summary_text import summary_text
@@ -97,8 +98,8 @@ def finished(task: Task) -> Ended | None:
 
 def kept(task: Task) -> Ended | None:
     """Return the outcome of a bag whose results are there and whose inputs have not changed."""
-    table = 'legs.parquet' if task.options.parquet else 'legs.csv'
-    files = ['bag', table, *(['report.html'] if task.options.report else [])]
+    table = kind_of_table(task.options.parquet)
+    files = ['bag', table.FILE, *(['report.html'] if task.options.report else [])]
     summary = _summary_of(task)
     try:
         if (summary is None or not all((task.folder / name).exists() for name in files)
@@ -111,7 +112,7 @@ def kept(task: Task) -> Ended | None:
 
 
 def _summary_of(task: Task) -> dict[str, Any] | None:
-    """Return the content of summary.json; None if there is none of this version."""
+    """Return the content of summary.json; None if this version has not written one."""
     try:
         summary = json.loads((task.folder / 'summary.json').read_text(encoding='utf-8'))
         return summary if summary['version'] == VERSION and 'fingerprint' in summary else None

@@ -34,7 +34,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 _FOLDER = Path(__file__).with_name('templates')
 
-
 # Between thousands: a narrow space that does not break, as SI recommends.
 _THIN_SPACE = '\u202f'
 

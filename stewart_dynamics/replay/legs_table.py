@@ -93,10 +93,12 @@ class CsvTable:
 
     """
 
+    FILE = 'legs.csv'
+
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
         self._quasi_static = quasi_static
-        self._file = (folder / 'legs.csv').open('wb')
+        self._file = (folder / self.FILE).open('wb')
         names = [_quoted(harmless(name)) for name in column_names(legs)]
         self._file.write(','.join(names).encode() + b'\n')
 
@@ -130,6 +132,8 @@ def _quoted(text: str) -> str:
 class ParquetTable:
     """legs.parquet: the columns of legs.csv; null: not known, or no force."""
 
+    FILE = 'legs.parquet'
+
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False) -> None:
         self._quasi_static = quasi_static
@@ -144,7 +148,7 @@ class ParquetTable:
         self._schema = pyarrow.schema([
             (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
             (names[-1], pyarrow.bool_())])
-        self._writer = pyarrow.parquet.ParquetWriter(folder / 'legs.parquet', self._schema)
+        self._writer = pyarrow.parquet.ParquetWriter(folder / self.FILE, self._schema)
         self._waiting: list[Any] = []
 
     def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
@@ -167,3 +171,8 @@ class ParquetTable:
         if self._waiting:
             self._writer.write_table(self._arrow.Table.from_batches(self._waiting))
             self._waiting.clear()
+
+
+def kind_of_table(parquet: bool) -> type[CsvTable] | type[ParquetTable]:
+    """Return the kind of table that a replay writes."""
+    return ParquetTable if parquet else CsvTable

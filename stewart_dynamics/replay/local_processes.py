@@ -124,8 +124,8 @@ class _Pool:
         except BrokenProcessPool:
             self._read(progress)
             if not self._started:
-                raise StewartError('the processes to replay bags could not start') from (
-                    None)
+                raise StewartError(
+                    'the processes to replay bags could not start') from None
             for task in self.in_work:
                 self._bar.at(task.number, 0, 0)
         finally:

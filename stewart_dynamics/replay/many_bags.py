@@ -60,9 +60,9 @@ class Fleet(NamedTuple):
         """Return the number of bags by result, and a line for every bag with an error."""
         number = Counter(str(each.row['result']) for each in self.ended)
         counts = ', '.join(f'{number[result]} {result}' for result in SEVERITY if number[result])
-        kept = sum(each.kept for each in self.ended)
-        if kept:
-            counts += f'; {kept} kept from an earlier run, their inputs have not changed'
+        unchanged = sum(each.kept for each in self.ended)
+        if unchanged:
+            counts += f'; {unchanged} kept from an earlier run, their inputs have not changed'
         return '\n'.join([f'{len(self.ended)} bags: {counts}',
                           *(each.error for each in self.ended if each.error)])
 

@@ -38,7 +38,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
-from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable, Table
+from stewart_dynamics.replay.legs_table import kind_of_table, Table
 from stewart_dynamics.replay.options import code_of, Options
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_efforts import Efforts
@@ -172,8 +172,8 @@ class _Run:
             self._breakdown = ForceBreakdownRows(parameters)
         self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters))
         stack.callback(self._bag.abandon)
-        table = ParquetTable if options.parquet else CsvTable
-        self._table: Table = table(folder, parameters['joints'], self._quasi_static)
+        self._table: Table = kind_of_table(options.parquet)(
+            folder, parameters['joints'], self._quasi_static)
         stack.callback(self._table.close)
 
     def take(self, messages: Messages) -> int:

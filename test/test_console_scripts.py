@@ -24,7 +24,7 @@ import pytest
 from referees import ROOT
 
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.nodes.programs import usage
+from stewart_dynamics.nodes.console_scripts import usage
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
