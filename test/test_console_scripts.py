@@ -38,8 +38,8 @@ import sys
 if sys.argv.pop(1) == 'without ROS':
     for name in ('rclpy', 'rcl_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'std_msgs'):
         sys.modules[name] = None
-from stewart_dynamics.nodes import programs
-code = getattr(programs, sys.argv.pop(1))()
+from stewart_dynamics.nodes import console_scripts
+code = getattr(console_scripts, sys.argv.pop(1))()
 print([name for name in {HEAVY} if sys.modules.get(name)])
 sys.exit(code)
 """

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    QUARTER_TURN, random_motion, random_parameters, rng, ROOT, size_of, symmetric_parameters,
-    uncompiled)
+    QUARTER_TURN, random_direction, random_motion, random_parameters, rng, ROOT,
+    rotation_about, size_of, symmetric_parameters, uncompiled)
 
 from stewart_dynamics import (
     Motion, MotionError, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
@@ -131,6 +131,16 @@ def test_the_assembly_of_the_guess_is_kept(hexapod: StewartPlatform) -> None:
         found = hexapod.forward_kinematics(lengths, guess)
         assert np.max(np.abs(found.position - pose.position)) < 1e-13
         assert np.max(np.abs(found.rotation - pose.rotation)) < 1e-13
+
+
+def test_a_rotation_that_has_drifted_becomes_the_nearest_one() -> None:
+    random = rng()
+    for _ in range(20):
+        rotation = rotation_about(random_direction(random), random.uniform(0.0, 3.0))
+        drifted = rotation + 1e-5 * random.normal(size=(3, 3))
+        left, _, right = np.linalg.svd(drifted)
+        found = forward_kinematics._orthonormal(tuple(drifted.ravel()))
+        assert np.allclose(np.reshape(found, (3, 3)), left @ right, rtol=0.0, atol=1e-8)
 
 
 def test_the_search_does_not_cross_a_singularity() -> None:

@@ -149,7 +149,7 @@ def test_what_the_node_says_of_mistakes_is_what_the_page_says(names: dict[str, A
         for change in changes:
             try:
                 if change == {'platform.mass': 21}:  # in a file; the library takes it
-                    Parameters.check_value('platform.mass', '21', 'my_hexapod.yaml')
+                    Parameters.read_value('platform.mass', '21', 'my_hexapod.yaml')
                 said = '\n'.join(likely_mistakes(names['parameters'].replaced(change)))
             except ParameterError as exc:
                 said = str(exc)

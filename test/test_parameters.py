@@ -559,10 +559,10 @@ def test_parameters_that_ros_declares_are_ignored(tmp_path: Path, name: str) -> 
     ('gravity', '[', 'gravity: not YAML: line '), ('gravity', '\udcff', 'gravity: not YAML'),
     ('use_sim_time', '1', 'use_sim_time: 1: must be a bool')])
 def test_a_bad_value_on_a_command_line_is_rejected(name: str, text: str, said: str) -> None:
-    Parameters.check_value('platform.mass', '150.0', 'command line')
-    Parameters.check_value('use_sim_time', 'true', 'command line')
+    Parameters.read_value('platform.mass', '150.0', 'command line')
+    Parameters.read_value('use_sim_time', 'true', 'command line')
     with pytest.raises(ParameterError) as caught:
-        Parameters.check_value(name, text, 'command line')
+        Parameters.read_value(name, text, 'command line')
     assert str(caught.value).startswith(f'command line: {said}')
     assert str(caught.value).isprintable()
 

@@ -255,6 +255,17 @@ def test_a_mistake_is_reported(name: str) -> None:
     assert all(mistake.isprintable() for mistake in found)
 
 
+# The platform joints of this hexapod are 0.6 m from their center, the base joints 0.9 m.
+@pytest.mark.parametrize('gyration, words', [
+    (26.0, ''), (28.0, 'in g mm^2 or kg mm^2?'), (0.6 / 190.0, ''), (0.6 / 210.0, 'scaled twice')])
+def test_the_radius_of_gyration_has_bounds(gyration: float, words: str) -> None:
+    moment = 150.0 * gyration ** 2
+    found = likely_mistakes(PLATFORM.replaced({
+        'platform.inertia': [moment, 0.0, 0.0, moment, 0.0, moment]}))
+    for suspected in ('in g mm^2 or kg mm^2?', 'scaled twice'):
+        assert any(suspected in mistake for mistake in found) == (suspected == words), found
+
+
 def test_one_mistake_is_reported_once() -> None:
     several = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
                'the base joints in mm', 'the platform joints in cm and limits', 'limits in mm'}
