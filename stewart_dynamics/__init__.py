@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters import Parameters
-    from stewart_dynamics.runtime.planned_trajectory import (
-        check_planned_trajectory, PlannedTrajectory)
+    from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
+    from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
 
 __version__ = '0.1.0'
 
@@ -51,7 +51,8 @@ _MODULES = {
     'mechanics.stewart_platform': ('StewartPlatform',),
     'mechanics.stiffness': ('NaturalModes',),
     'parameters': ('Parameters',),
-    'runtime.planned_trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
+    'runtime.planned_trajectory': ('check_planned_trajectory',),
+    'runtime.planned_trajectory_result': ('PlannedTrajectory',),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

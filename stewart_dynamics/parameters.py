@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameter_declaration import Parameter
+from stewart_dynamics.parameter_set import ParameterSet
 
 
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:

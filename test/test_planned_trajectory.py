@@ -30,8 +30,9 @@ from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
-from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory, PlannedTrajectory
+from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
 from stewart_dynamics.runtime.planned_trajectory_checks import LIMIT, SINGULAR
+from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.step import Setpoint, Step
 from trajectories import (

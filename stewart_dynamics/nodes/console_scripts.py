@@ -29,7 +29,8 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.nodes.signals import SIGNALS
 
 if TYPE_CHECKING:
-    from stewart_dynamics.parameter_set import Parameter, ParameterSet
+    from stewart_dynamics.parameter_declaration import Parameter
+    from stewart_dynamics.parameter_set import ParameterSet
 
 
 def dynamics() -> int:

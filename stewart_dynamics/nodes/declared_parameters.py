@@ -32,8 +32,9 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.nodes.console_scripts import parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
     describe_by, is_present, set_parameters_together)
+from stewart_dynamics.parameter_declaration import Parameter
 from stewart_dynamics.parameter_files import is_of_ros, other_nodes, parameters_of
-from stewart_dynamics.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameter_set import ParameterSet
 from stewart_dynamics.parameters_yaml import read_document
 
 _TYPES = {

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 import math
 
 import numpy as np
@@ -43,6 +42,7 @@ from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, MOTION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.planned_trajectory_checks import Checks, Violation
+from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
 
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
@@ -69,48 +69,6 @@ TOO_FAR = 'points too far apart'
 _LENGTHS, _RATES, _FORCES = consecutive(6, 6, 6)
 # After which points of a block samples are (M,), and at which fraction of the interval (M,).
 _Samples = tuple[Integers, Array]
-
-
-def _no_legs() -> Array:
-    return np.empty((0, 6))
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedTrajectory:
-    """The result of the check of a planned trajectory."""
-
-    accepted: bool
-    message: str
-    """In words: 'accepted: 201 points over 2 s' or 'rejected: at 0.055 s leg_3: rate ...'."""
-    points: int
-    duration: float
-    """From the first point to the last [s]."""
-    reason: str = ''
-    """Why it is rejected, a constant of this module or ``planned_trajectory_checks``."""
-    time: float = math.nan
-    """When it would first do what it is rejected for [s]."""
-    leg: int | None = None
-    """Which leg would, 0 to 5; None where no leg is concerned."""
-    limit: str = ''
-    """The limit that is exceeded, 'limits.velocity_max'; empty where none is."""
-    lengths: Array = field(default_factory=_no_legs, repr=False)
-    """At the points (N, 6) [m]; (0, 6) where rejected."""
-    rates: Array = field(default_factory=_no_legs, repr=False)
-    """At the points (N, 6) [m/s], + extends; (0, 6) where rejected."""
-    forces: Array = field(default_factory=_no_legs, repr=False)
-    """Of the actuators at the points (N, 6) [N], + pushes; (0, 6) where rejected."""
-    warning: bool = False
-    """Accepted, but the condition number reaches singularity.warn_condition."""
-    condition_number: float = math.nan
-    """The largest, at points and between them; nan where rejected."""
-    condition_time: float = math.nan
-    """When that is [s]."""
-    force: float = math.nan
-    """The largest absolute force, at points and between them [N]; nan where rejected."""
-    force_leg: int | None = None
-    """Of which leg, 0 to 5."""
-    load: float = math.nan
-    """The largest absolute force as a part of limits.force_max; 0 without that limit."""
 
 
 def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion: Motion,

@@ -34,7 +34,8 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.planned_trajectory import (
-    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
+    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE)
+from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
 from stewart_dynamics.runtime.rejections import (
     frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 from stewart_dynamics.runtime.samples import unit_quaternions
