@@ -39,7 +39,7 @@ class PlannedTrajectory:
     duration: float
     """From the first point to the last [s]."""
     reason: str = ''
-    """Why it is rejected, a constant of ``planned_trajectory`` or ``planned_trajectory_checks``."""
+    """Why it is rejected, a constant of ``planned_trajectory`` or of its checks."""
     time: float = math.nan
     """When it would first do what it is rejected for [s]."""
     leg: int | None = None
