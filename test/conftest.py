@@ -48,13 +48,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests with ROS, and put their modules first: they wait most; then slow ones."""
+    """Mark the tests with ROS; put modules with slow tests first, those with ROS wait most."""
     for item in items:
         if 'ros_environment' in getattr(item, 'fixturenames', ()):
             item.add_marker('ros')
-    slow = {mark: {item.path for item in items if item.get_closest_marker(mark)}
+    having = {mark: {item.path for item in items if item.get_closest_marker(mark)}
             for mark in ('ros', 'slow')}
-    items.sort(key=lambda item: (item.path not in slow['ros'], item.path not in slow['slow']))
+    items.sort(key=lambda item: (item.path not in having['slow'], item.path not in having['ros']))
 
 
 @pytest.fixture(scope='session')

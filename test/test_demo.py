@@ -20,9 +20,11 @@ from pathlib import Path
 import re
 import sys
 
+import pytest
 from running import log_lines, Program, ROOT
 
 
+@pytest.mark.slow
 def test_the_demo_prints_what_the_node_has_answered(domain: int, tmp_path: Path) -> None:
     program = Program([sys.executable, ROOT / 'demo' / 'demo.py'], domain, tmp_path)
     try:

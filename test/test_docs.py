@@ -81,6 +81,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
             if '_static' not in path.parts}
 
 
+@pytest.mark.slow
 def test_every_page_is_on_the_site(site: dict[str, Page]) -> None:
     pages = {path.stem for path in [*ROOT.glob('docs/*.md'), *ROOT.glob('docs/*.rst')]}
     assert {f'{page}.html' for page in pages} <= set(site)

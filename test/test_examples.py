@@ -52,6 +52,7 @@ def run(tmp_path: Path) -> Iterator[Run]:
         program.kill()
 
 
+@pytest.mark.slow
 def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
         start: Callable[..., DynamicsNode], run: Run) -> None:
     # Its answers go to the topic of a joint_trajectory_controller.
@@ -104,6 +105,7 @@ def test_without_a_node_it_ends_with_one_line(domain: int, run: Run, name: str) 
     assert 'within 0.5 s' in line
 
 
+@pytest.mark.slow
 def test_a_push_is_found_in_the_loop(ros_environment: None, tmp_path: Path, run: Run) -> None:
     """In the simulator's own time, so that it depends on no load of the computer."""
     simulated = ['-p', 'use_sim_time:=true']

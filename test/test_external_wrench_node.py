@@ -302,6 +302,7 @@ def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
 
 # In the loop with the simulator
 
+@pytest.mark.slow
 def test_a_wrench_on_the_simulator_in_motion_is_found_within_5_percent(
         start: Start, tmp_path: Path) -> None:
     """Step by step: this is the controller, PD and feed-forward; and it lets go again."""

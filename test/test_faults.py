@@ -338,6 +338,7 @@ def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_dropped(
     node.rejects('setpoint/pose', NOT_JOINED, 999)
 
 
+@pytest.mark.slow
 def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -> None:
     node = begin(NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
     stamps = [node.stamp() for _ in range(10_000 // 3 + 1)]
@@ -534,6 +535,7 @@ def test_with_exclusive_setpoints_a_killed_publisher_counts_until_it_is_removed(
 
 # The node itself
 
+@pytest.mark.slow
 def test_a_killed_node_answers_again_after_a_restart(start: Start, tmp_path: Path) -> None:
     killed = start(NUMBA_DEBUG_CACHE='1')
     killed.until_active()
@@ -555,6 +557,7 @@ def test_a_killed_node_answers_again_after_a_restart(start: Start, tmp_path: Pat
         node.at_work()
 
 
+@pytest.mark.slow
 def test_lifecycles_under_load_leave_nothing_behind(
         begin: Start, tmp_path: Path) -> None:
     node = begin()
@@ -919,6 +922,7 @@ def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> 
                'they are counted')
 
 
+@pytest.mark.slow
 def test_a_trajectory_in_work_is_dropped_when_the_node_ends(renew: Start) -> None:
     node = renew()
     planner = Planner(node)

@@ -126,6 +126,8 @@ def until(condition: Callable[[], Any], what: str) -> Any:
 
 def process_in(folder: Path, bag: str) -> int | None:
     """Return the other process that is writing the results of a bag."""
+    if not any(folder.glob(f'.{bag}.*')):
+        return None
     for process in Path('/proc').glob('[0-9]*'):
         if process.name == f'{os.getpid()}':
             continue  # it removes the partial results of others, and has that folder open
@@ -182,6 +184,7 @@ def check_each_once(fleet: Fleet, pairs: list[tuple[Path, Path]], output: Path) 
 # On this computer
 
 @pytest.mark.parametrize('jobs', [1, 2])
+@pytest.mark.slow
 def test_every_bag_is_replayed_once(bags: Path, tmp_path: Path, jobs: int) -> None:
     output = tmp_path / 'out' / 'of two'
     pairs = folders_of_results([bags], output)
@@ -266,6 +269,7 @@ def test_results_are_not_overwritten(bags: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('jobs', [1, 2])
+@pytest.mark.slow
 def test_a_bag_finished_by_the_same_run_is_not_replayed_again(
         bags: Path, tmp_path: Path, jobs: int, cluster: LocalCluster) -> None:
     """As left by a process that dies before it can report it."""
@@ -381,6 +385,7 @@ def test_hostile_names(
 
 
 @pytest.mark.parametrize('jobs', [1, 2])
+@pytest.mark.slow
 def test_an_interrupted_run_continues(bags: Path, tmp_path: Path, jobs: int) -> None:
     output = tmp_path / 'out'
     pairs = folders_of_results([bags], output)
@@ -504,6 +509,7 @@ def group_is_gone(leader: int) -> bool:
 
 
 @pytest.mark.parametrize('where', ['here', 'processes', 'cluster'])
+@pytest.mark.slow
 def test_an_interrupt_leaves_no_partial_results(
         huge: Path, tmp_path: Path, where: str, cluster: LocalCluster) -> None:
     output = tmp_path / 'out'
@@ -528,6 +534,7 @@ def test_an_interrupt_leaves_no_partial_results(
         check_whole(folder, huge / folder.relative_to(output))
 
 
+@pytest.mark.slow
 def test_processes_end_with_the_one_that_started_them(huge: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
     running = program(huge, output, '--jobs', '2')
@@ -567,6 +574,7 @@ def test_a_cluster_gives_the_results_of_this_computer(
     assert '100%' in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_every_bag_is_replayed_once_when_a_worker_is_killed(
         bags: Path, tmp_path: Path, cluster: LocalCluster) -> None:
     output = tmp_path / 'out'
@@ -585,6 +593,7 @@ def test_every_bag_is_replayed_once_when_a_worker_is_killed(
     check_each_once(fleet, pairs, output)
 
 
+@pytest.mark.slow
 def test_a_bag_that_kills_its_workers_does_not_affect_others(
         bags: Path, tmp_path: Path) -> None:
     output = tmp_path / 'out'
@@ -603,6 +612,7 @@ def test_a_bag_that_kills_its_workers_does_not_affect_others(
             if pid is not None and pid not in killed:
                 killed.add(pid)
                 os.kill(pid, signal.SIGKILL)
+            time.sleep(0.002)
         fleet = running.result()
     assert [each.bag.name for each in fleet.ended if each.code == BAD_INPUT] == ['long']
     assert re.search(r'/long: the worker that replayed it died 2 times, the last one at '
@@ -613,6 +623,7 @@ def test_a_bag_that_kills_its_workers_does_not_affect_others(
         check_whole(folder, bag)
 
 
+@pytest.mark.slow
 def test_a_lost_cluster_is_reported_for_each_bag(
         huge: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     script = tmp_path / 'cluster.py'

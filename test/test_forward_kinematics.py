@@ -92,6 +92,7 @@ def test_the_pose_is_found_from_lengths_and_the_twist_from_rates(seed: int) -> N
     assert rates == pytest.approx(truth.rates, rel=1e-12, abs=1e-12 * size_of(p))
 
 
+@pytest.mark.slow
 def test_from_far_it_takes_six_steps_at_most_and_never_ends_at_another_pose(
         hexapod: StewartPlatform) -> None:
     p, random, many = hexapod.parameters, rng(), 100_000

@@ -340,6 +340,7 @@ def test_a_row_without_a_report_links_to_its_folder(page: Page, tmp_path: Path) 
 
 
 @in_browser
+@pytest.mark.slow
 def test_thousands_of_bags(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, [row(f'{n}', 0, summary([float(n % 997)])) for n in range(1500)])
     # the page is small, and the rows are not drawn all at once

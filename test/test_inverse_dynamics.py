@@ -597,6 +597,7 @@ def test_the_package_needs_neither_ros_nor_bags() -> None:
     assert not tops & {'rclpy', 'rosbags', 'sensor_msgs', 'geometry_msgs', 'std_msgs'}
 
 
+@pytest.mark.slow
 def test_kept_machine_code_is_not_used_after_a_change_of_a_module_it_was_made_of(
         tmp_path: Path) -> None:
     if not stewart_dynamics.mechanics.jit.COMPILED:

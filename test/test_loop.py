@@ -63,6 +63,7 @@ def run(ros_environment: None, demo: ModuleType) -> Iterator[Callable[..., Any]]
 
 
 @pytest.mark.parametrize('payload, times', [(1.0, 10.0), (1.3, 2.0)], ids=['right', 'heavier'])
+@pytest.mark.slow
 def test_feed_forward_cuts_the_tracking_error(
         run: Callable[..., Any], payload: float, times: float) -> None:
     alone, forward = run(False, payload), run(True, payload)
@@ -73,6 +74,7 @@ def test_feed_forward_cuts_the_tracking_error(
     assert 100.0 < alone.rms['all legs'] < 10e3  # [um]
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_bits(run: Callable[..., Any]) -> None:
     first, second = run(True, 1.3), run(True, 1.3, number=1)
     for one, other in zip(first.errors, second.errors, strict=True):
@@ -87,6 +89,7 @@ def test_a_program_that_does_not_start_ends_the_demo_with_its_output(
         run(True, 1.0, number=1)
 
 
+@pytest.mark.slow
 def test_a_program_that_ends_early_ends_the_demo(domain: int, tmp_path: Path) -> None:
     program = Program([sys.executable, ROOT / 'demo' / 'loop.py', '--seconds', '1000.0',
                        '--output', tmp_path / 'looped'], domain, tmp_path / 'demo')
@@ -135,6 +138,7 @@ def test_what_cannot_be_run_is_reported_in_one_line(
     assert said in line
 
 
+@pytest.mark.slow
 def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         domain: int, tmp_path: Path) -> None:
     simulator = ROOT / 'config' / 'simulator.yaml'

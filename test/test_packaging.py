@@ -182,6 +182,7 @@ def check_share(share: Path) -> None:
     assert (share / NAME / 'launch/demo.launch.py').is_file()
 
 
+@pytest.mark.slow
 def test_colcon_puts_executables_where_ros2_run_looks(install: Path) -> None:
     """Scripts stand in lib/<package> and data in share/."""
     scripts = install / NAME / 'lib' / NAME

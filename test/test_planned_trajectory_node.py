@@ -21,6 +21,7 @@ from collections.abc import Callable
 
 from lifecycle_msgs.msg import Transition
 import numpy as np
+import pytest
 from running import (
     bits, DynamicsNode, HOME, log_lines, nanoseconds, NODE, Planner, Sample, wrench_message)
 from stewart_dynamics import StewartPlatform
@@ -156,6 +157,7 @@ def test_a_trajectory_is_answered_with_one_set_of_parameters(fresh: Start) -> No
     check(planner.until_answered(3), [HOME], heavy)
 
 
+@pytest.mark.slow
 def test_work_on_trajectories_ends_with_the_node(start: Start) -> None:
     node = start()
     node.until_active()

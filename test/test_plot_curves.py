@@ -62,6 +62,7 @@ def same(a: Array, b: Array) -> bool:
 
 @settings(max_examples=150, deadline=None)
 @given(samples(), st.sampled_from([2, 4, 8, 64]))
+@pytest.mark.slow
 def test_every_extreme_of_every_bucket_is_drawn_at_its_time(
         given_samples: tuple[Array, Array, list[int]], buckets: int) -> None:
     times, values, edges = given_samples

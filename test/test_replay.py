@@ -837,6 +837,7 @@ def test_a_damaged_bag_never_crashes_the_replay(plugin: StoragePlugin, tmp_path:
 
 # In a process of its own
 
+@pytest.mark.slow
 def test_it_runs_as_a_program(tmp_path: Path, replayed: dict[str, Outputs]) -> None:
     done = run_apart(*(ROOT / 'bags' / name for name in BAGS), '--params', PARAMS, '--output',
                      tmp_path / 'out', '--strict')
@@ -891,6 +892,7 @@ def begun(bag: Path, out: Path) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.slow
 def test_a_killed_replay_leaves_nothing_under_the_final_name(
         long_bag: Path, tmp_path: Path) -> None:
     with begun(long_bag, tmp_path / 'out') as process:
@@ -902,6 +904,7 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
 
 
 @pytest.mark.parametrize('sent', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.slow
 def test_an_interrupted_replay_leaves_nothing(
         sent: signal.Signals, long_bag: Path, tmp_path: Path) -> None:
     with begun(long_bag, tmp_path / 'out') as process:

@@ -645,6 +645,7 @@ def test_without_any_setpoint(opened: Callable[..., Opened]) -> None:
     report.check()
 
 
+@pytest.mark.slow
 def test_hostile_names_are_shown_and_not_executed(opened: Callable[..., Opened]) -> None:
     given = trajectory('clear', PARAMETERS.replaced({'joints': list(HOSTILE)}))
     report = opened(given, bag=f'/a/{HOSTILE[1]}', notices=list(HOSTILE))

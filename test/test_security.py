@@ -463,6 +463,7 @@ def _another_address() -> str:
         return '' if address.startswith('127.') else address
 
 
+@pytest.mark.slow
 def test_one_host(crowd: Crowd, tmp_path: Path) -> None:
     """
     The node is bound to 127.0.0.1 alone, and who does not use that address gets nothing.
@@ -544,6 +545,7 @@ def without(profile: Path, elements: str) -> str:
     return str(lacking)
 
 
+@pytest.mark.slow
 def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
     Forces flow where keys are right, and all others are turned away.
@@ -602,6 +604,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     assert_only(receiver, 1)
 
 
+@pytest.mark.slow
 def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
     The same intruders succeed where just that is missing which is to keep each of them out.

@@ -486,6 +486,7 @@ def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(
     assert np.all(gaps >= PERIOD)
 
 
+@pytest.mark.slow
 def test_a_signal_ends_it(start: Start) -> None:
     for number, overrides in (
             (signal.SIGINT, ()), (signal.SIGTERM, (STEPPED,)), (signal.SIGINT, TOO_STIFF)):
