@@ -53,7 +53,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if 'ros_environment' in getattr(item, 'fixturenames', ()):
             item.add_marker('ros')
     having = {mark: {item.path for item in items if item.get_closest_marker(mark)}
-            for mark in ('ros', 'slow')}
+              for mark in ('ros', 'slow')}
     items.sort(key=lambda item: (item.path not in having['slow'], item.path not in having['ros']))
 
 
