@@ -92,7 +92,7 @@ def heave(folder: Path, number: int, amplitude: float = 0.05) -> Path:
 @pytest.fixture(scope='module')
 def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a bag that takes so long that a process can be caught in the middle of it."""
-    return heave(tmp_path_factory.mktemp('long') / 'long', 150_000)
+    return heave(tmp_path_factory.mktemp('long') / 'long', 80_000)
 
 
 @pytest.fixture
