@@ -95,11 +95,12 @@ class Planner(Node):
 
     def missing(self) -> str:
         """Return what is not connected yet: the node answers only once."""
-        if not self.motions.get_subscription_count():
-            return f'no subscriber on {self.motions.topic_name}'
-        if not self.count_publishers(self.answer.topic_name):  # which follows remaps
-            return f'no publisher on {self.answer.topic_name}'
-        return '' if self.connected else 'no diagnostics of stewart_dynamics'
+        ends = {f'subscriber on {self.motions.topic_name}': self.motions.get_subscription_count(),
+                # which follows remaps
+                f'publisher on {self.answer.topic_name}':
+                    self.count_publishers(self.answer.topic_name),
+                'diagnostics of stewart_dynamics': self.connected}
+        return ', '.join(f'no {end}' for end, there in ends.items() if not there)
 
     def until(self, done: Callable[[], bool], timeout: float) -> bool:
         end = time.monotonic() + timeout

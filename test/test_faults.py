@@ -457,13 +457,18 @@ def test_a_second_node_of_the_same_name_is_reported(at_work: DynamicsNode) -> No
 
 
 # How long a silent participant counts as alive for others; 20 s by default.
-BRIEF = """\
-<?xml version="1.0" encoding="UTF-8"?>
-<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
-  <participant profile_name="brief" is_default_profile="true"><rtps><builtin><discovery_config>
+# Others remove a killed process after 2 s.
+LEASE = """\
+  <discovery_config>
     <leaseDuration><sec>2</sec></leaseDuration>
     <leaseAnnouncement><sec>0</sec><nanosec>500000000</nanosec></leaseAnnouncement>
-  </discovery_config></builtin></rtps></participant>
+  </discovery_config>
+"""
+BRIEF = f"""\
+<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <participant profile_name="brief" is_default_profile="true"><rtps><builtin>
+{LEASE}  </builtin></rtps></participant>
 </profiles>
 """
 
@@ -473,6 +478,20 @@ def _brief(folder: Path) -> dict[str, str]:
     profile = folder / 'brief.xml'
     profile.write_text(BRIEF, encoding='utf-8')
     return {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile)}
+
+
+def _by_udp(folder: Path, lease: str = '') -> dict[str, str]:
+    """
+    Return the environment of a process without shared memory.
+
+    With it, one that is stopped or killed may hold the lock of its queue, for which others wait.
+    """
+    one_host = (ROOT / 'security' / 'one_host.xml').read_text(encoding='utf-8')
+    assert one_host.count('<builtin>') == 1
+    profile = folder / 'udp.xml'
+    profile.write_text(one_host.replace('<builtin>', f'<builtin>{lease}'), encoding='utf-8')
+    return {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
 
 
 def test_a_publisher_that_is_killed_and_started_again_is_received(
@@ -642,7 +661,7 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> 
 def test_a_killed_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
     node = at_work
     controller = Program([sys.executable, FEEDER], node.domain, tmp_path / 'controller',
-                         **_brief(tmp_path))
+                         **_by_udp(tmp_path, LEASE))
     forces = f'{NODE}/leg_forces'
     node.until(lambda: node.peer.node.count_subscribers(forces) == 2, 'the controller is there')
     before = len(node.raw['leg_states'])
@@ -659,7 +678,8 @@ def test_a_killed_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: 
 def test_a_stopped_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
     """A viewer that hangs reads neither forces nor markers; the node does not wait for it."""
     node = at_work
-    viewer = Program([sys.executable, FEEDER], node.domain, tmp_path / 'viewer')
+    viewer = Program([sys.executable, FEEDER], node.domain, tmp_path / 'viewer',
+                     **_by_udp(tmp_path))
     markers = f'{NODE}/markers'
     node.until(lambda: node.peer.node.count_subscribers(markers) == 1, 'the viewer is there')
     before = len(node.raw['leg_states'])
