@@ -13,14 +13,16 @@
 # limitations under the License.
 
 """
-A program that has numba keep the machine code of the package: ``python compile_ahead.py PART``.
+A program that has numba keep the machine code of the package: ``python compile_ahead.py``.
 
-The tests start it, once for each part and all at a time, before several processes need the code.
+It starts itself once for each part, all at a time. ``make environment`` runs it, and the tests do
+before several processes need the code.
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
+import subprocess
 import sys
 from tempfile import TemporaryDirectory
 
@@ -69,4 +71,9 @@ def library() -> None:
 PARTS = {'step': step, 'plant': plant, 'library': library}
 
 if __name__ == '__main__':
-    PARTS[sys.argv[1]]()
+    if sys.argv[1:]:
+        PARTS[sys.argv[1]]()
+    else:
+        programs = [subprocess.Popen([sys.executable, __file__, part], stdin=subprocess.DEVNULL,
+                                     stdout=subprocess.DEVNULL) for part in PARTS]
+        sys.exit(max(program.wait() for program in programs))

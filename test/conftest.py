@@ -39,12 +39,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Before several processes run the tests, compile what each of them would compile."""
     is_worker = hasattr(session.config, 'workerinput')
     if not is_worker and getattr(session.config.option, 'numprocesses', None):
-        programs = [subprocess.Popen([sys.executable, COMPILE_AHEAD, part], stdin=DEVNULL,
-                                     stdout=DEVNULL, cwd=COMPILE_AHEAD.parent)
-                    for part in ('step', 'plant', 'library')]
-        for program in programs:
-            if program.wait():
-                raise pytest.UsageError(f'{program.args}: exit code {program.returncode}')
+        subprocess.run([sys.executable, COMPILE_AHEAD], check=True, stdin=DEVNULL, stdout=DEVNULL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

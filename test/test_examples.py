@@ -91,8 +91,8 @@ def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
     program = run('plan_motion.py', node.domain, '--timeout', '1.0')
     assert program.wait() == 1
     assert re.fullmatch(  # the others may have been found by then
-        '(no subscriber .+, )?no publisher on /stewart_dynamics/leg_trajectory(, no diagnostics .+)?'
-        r' within 1 s; are topics remapped\? See --help\n', program.stderr)
+        '(no subscriber .+, )?no publisher on /stewart_dynamics/leg_trajectory'
+        r'(, no diagnostics .+)? within 1 s; are topics remapped\? See --help\n', program.stderr)
     program = planned('--duration', '-1.0')
     assert program.wait() == 1
     assert 'motion.duration: -1.0 s: must be more than 0' in program.stderr

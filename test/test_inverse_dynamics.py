@@ -47,7 +47,7 @@ from stewart_dynamics.mechanics import batch, lagrange
 from stewart_dynamics.mechanics.inverse_dynamics import LANES, solve
 from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, FORCES, LINEAR_VELOCITY, MOTION, RESULT)
+    CONDITION, DETERMINANT, FORCES, LINEAR_VELOCITY, MOTION)
 
 Array = NDArray[np.float64]
 
