@@ -76,4 +76,5 @@ if __name__ == '__main__':
     else:
         programs = [subprocess.Popen([sys.executable, __file__, part], stdin=subprocess.DEVNULL,
                                      stdout=subprocess.DEVNULL) for part in PARTS]
-        sys.exit(any([program.wait() for program in programs]))
+        codes = [program.wait() for program in programs]
+        sys.exit(any(codes))
