@@ -94,7 +94,7 @@ import sys
 from stewart_dynamics import Parameters
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.input_topics import SOURCES
-from stewart_dynamics.runtime.setpoints import Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
 
 many = 0
 setpoints = Setpoints(Parameters.from_yaml({str(PARAMETERS)!r}), print, print)

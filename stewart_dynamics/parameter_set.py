@@ -26,9 +26,9 @@ from typing import Any, ClassVar, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.errors import ParameterError, shown, shown_name
-from stewart_dynamics.parameter_declaration import checked, Parameter
 from stewart_dynamics.parameter_files import (
     check_given, flat, is_of_ros, parameters_of, read_yaml, write_yaml)
+from stewart_dynamics.parameter_rules import checked, Parameter
 from stewart_dynamics.parameters_yaml import no_space, read_document, read_value
 
 if TYPE_CHECKING:

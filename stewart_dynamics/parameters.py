@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameter_declaration import Parameter
+from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameter_set import ParameterSet
 
 

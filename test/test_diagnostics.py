@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 import pytest
 from referees import symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
-from stewart_dynamics.mechanics.singularity import Cause, Singularity
+from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.runtime.input_topics import ACCEL, POSE, TWIST

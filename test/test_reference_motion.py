@@ -25,7 +25,7 @@ from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatfor
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_time, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.mechanics.singularity import Cause, Singularity
+from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'

@@ -36,7 +36,7 @@ from referees import (
 from stewart_dynamics import Parameters
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import MOTION, RESULT, WRENCH
-from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME
+from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME
 from stewart_dynamics.replay.block_statistics import LISTED
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines

@@ -39,7 +39,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import NODE
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.setpoints import Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 matplotlib.use('Agg')

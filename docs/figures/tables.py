@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.parameter_declaration import Parameter
+from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameter_set import ParameterSet
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.friction import friction
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.rows import ACCELERATION, CONDITION, FORCES, MOTION, RATES, TWIST
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
 
 

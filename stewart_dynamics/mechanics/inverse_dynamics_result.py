@@ -21,7 +21,7 @@ from typing import NamedTuple
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity import time_to_crossing
+from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 
 class InverseDynamics(NamedTuple):

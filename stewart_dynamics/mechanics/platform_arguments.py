@@ -25,7 +25,7 @@ from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_t
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.rows import CONDITION, MOTION, POSE, POSITION, WRENCH
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 
 
 def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '') -> None:

@@ -32,7 +32,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import lagrange
 from stewart_dynamics.mechanics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle

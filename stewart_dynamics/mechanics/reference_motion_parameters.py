@@ -24,7 +24,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameter_declaration import Parameter
+from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameter_set import ParameterSet
 
 _POSE = 'X Y Z alpha beta gamma'

@@ -20,16 +20,17 @@ The console scripts of the nodes: what needs no ROS is answered before rclpy is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib import import_module
 import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.nodes.command_line import parameter_files
 from stewart_dynamics.nodes.signals import SIGNALS
 
 if TYPE_CHECKING:
-    from stewart_dynamics.parameter_declaration import Parameter
+    from stewart_dynamics.parameter_rules import Parameter
     from stewart_dynamics.parameter_set import ParameterSet
 
 
@@ -47,12 +48,6 @@ def trajectory() -> int:
     """Run the node stewart_trajectory; return its exit code."""
     return _run('mechanics.reference_motion_parameters', 'ReferenceMotionParameters',
                 'trajectory_node')
-
-
-def parameter_files(arguments: Sequence[str]) -> list[str]:
-    """Return the parameter files that a command line names."""
-    return [value for option, value in zip(arguments, arguments[1:], strict=False)
-            if option == '--params-file']
 
 
 def usage(kind: type[ParameterSet]) -> str:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node's parameters: from the command line through the table's check into ROS."""
+"""A node's parameters in ROS: checked by the table, described, and no others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from functools import partial
 import math
 import sys
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from rcl_interfaces.msg import (
     FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult)
@@ -29,13 +29,12 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.nodes.console_scripts import parameter_files
+from stewart_dynamics.nodes.command_line import given_parameters, parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
     describe_by, is_present, set_parameters_together)
-from stewart_dynamics.parameter_declaration import Parameter
-from stewart_dynamics.parameter_files import is_of_ros, other_nodes, parameters_of
+from stewart_dynamics.parameter_files import is_of_ros, other_nodes
+from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameter_set import ParameterSet
-from stewart_dynamics.parameters_yaml import read_document
 
 _TYPES = {
     'string': (ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_STRING_ARRAY),
@@ -43,27 +42,6 @@ _TYPES = {
     'bool': (ParameterType.PARAMETER_BOOL, ParameterType.PARAMETER_BOOL_ARRAY)}
 
 Kind = TypeVar('Kind', bound=ParameterSet)
-
-
-def _given(arguments: Sequence[str], node: str, kind: type[ParameterSet]) -> dict[str, Any]:
-    """
-    Return the values that a command line gives a node, in files and by ``-p``: the last of each.
-
-    ROS may use another one. rcl keeps both a number and a list that ``-p`` sets in its place, and
-    rclpy takes the number; values for ``/**`` and those for the node's name are applied in the
-    order in which these two first appear; a ``-p`` of another type than in a file is dropped.
-    """
-    values: dict[str, Any] = {}
-    for option, argument in zip(arguments, arguments[1:], strict=False):
-        if option == '--params-file':
-            values.update(parameters_of(read_document(argument), node, argument))
-        elif option in ('-p', '--param'):
-            target, _, text = argument.partition(':=')
-            section, _, name = target.rpartition(':')
-            if section in ('', node.lstrip('/')):
-                values[name] = kind.read_value(name, text, 'command line')
-    return {name: value for name, value in values.items()
-            if value is not None and not is_of_ros(name)}
 
 
 def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
@@ -81,7 +59,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
     if not sources or {'-p', '--param'} & set(sys.argv):
         sources.append('command line')
     source = ', '.join(sources)
-    given = _given(sys.argv, node.get_fully_qualified_name(), kind)
+    given = given_parameters(sys.argv, node.get_fully_qualified_name(), kind)
     try:
         parameters = kind(given, source, exact_types=True)
     except ParameterError as exc:

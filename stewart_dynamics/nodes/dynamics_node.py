@@ -54,7 +54,7 @@ from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.planned_trajectory import compile_ahead
 from stewart_dynamics.runtime.rejections import NOT_EXCLUSIVE, Rejection
-from stewart_dynamics.runtime.setpoints import Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
 
 

@@ -30,7 +30,7 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from stewart_dynamics.errors import ParameterError, StewartError
-from stewart_dynamics.nodes.console_scripts import parameter_files
+from stewart_dynamics.nodes.command_line import parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
     make_executor, reject_impossible_times, shut_down, spin)
 from stewart_dynamics.nodes.security import check_environment, without_security_libraries

@@ -33,7 +33,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.singularity import Singularity
+from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
@@ -51,7 +51,7 @@ from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import input_topics as inputs
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
-from stewart_dynamics.runtime.setpoints import Messages, Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Messages, Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
 
 _SECOND = 1_000_000_000

@@ -26,7 +26,7 @@ from stewart_dynamics.replay.bag_files import files_of, unpack
 from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.replay.mcap_recording import McapRecording
 from stewart_dynamics.replay.message_blocks import of_good_length, Source
-from stewart_dynamics.runtime.setpoints import Messages
+from stewart_dynamics.runtime.setpoint_joining import Messages
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'
@@ -135,6 +135,7 @@ class Recording:
 
     def _opened_by_rosbags(self, file: Path, unpacked: Path, suffix: str) -> Source:
         from stewart_dynamics.replay.rosbags_recording import RosbagsRecording
+
         # rosbags detects formats by suffix, and cannot open names with ?, # or %.
         link = self._new_file().with_suffix(suffix)
         link.symlink_to(unpacked.absolute())

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.limits import (
     Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE
 

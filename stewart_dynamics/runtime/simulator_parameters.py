@@ -25,7 +25,7 @@ import math
 from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameter_declaration import Parameter
+from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameters import PARAMETERS, Parameters
 
 _OWN = (

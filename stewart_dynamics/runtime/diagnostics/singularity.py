@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from stewart_dynamics.mechanics.singularity import Cause, LEAVING
+from stewart_dynamics.mechanics.singularity_warning import Cause, LEAVING
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.report import (
     ERROR, FINE, Held, Level, LevelLog, LogLine, OK, PERIOD, Status, WARN)

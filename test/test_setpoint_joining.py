@@ -42,7 +42,7 @@ from stewart_dynamics.runtime.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
     WRONG_FRAME)
 from stewart_dynamics.runtime.samples import SampleReader
-from stewart_dynamics.runtime.setpoints import Messages, Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Messages, Setpoints
 from stewart_dynamics.runtime.step import Setpoint
 from stewart_dynamics.runtime.wrench_input import WrenchInput
 
