@@ -473,10 +473,13 @@ def test_without_a_rate_there_is_no_such_topic(fresh: Start) -> None:
     node = fresh('visualization_rate:=0.0')
     node.until_active()
     node.answer()
-    topics = [name for name, _ in node.peer.node.get_publisher_names_and_types_by_node(
-        'stewart_dynamics', '/')]
-    assert f'{NODE}/leg_forces' in topics
-    assert f'{NODE}/markers' not in topics
+
+    def topics() -> list[str]:
+        return [name for name, _ in node.peer.node.get_publisher_names_and_types_by_node(
+            'stewart_dynamics', '/')]
+
+    node.until(lambda: f'{NODE}/leg_forces' in topics(), 'its topics are known')
+    assert f'{NODE}/markers' not in topics()
 
 
 def test_a_later_subscriber_gets_no_earlier_markers(fresh: Start) -> None:
