@@ -146,14 +146,16 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
 
 def test_topics_are_those_that_the_node_publishes(node: Any) -> None:
     node.answer()
-    published = dict(
-        node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/'))
+
+    def published() -> dict[str, list[str]]:
+        return dict(node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/'))
+
     shown = {**topics_of_rviz(), **topics_of_foxglove()}
     assert {'/stewart_dynamics/markers', '/stewart_dynamics/leg_forces',
             '/stewart_dynamics/jacobian_determinant', '/diagnostics', MONITOR} <= set(shown)
+    node.until(lambda: set(shown) - {MONITOR} <= set(published()), 'its topics are known')
     for topic, kind in shown.items():
-        if topic != MONITOR or MONITOR in published:
-            assert published[topic] == [kind]
+        assert topic == MONITOR or published()[topic] == [kind]
     panel = foxglove()['configById']['DiagnosticStatusPanel!singularity']
     assert panel['selectedName'] == node.status('singularity').name
     assert panel['selectedHardwareId'] == node.status('singularity').hardware_id
