@@ -65,8 +65,8 @@ def wrong_type(name: str, value: object, wanted: str) -> MotionError:
 
 def check_finite(name: str, values: Array, leading: int) -> Array:
     """Return values whose first ``leading`` axes are samples; MotionError where not finite."""
-    finite = np.isfinite(values).all(axis=tuple(range(leading, values.ndim)))
-    if not finite.all():
+    if not np.isfinite(values).all():
+        finite = np.isfinite(values).all(axis=tuple(range(leading, values.ndim)))
         at = list(map(int, np.argwhere(~finite)[0]))
         raise MotionError(f'{name}{f" of sample {at}" if at else ""}: out of range: '
                           'numbers overflow')

@@ -52,15 +52,23 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     results = np.empty((len(motions), RESULT))
+    if _threads(len(motions)) < 2:  # slices take half a microsecond
+        inverse_dynamics.solve(constants, motions, wrenches, results)
+        return results
     in_parts(len(motions), lambda part: inverse_dynamics.solve(
         constants, motions[part], wrenches if len(wrenches) == 1 else wrenches[part],
         results[part]))
     return results
 
 
+def _threads(many: int) -> int:
+    """Return how many threads so many samples are worth."""
+    return min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+
+
 def in_parts(many: int, do: Callable[[slice], object]) -> None:
     """Call ``do`` with slices of ``many`` samples; large batches on all processors."""
-    threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+    threads = _threads(many)
     if threads < 2:
         do(slice(0, many))
         return

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import MotionError, SingularityError
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
 from stewart_dynamics.mechanics.motion import Motion
@@ -82,14 +82,14 @@ def place(at: int, shape: tuple[int, ...]) -> str:
     return str(list(map(int, np.unravel_index(at, shape))))
 
 
-def find_unsolvable(rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Flags:
-    """Return where J_inv cannot be solved (N,); SingularityError with ``singular`` 'raise'."""
+def find_unsolvable(rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Integers:
+    """Return the samples where J_inv cannot be solved; SingularityError if that is to raise."""
     if singular not in ('raise', 'nan'):
         raise wrong_type('singular', singular, "'raise' or 'nan'")
     condition = results[:, CONDITION]
-    unsolvable: Flags = condition >= UNSOLVABLE_CONDITION
-    if singular == 'raise' and unsolvable.any():
-        at = int(np.argmax(unsolvable))
+    unsolvable: Integers = (condition >= UNSOLVABLE_CONDITION).nonzero()[0]
+    if singular == 'raise' and len(unsolvable):
+        at = int(unsolvable[0])
         raise SingularityError(
             f'sample {place(at, shape)}: J_inv cannot be solved: its condition number is '
             f'{condition[at]:.3g}, must be less than {UNSOLVABLE_CONDITION:g}; position '

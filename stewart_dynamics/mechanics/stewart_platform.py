@@ -115,7 +115,9 @@ class StewartPlatform:
         rows, wrenches, shape = loaded(motion, wrench)
         results = self.solve(rows, wrenches)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
-        results[find_unsolvable(rows, results, shape, singular), FORCES] = np.nan
+        unsolvable = find_unsolvable(rows, results, shape, singular)
+        if len(unsolvable):
+            results[unsolvable, FORCES] = np.nan
         return InverseDynamics.of_rows(results.reshape(*shape, RESULT))
 
     def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
@@ -138,8 +140,9 @@ class StewartPlatform:
         if self._breakdown is None:
             self._breakdown = ForceBreakdownRows(self.parameters)
         forces = self._breakdown(rows, wrenches)
-        check_finite('motion', np.where(unsolvable[:, None, None], 0.0, forces).reshape(
-            *shape, len(SOURCES), 6), len(shape))
+        known = forces.copy() if len(unsolvable) else forces
+        known[unsolvable] = 0.0
+        check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
         return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
 
     def forward_dynamics(
