@@ -82,7 +82,8 @@ def place(at: int, shape: tuple[int, ...]) -> str:
     return str(list(map(int, np.unravel_index(at, shape))))
 
 
-def find_unsolvable(rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Integers:
+def find_unsolvable(
+        rows: Array, results: Array, shape: tuple[int, ...], singular: str) -> Integers:
     """Return the samples where J_inv cannot be solved; SingularityError if that is to raise."""
     if singular not in ('raise', 'nan'):
         raise wrong_type('singular', singular, "'raise' or 'nan'")
