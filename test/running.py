@@ -1019,7 +1019,7 @@ class Planner:
         while not any('queue full' in line for line in log_lines(
                 self._node.program.stderr, 'ERROR')):
             self.send_long(50_000, leap=leap)
-            self._node.peer.spin(0.0)
+            self._node.peer.spin(0.1)
 
     def until_answered(self, number: int) -> JointTrajectory:
         """Return the last answer once so many have come."""
