@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from functools import partial
 import gc
 import math
 import time
@@ -88,7 +89,7 @@ class SimulatorNode(Node):
         if jit.HINT:
             self.get_logger().warning(jit.HINT)
         begun = time.monotonic()
-        self._plant = SIGNALS.interruptible(lambda: Plant(self._settings))
+        self._plant = SIGNALS.interruptible(partial(Plant, self._settings))
         self._state_messages = StateMessages(self._settings)
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
