@@ -58,9 +58,21 @@ def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
     document = read_document(path)
     values = dict(parameters_of(document, node, str(path)))
     if not values:
-        raise ParameterError(f"{path}: holds {_listed(document)}, but no parameters under '/**:' "
-                             f"or '{node}:'")
+        raise _without_parameters(path, document, node)
     return values
+
+
+def check_sections(path: str | Path, document: Mapping[str, Any], node: str) -> None:
+    """Raise ParameterError where a file has no parameters of any node: rcl rejects it."""
+    if document and not any(
+            True for name, content in document.items() for _ in _sections(name, content)):
+        raise _without_parameters(path, document, node)
+
+
+def _without_parameters(
+        path: str | Path, document: Mapping[str, Any], node: str) -> ParameterError:
+    return ParameterError(f"{path}: holds {_listed(document)}, but no parameters under '/**:' or "
+                          f"'{node}:', 'ros__parameters:'")
 
 
 def other_nodes(path: str | Path, node: str) -> str:

@@ -27,7 +27,7 @@ import numpy as np
 
 from stewart_dynamics.errors import ParameterError, shown, shown_name
 from stewart_dynamics.parameter_files import (
-    check_given, flat, is_of_ros, parameters_of, read_yaml, write_yaml)
+    check_given, check_sections, flat, is_of_ros, parameters_of, read_yaml, write_yaml)
 from stewart_dynamics.parameter_rules import checked, Parameter
 from stewart_dynamics.parameters_yaml import no_space, read_document, read_value
 
@@ -163,7 +163,9 @@ class ParameterSet(Mapping[str, Any]):
     def check_file(cls, path: str | Path) -> None:
         """Raise ParameterError if a value of a file breaks a rule; the file may be incomplete."""
         source = str(path)
-        for name, value in list(parameters_of(read_document(path), cls.node, source)):
+        document = read_document(path)
+        check_sections(path, document, cls.node)
+        for name, value in list(parameters_of(document, cls.node, source)):
             parameter = cls.declared(name, value, source)
             if value is not None:
                 checked(parameter, value, source)

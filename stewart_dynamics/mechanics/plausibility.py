@@ -99,13 +99,15 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
     # An overflow of numbers near the largest double is not reported by itself.
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
-        found = [*_sizes(parameters, shape), *_inertia(parameters, shape),
+        sizes = [*_sizes(parameters, shape)]
+        found = [*sizes, *_inertia(parameters, shape),
                  *_reflected_mass(parameters), *_others(parameters, shape)]
         if geometry:
             reach = reach_of(parameters, shape)
-            found += [*_legs(parameters, shape, reach),
-                      *(tuple(_singular(parameters, shape, reach))
-                        or _order(parameters, shape, reach))]
+            found += _legs(parameters, shape, reach)
+            if not sizes:  # else what follows from a wrong unit
+                found += (tuple(_singular(parameters, shape, reach))
+                          or _order(parameters, shape, reach))
     return tuple(found)
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameter_files import is_of_ros, parameters_of
 from stewart_dynamics.parameters_yaml import read_document
 
@@ -30,6 +31,15 @@ def parameter_files(arguments: Sequence[str]) -> list[str]:
     """Return the parameter files that a command line names."""
     return [value for option, value in zip(arguments, arguments[1:], strict=False)
             if option == '--params-file']
+
+
+def check_arguments(arguments: Sequence[str], kind: type[ParameterSet]) -> None:
+    """Raise ParameterError for what the parser of ROS rejects in words of its own."""
+    for option, argument in zip(arguments, [*arguments[1:], ''], strict=True):
+        if option in ('-p', '--param') and ':=' not in argument:
+            raise ParameterError(f'command line: {option} {argument}: must be NAME:=VALUE')
+    for path in parameter_files(arguments):
+        kind.check_file(path)
 
 
 def given_parameters(arguments: Sequence[str], node: str, kind: type[ParameterSet],

@@ -26,7 +26,6 @@ import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.nodes.command_line import parameter_files
 from stewart_dynamics.nodes.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -71,13 +70,13 @@ def _described(parameter: Parameter) -> str:
 def _run(module: str, name: str, node: str) -> int:
     """Run the node of a module, with the parameters of another one; return its exit code."""
     SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
+    check_arguments = _imported('nodes.command_line').check_arguments
     kind: type[ParameterSet] = getattr(_imported(module), name)
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(usage(kind))
         return 0
     try:
-        for path in parameter_files(sys.argv):
-            kind.check_file(path)
+        check_arguments(sys.argv, kind)
         program = _imported(f'nodes.{node}')
     except ParameterError as exc:
         print(f'{kind.node}: {exc}', file=sys.stderr)

@@ -38,7 +38,7 @@ from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.parameter_set import ParameterSet
 
 # Errors that the user can correct: reported in one line. All others are defects of this package.
-_OF_THE_USER = (StewartError, RCLError, UnknownROSArgsError, NameValidationException)
+_OF_THE_USER = (StewartError, RCLError, NameValidationException)
 
 
 def run(make_node: Callable[[], Node], kind: type[ParameterSet],
@@ -78,6 +78,10 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         return int(stop.result())
     except KeyboardInterrupt:  # while it compiled
         return 0
+    except UnknownROSArgsError as exc:
+        print(f'{kind.node}: {str(exc).strip("[]")}: unknown after --ros-args; see --help',
+              file=sys.stderr)
+        return 1
     except _OF_THE_USER as exc:
         print(f'{kind.node}: {" ".join(str(exc).split())}', file=sys.stderr)
         return 1

@@ -24,7 +24,6 @@ whose calls of ROS then raise RCLError (https://github.com/ros2/rclpy/issues/128
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
 import os
 import signal
 from threading import Thread
@@ -65,13 +64,14 @@ class Signals:
 
         It runs in a thread of its own, which goes on after a signal until the process ends.
         """
-        future: Future[Result] = Future()
+        results: list[Result] = []
+        errors: list[BaseException] = []
 
         def run() -> None:
             try:
-                future.set_result(compute())
+                results.append(compute())
             except BaseException as exc:
-                future.set_exception(exc)
+                errors.append(exc)
 
         thread = Thread(target=run, daemon=True)
         thread.start()
@@ -79,7 +79,9 @@ class Signals:
             if self.received:
                 raise KeyboardInterrupt
             thread.join(_LOOK)
-        return future.result()
+        if errors:
+            raise errors[0]
+        return results[0]
 
     def _handle(self, number: int, frame: Any) -> None:
         self.received = True

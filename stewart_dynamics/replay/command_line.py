@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import io
+import os
 from pathlib import Path
 import re
 import signal
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.parameters import Parameters
 
 _INTERRUPTED = 130
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _CUTOFF = 10.0
 # Up to this number of bags the summary of each is printed; of more only the totals.
 _FEW = 10
@@ -48,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
             stream.reconfigure(errors='backslashreplace')
-    before = {each: signal.signal(each, _interrupted) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {each: signal.signal(each, _end_at_once) for each in _SIGNALS}
     try:
         return _run(given, _options(given))
     except (StewartError, OSError) as exc:
@@ -65,9 +67,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(each, handler)
 
 
+def _end_at_once(number: int, frame: object) -> None:
+    """End while libraries are imported: numpy turns an exception into another one."""
+    os.write(2, b'stewart_replay: interrupted\n')
+    os._exit(_INTERRUPTED)
+
+
 def _interrupted(number: int, frame: object) -> None:
     """Stop; further signals are ignored while partial results are removed."""
-    for each in (signal.SIGINT, signal.SIGTERM):
+    for each in _SIGNALS:
         signal.signal(each, signal.SIG_IGN)
     raise KeyboardInterrupt
 
@@ -81,7 +89,8 @@ def _arguments() -> argparse.ArgumentParser:
                'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
                'index.html.\n\nexit codes: 0 done; 1 with --strict, when a limit or singularity '
                'warning was met;\n2 bad arguments, parameters or bags; 3 part of a bag could not '
-               'be read, the rest is done;\nof several bags the most severe: 2, then 3, then 1')
+               'be read, the rest is done; 130 interrupted;\nof several bags the most severe: 2, then '
+               '3, then 1')
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
                         help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
                              'with bags in it')
@@ -144,6 +153,8 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     from stewart_dynamics.replay.many_bags import replay_fleet
     from stewart_dynamics.replay.report import share_plotly
 
+    for each in _SIGNALS:
+        signal.signal(each, _interrupted)
     parameters = Parameters.from_yaml(given.params, given.node)
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
