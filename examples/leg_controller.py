@@ -83,11 +83,11 @@ class LegController(Node):
         return value
 
     def platform_of(self, file: str) -> StewartPlatform | None:
-        """Return the hexapod of a parameter file, its code compiled; None without a file."""
+        """Return the hexapod of a parameter file, its code compiled; stepped, it needs none."""
         if not file:
             if not self.stepped:
-                self.get_logger().warning(
-                    'no params_file: when desired states stop, their last forces are held')
+                raise ValueError('params_file: missing: it has the forces at rest, which hold the '
+                                 'hexapod when desired states stop')
             return None
         platform = StewartPlatform.from_yaml(file)
         self.zero_length = platform.parameters['geometry.zero_length']

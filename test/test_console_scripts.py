@@ -23,13 +23,16 @@ import sys
 import pytest
 from referees import ROOT
 
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.nodes.command_line import check_arguments
 from stewart_dynamics.nodes.console_scripts import usage
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
             'trajectory': ReferenceMotionParameters}
+PLATFORM = ROOT / 'config' / 'platform.yaml'
 HEAVY = ('numba', 'scipy', 'rclpy', 'rosbags')
 
 # Without ROS: none of its modules can be imported. The last line lists what was loaded.
@@ -98,3 +101,21 @@ print(len(Parameters.from_yaml({str(ROOT / 'config' / 'platform.yaml')!r})))
 print([name for name in {HEAVY} if name in sys.modules])
 """], check=True, capture_output=True, text=True, timeout=60)
     assert done.stdout == f'{len(Parameters.table)}\n[]\n'
+
+
+@pytest.mark.parametrize('arguments, text', [
+    (['-p', 'platform.mass=200.0'], 'command line: -p platform.mass=200.0: must be NAME:=VALUE'),
+    (['--params-file', str(PLATFORM), '-p'], 'command line: -p : must be NAME:=VALUE')])
+def test_what_ros_would_reject_in_its_own_words_is_named(arguments: list[str], text: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        check_arguments(['--ros-args', *arguments], Parameters)
+    assert str(caught.value) == text
+
+
+def test_a_file_without_the_lines_of_ros_is_named(tmp_path: Path) -> None:
+    file = tmp_path / 'bare.yaml'
+    file.write_text('platform:\n  mass: 1.0\n')
+    with pytest.raises(ParameterError) as caught:
+        check_arguments(['--ros-args', '--params-file', str(file)], Parameters)
+    assert str(caught.value) == (f"{file}: holds platform, but no parameters under '/**:' or "
+                                 "'stewart_dynamics:', 'ros__parameters:'")

@@ -140,6 +140,9 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
         {'geometry.base_joints': 1e3 * BASE}, [
             'geometry.platform_joints: 0.6 m from their center, the base joints 900 m: one of '
             'them in mm?']),
+    'one base joint in mm': (
+        {'geometry.base_joints': BASE * np.where(np.arange(6) == 1, 1e3, 1.0)[:, None]}, [
+            'geometry.platform_joints: ']),
     'the platform joints in cm and limits': (
         {'geometry.platform_joints': 1e2 * TOP}, ['no level pose has all legs within']),
     'limits in mm': (

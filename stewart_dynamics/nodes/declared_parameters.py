@@ -64,7 +64,8 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
         parameters = kind(given, source, exact_types=True)
     except ParameterError as exc:
         if not files:
-            raise ParameterError(f'{exc}; a file is given by --params-file after --ros-args') from exc
+            raise ParameterError(
+                f'{exc}; a file is given by --params-file after --ros-args') from exc
         raise _of_other_nodes(files, node.get_fully_qualified_name()) or exc from exc
     for name, parameter in kind.table.items():
         unchecked = ParameterDescriptor(dynamic_typing=True)

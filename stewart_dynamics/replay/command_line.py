@@ -89,8 +89,8 @@ def _arguments() -> argparse.ArgumentParser:
                'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
                'index.html.\n\nexit codes: 0 done; 1 with --strict, when a limit or singularity '
                'warning was met;\n2 bad arguments, parameters or bags; 3 part of a bag could not '
-               'be read, the rest is done; 130 interrupted;\nof several bags the most severe: 2, then '
-               '3, then 1')
+               'be read, the rest is done; 130 interrupted;\n'
+               'of several bags the most severe: 2, then 3, then 1')
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
                         help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
                              'with bags in it')
