@@ -962,7 +962,8 @@ def test_a_bad_parameter_on_the_command_line_is_reported_in_one_line(
 
 def test_no_parameters_at_all_is_reported_in_one_line(domain: int, tmp_path: Path) -> None:
     assert rejected(domain, tmp_path / 'node') == (
-        'stewart_dynamics: command line: geometry.base_joints: missing, it has no default')
+        'stewart_dynamics: command line: geometry.base_joints: missing, it has no default; '
+        'a file is given by --params-file after --ros-args')
 
 
 # Any input

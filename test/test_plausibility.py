@@ -271,12 +271,20 @@ def test_the_radius_of_gyration_has_bounds(gyration: float, words: str) -> None:
 
 def test_one_mistake_is_reported_once() -> None:
     several = {'all joints in mm', 'all joints in mm of a hexapod as long as a street',
-               'the base joints in mm', 'the platform joints in cm and limits', 'limits in mm'}
+               'the base joints in mm', 'one base joint in mm',
+               'the platform joints in cm and limits', 'limits in mm'}
     assert several <= set(SLIPS)
     for name in set(SLIPS) - several:
         changes = {key: np.ravel(value) if np.ndim(value) else value
                    for key, value in SLIPS[name][0].items()}
         assert len(likely_mistakes(PLATFORM.replaced(changes))) == 1, name
+
+
+def test_a_wrong_unit_is_not_also_an_order_of_the_joints() -> None:
+    changes, _ = SLIPS['one base joint in mm']
+    found = likely_mistakes(PLATFORM.replaced({
+        name: value.ravel() for name, value in changes.items()}))
+    assert not any('another order' in mistake for mistake in found), found
 
 
 @pytest.mark.parametrize('spread', [8.0, 12.0, 20.0, 25.0])
