@@ -84,7 +84,8 @@ def test_the_example_of_the_readme_runs(
     code, = re.findall(r'```python\n(.*?)```', README, flags=re.DOTALL)
     monkeypatch.chdir(ROOT)
     exec(compile(code, 'README.md', 'exec'), {})
-    lengths, *forces, error = capsys.readouterr().out.strip().split('\n')
+    mistakes, lengths, *forces, error = capsys.readouterr().out.strip().split('\n')
+    assert mistakes == '()'
     assert len(lengths.strip('[] ').split()) == 6
     *six, condition = ' '.join(forces).replace('[', '').replace(']', '').split()
     assert len(six) == 6
