@@ -54,6 +54,7 @@ def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
     ({'actuator.viscous_friction': 1e12}, 'actuator.viscous_friction'),
     ({'actuator.viscous_friction': 1e308}, 'actuator.viscous_friction'),
     ({'end_stops.frequency': 1e6}, 'end_stops.frequency'),
+    ({'end_stops.frequency': 1e6, 'end_stops.damping_ratio': 1.5}, 'end_stops.damping_ratio'),
     ({'end_stops.damping_ratio': 1e7}, 'end_stops.damping_ratio')], ids=str)
 def test_what_would_need_too_short_steps_is_rejected_by_name(
         changes: dict[str, Any], named: str) -> None:
