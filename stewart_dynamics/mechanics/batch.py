@@ -19,8 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 import os
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import inverse_dynamics
@@ -52,30 +54,29 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     results = np.empty((len(motions), RESULT))
-    if _threads(len(motions)) < 2:  # slices take half a microsecond
-        inverse_dynamics.solve(constants, motions, wrenches, results)
-        return results
-    in_parts(len(motions), lambda part: inverse_dynamics.solve(
-        constants, motions[part], wrenches if len(wrenches) == 1 else wrenches[part],
-        results[part]))
+    in_parts(inverse_dynamics.solve, constants, motions, wrenches, results)
     return results
 
 
-def _threads(many: int) -> int:
-    """Return how many threads so many samples are worth."""
-    return min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[Any]) -> None:
+    """
+    Call a function with constants and rows of arrays; large batches in parts on all processors.
 
-
-def in_parts(many: int, do: Callable[[slice], object]) -> None:
-    """Call ``do`` with slices of ``many`` samples; large batches on all processors."""
-    threads = _threads(many)
+    The first array has as many rows as there are samples. One with a single row is for all parts.
+    """
+    many = len(arrays[0])
+    threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
     if threads < 2:
-        do(slice(0, many))
+        compute(constants, *arrays)
         return
+
+    def part(begin: int, end: int) -> None:
+        compute(constants, *(array if len(array) == 1 else array[begin:end] for array in arrays))
+
     # More parts than threads: if one thread is slow, the others take more parts.
     edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(do, map(slice, edges[:-1], edges[1:])))
+        list(pool.map(part, edges[:-1], edges[1:]))
 
 
 def compact(array: Array) -> Array:

@@ -140,7 +140,7 @@ class StewartPlatform:
         if self._breakdown is None:
             self._breakdown = ForceBreakdownRows(self.parameters)
         forces = self._breakdown(rows, wrenches)
-        known = forces.copy() if len(unsolvable) else forces
+        known = forces.copy()
         known[unsolvable] = 0.0
         check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
         return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
@@ -170,8 +170,7 @@ class StewartPlatform:
                              wrench=load.shape[:-1])
         rows = copies(motion.rows, shape)
         pushes, load = copies(pushes, shape), copies(load, shape)
-        batch.in_parts(len(rows), lambda part: forward_dynamics.solve(
-            self.constants, rows[part], pushes[part], load[part]))
+        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load)
         rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
         return Motion.of_rows(rows)
 
@@ -210,8 +209,8 @@ class StewartPlatform:
         wanted, rows = copies(wanted, shape), motion_rows(guess, shape)
         codes, steps = np.empty(len(rows), dtype=np.int64), np.empty(len(rows), dtype=np.int64)
         residuals = np.empty(len(rows))
-        batch.in_parts(len(rows), lambda part: forward_kinematics.poses(
-            self.constants, wanted[part], rows[part], codes[part], steps[part], residuals[part]))
+        batch.in_parts(forward_kinematics.poses, self.constants, wanted, rows, codes, steps,
+                       residuals)
         if codes.any():
             at = int(np.argmax(codes > 0))
             where = (f'sample {place(at, shape)}: lengths {wanted[at].tolist()} m from the guess '
