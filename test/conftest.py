@@ -30,7 +30,7 @@ import pytest
 if TYPE_CHECKING:
     from running import DynamicsNode, NodeProcess
 
-COMPILE_AHEAD = Path(__file__).with_name('compile_ahead.py')
+COMPILE_ALL = 'from stewart_dynamics.compile_all import compile_all; compile_all()'
 
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
 
@@ -39,7 +39,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Before several processes run the tests, compile what each of them would compile."""
     is_worker = hasattr(session.config, 'workerinput')
     if not is_worker and getattr(session.config.option, 'numprocesses', None):
-        subprocess.run([sys.executable, COMPILE_AHEAD], check=True, stdin=DEVNULL, stdout=DEVNULL)
+        subprocess.run([sys.executable, '-c', COMPILE_ALL], check=True, stdin=DEVNULL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

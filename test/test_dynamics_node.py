@@ -889,7 +889,7 @@ def test_a_signal_ends_it_with_exit_code_0(
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
 def test_a_signal_ends_it_while_it_starts(start: Start, number: signal.Signals) -> None:
-    node = start(NUMBA_CACHE_DIR='cache')  # an empty one: it compiles for seconds
+    node = start(STEWART_DYNAMICS_CACHE_DIR='cache')  # an empty one: it compiles for seconds
     # The node is there, and is compiling: no setpoint topic yet.
     node.until(lambda: ('stewart_dynamics', '/') in node.peer.node.get_node_names_and_namespaces(),
                'the node is there')

@@ -17,10 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-import importlib
 import itertools
-import sys
 from typing import Any
 
 import numpy as np
@@ -28,7 +25,7 @@ from numpy.typing import NDArray
 import pytest
 from referees import rng
 
-import stewart_dynamics.mechanics
+from stewart_dynamics.mechanics import matrix6
 from stewart_dynamics.mechanics.matrix6 import SMALLEST_PIVOT
 
 Array = NDArray[np.float64]
@@ -36,24 +33,12 @@ Array = NDArray[np.float64]
 MOST_STEPS = 64  # as the inverse dynamics have it
 
 
-@pytest.fixture(scope='module')
-def matrix6() -> Iterator[Any]:
-    """Return the module as it is where numba is not installed."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, 'numba', None)
-        for name in ('jit', 'vectors', 'matrix6'):
-            importlib.import_module(f'stewart_dynamics.mechanics.{name}')
-            patch.delitem(sys.modules, f'stewart_dynamics.mechanics.{name}')
-            patch.setattr(stewart_dynamics.mechanics, name, None)
-        yield importlib.import_module('stewart_dynamics.mechanics.matrix6')
-
-
 def rows(matrix: Any) -> list[tuple[float, ...]]:
     """Return a matrix's rows as tuples of plain numbers."""
     return [tuple(map(float, row)) for row in matrix]
 
 
-def inverse(matrix6: Any, matrix: Array) -> tuple[Array, float]:
+def inverse(matrix: Array) -> tuple[Array, float]:
     """Return the inverse and the determinant."""
     found, det = matrix6.inverse_and_determinant(*rows(matrix))
     return np.array(found), det
@@ -71,7 +56,7 @@ def whole(t: tuple[float, ...]) -> Array:
     return full
 
 
-def largest(matrix6: Any, t: tuple[float, ...]) -> float:
+def largest(t: tuple[float, ...]) -> float:
     """Return the eigenvalue to which Laguerre's iteration converges from 1."""
     x, steps = 1.0 + 1e-14, 0
     while (nearer := matrix6.laguerre_step(x, t)) != x:
@@ -87,67 +72,67 @@ def symmetric(values: Any, random: np.random.Generator) -> Array:
     return (q * np.asarray(values)) @ q.T
 
 
-def test_inverse_and_determinant_are_those_of_numpy(matrix6: Any) -> None:
+def test_inverse_and_determinant_are_those_of_numpy() -> None:
     random = rng()
     for _ in range(300):
         a = random.normal(size=(6, 6))
         a /= np.linalg.norm(a, axis=1, keepdims=True)
-        found, det = inverse(matrix6, a)
+        found, det = inverse(a)
         allowed = 1e-14 * np.linalg.cond(a)
         assert np.max(np.abs(found @ a - np.eye(6))) < allowed
         assert np.allclose(found, np.linalg.inv(a), rtol=0.0, atol=allowed * np.abs(found).max())
         assert det == pytest.approx(np.linalg.det(a), rel=allowed)
 
 
-def test_every_permutation_is_inverted_exactly_with_its_sign(matrix6: Any) -> None:
+def test_every_permutation_is_inverted_exactly_with_its_sign() -> None:
     for order in itertools.permutations(range(6)):
         p = np.eye(6)[list(order)]
-        found, det = inverse(matrix6, p)
+        found, det = inverse(p)
         assert np.array_equal(found, p.T)
         assert det == round(np.linalg.det(p))
 
 
-def test_a_matrix_with_zeros_on_the_diagonal_is_inverted(matrix6: Any) -> None:
+def test_a_matrix_with_zeros_on_the_diagonal_is_inverted() -> None:
     random = rng()
     for _ in range(100):
         a = random.normal(size=(6, 6))
         a[np.arange(6), np.arange(6)] = 0.0
-        found, det = inverse(matrix6, a)
+        found, det = inverse(a)
         assert np.max(np.abs(found @ a - np.eye(6))) < 1e-13 * np.linalg.cond(a)
         assert det == pytest.approx(np.linalg.det(a), rel=1e-13 * np.linalg.cond(a))
 
 
-def test_a_tiny_first_pivot_loses_no_digits(matrix6: Any) -> None:
+def test_a_tiny_first_pivot_loses_no_digits() -> None:
     a = np.eye(6)[::-1] + 1e-20 * np.eye(6)
-    found, det = inverse(matrix6, a)
+    found, det = inverse(a)
     assert np.allclose(found, np.eye(6)[::-1], rtol=0.0, atol=1e-15)
     assert det == pytest.approx(-1.0, rel=1e-15)
 
 
 @pytest.mark.parametrize('rank', [5, 4, 3])
-def test_inverse_of_a_singular_matrix_is_finite_and_large(matrix6: Any, rank: int) -> None:
+def test_inverse_of_a_singular_matrix_is_finite_and_large(rank: int) -> None:
     random = rng()
     exact = np.diag([1.0] * rank + [0.0] * (6 - rank))
-    found, det = inverse(matrix6, exact)
+    found, det = inverse(exact)
     assert np.all(np.isfinite(found))
     assert abs(det) == pytest.approx(SMALLEST_PIVOT ** (6 - rank), rel=1e-12)
     assert np.abs(found).max() > 1e15
     for _ in range(20):
         a = random.normal(size=(6, rank)) @ random.normal(size=(rank, 6))
         a /= np.linalg.norm(a, axis=1, keepdims=True)
-        found, det = inverse(matrix6, a)
+        found, det = inverse(a)
         assert np.all(np.isfinite(found))
         assert abs(det) < 1e-14
         assert np.abs(found).max() > 1e12
 
 
-def test_gram_holds_the_products_of_the_rows(matrix6: Any) -> None:
+def test_gram_holds_the_products_of_the_rows() -> None:
     a = rng().normal(size=(6, 6))
     for n, column in enumerate(matrix6.gram(*rows(a))):
         assert np.allclose(column, (a @ a.T)[n:, n], rtol=1e-14, atol=1e-14)
 
 
-def test_tridiagonal_keeps_the_eigenvalues(matrix6: Any) -> None:
+def test_tridiagonal_keeps_the_eigenvalues() -> None:
     random = rng()
     samples = [symmetric(random.uniform(0.0, 1.0, 6), random) for _ in range(100)]
     samples += [np.eye(6), np.zeros((6, 6)), np.diag([3.0, 1.0, 2.0, 0.0, 5.0, 4.0]),
@@ -166,7 +151,7 @@ def test_tridiagonal_keeps_the_eigenvalues(matrix6: Any) -> None:
 
 @pytest.mark.parametrize('kind', [
     'any', 'double', 'triple', 'fourfold', 'fivefold', 'near double', 'one alone'])
-def test_laguerre_converges_to_the_largest_eigenvalue(matrix6: Any, kind: str) -> None:
+def test_laguerre_converges_to_the_largest_eigenvalue(kind: str) -> None:
     random = rng()
     for _ in range(60):
         values = np.sort(random.uniform(0.0, 1.0, 6))[::-1]
@@ -178,21 +163,21 @@ def test_laguerre_converges_to_the_largest_eigenvalue(matrix6: Any, kind: str) -
             values[1:] *= 1e-12
         g = symmetric(values / values.sum(), random)
         t = matrix6.tridiagonal(lower(g))
-        found = largest(matrix6, t)
+        found = largest(t)
         assert found == pytest.approx(np.linalg.eigvalsh(g)[-1], rel=1e-13)
 
 
-def test_laguerre_stays_finite_on_matrices_without_directions(matrix6: Any) -> None:
-    found = largest(matrix6, matrix6.tridiagonal(lower(np.eye(6) / 6)))
+def test_laguerre_stays_finite_on_matrices_without_directions() -> None:
+    found = largest(matrix6.tridiagonal(lower(np.eye(6) / 6)))
     assert found == pytest.approx(1.0 / 6.0, rel=1e-14)
-    found = largest(matrix6, matrix6.tridiagonal(lower(np.zeros((6, 6)))))
+    found = largest(matrix6.tridiagonal(lower(np.zeros((6, 6)))))
     assert 0.0 < found <= 1.0 + 1e-14
 
 
-def test_a_converged_laguerre_iteration_is_not_changed_by_a_further_step(matrix6: Any) -> None:
+def test_a_converged_laguerre_iteration_is_not_changed_by_a_further_step() -> None:
     random = rng()
     for _ in range(50):
         values = random.uniform(0.0, 1.0, 6)
         t = matrix6.tridiagonal(lower(symmetric(values / values.sum(), random)))
-        rest = largest(matrix6, t)
+        rest = largest(t)
         assert all(matrix6.laguerre_step(rest, t) == rest for _ in range(5))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from stewart_dynamics.compilation.preparation import Preparation
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PlannedTrajectoryQueue
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
@@ -30,7 +31,7 @@ class Timed:
         self.pieces: list[str] = []
         self.done: list[tuple[str, float]] = []
         self.queue = PlannedTrajectoryQueue(
-            lambda: self._run(True), lambda: self._run(False),
+            lambda: self._run(True), lambda: self._run(False), Preparation(),
             lambda outcome, came: self.done.append((outcome.message, came)))
 
     def _run(self, running: bool) -> None:

@@ -26,7 +26,8 @@ from referees import (
     random_direction, random_parameters, rng, rotation_about, size_of, symmetric_parameters)
 
 from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import (
     Cause, LEAVING, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
 
@@ -132,7 +133,9 @@ def test_time_to_crossing_is_the_same_for_one_and_for_many() -> None:
     assert np.array_equal(times[:6], [0.5, np.inf, 0.5, np.inf, np.inf, 0.0])
     for det, rate, time in zip(dets, rates, times, strict=True):
         assert after((det, rate, 3.0)).time_to_crossing == time
-    of_result = InverseDynamics(*[np.zeros(6)] * 4, np.array(0.2), np.array(-0.4), np.array(3.0))
+    row = np.zeros(RESULT)
+    row[DETERMINANT], row[DETERMINANT_RATE] = 0.2, -0.4
+    of_result = InverseDynamics(row)
     assert of_result.time_to_crossing == 0.5
 
 

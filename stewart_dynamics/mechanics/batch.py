@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.mechanics import inverse_dynamics
-from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.rows import RESULT, WRENCH
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.
@@ -54,24 +54,30 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     results = np.empty((len(motions), RESULT))
-    in_parts(inverse_dynamics.solve, constants, motions, wrenches, results)
+    in_parts(inverse_dynamics.solve, constants, motions, wrenches, results,
+             scratch=(inverse_dynamics.TILE,))
     return results
 
 
-def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[Any]) -> None:
+def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[Any],
+             scratch: tuple[int, ...] = ()) -> None:
     """
     Call a function with constants and rows of arrays; large batches in parts on all processors.
 
     The first array has as many rows as there are samples. One with a single row is for all parts.
+    Each call gets scratch memory of a shape as its last argument, if it needs any.
     """
+    def call(*rows: NDArray[Any]) -> None:
+        compute(constants, *rows, *([np.empty(scratch)] if scratch else []))
+
     many = len(arrays[0])
     threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
     if threads < 2:
-        compute(constants, *arrays)
+        call(*arrays)
         return
 
     def part(begin: int, end: int) -> None:
-        compute(constants, *(array if len(array) == 1 else array[begin:end] for array in arrays))
+        call(*(array if len(array) == 1 else array[begin:end] for array in arrays))
 
     # More parts than threads: if one thread is slow, the others take more parts.
     edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
@@ -81,7 +87,4 @@ def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[
 
 def compact(array: Array) -> Array:
     """Return the array, or a copy in the layout that the functions are compiled for."""
-    # For another layout in memory numba would compile anew, for seconds.
-    if array.flags.carray and array.dtype.char == 'd':
-        return array
-    return np.require(array, float, ['C', 'W'])
+    return np.ascontiguousarray(array, dtype=float)

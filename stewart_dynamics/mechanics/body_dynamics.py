@@ -25,10 +25,10 @@ import math
 from typing import NamedTuple
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.friction import with_friction
 from stewart_dynamics.mechanics.hexapod_constants import (
     characteristic_length_of, gravity_of, joints_of, Leg, leg_of, platform_of)
-from stewart_dynamics.mechanics.jit import inlined
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, Matrix3, rotate, rotate_back, scale, subtract, symmetric, Vector3, Vector6)
 

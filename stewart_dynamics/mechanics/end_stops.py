@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN
 from stewart_dynamics.mechanics.rows import consecutive
 from stewart_dynamics.parameters import Parameters

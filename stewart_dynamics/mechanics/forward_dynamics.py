@@ -27,13 +27,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import (
     characteristic_length_of, leg_of, platform_of)
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION,
     ROTATION)
@@ -175,14 +173,13 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         motion[ANGULAR_ACCELERATION.start + n] = inverse_size * work[_RIGHT, 3 + n]
 
 
-@entry_point
-def solve(constants: Array, motions: Array, forces: Array, wrenches: Array) -> None:
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
+def solve(constants: Array, motions: Array, forces: Array, wrenches: Array, work: Array) -> None:
     """
     Write the accelerations of motions (N, MOTION) under forces (N, 6), see ``acceleration``.
 
     The wrenches are (N, WRENCH), or (1, WRENCH): one row for all.
     """
-    work = np.empty(WORK)
     one_wrench = len(wrenches) == 1
     for n in range(len(motions)):
         acceleration(constants, motions[n], forces[n], wrenches[0 if one_wrench else n], work)

@@ -27,9 +27,9 @@ from __future__ import annotations
 import math
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import characteristic_length_of
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.matrix6 import inverse_and_determinant, Rows
 from stewart_dynamics.mechanics.rows import ANGULAR_VELOCITY, LINEAR_VELOCITY, POSITION, ROTATION
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -189,7 +189,7 @@ def twist(constants: Array, rates: Array, motion: Array) -> None:
         motion[ANGULAR_VELOCITY.start + n] = per_size * dot6(inverse[3 + n], rate)
 
 
-@entry_point
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'i8[::1]', 'i8[::1]', 'f8[::1]')
 def poses(constants: Array, lengths: Array, motions: Array, codes: Integers, steps: Integers,
           residuals: Array) -> None:
     """Find the poses of lengths (N, 6), see ``pose``; the rest is (N, MOTION) and (N,)."""
@@ -197,7 +197,7 @@ def poses(constants: Array, lengths: Array, motions: Array, codes: Integers, ste
         codes[n], steps[n], residuals[n] = pose(constants, lengths[n], motions[n])
 
 
-@entry_point
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]')
 def twists(constants: Array, rates: Array, motions: Array) -> None:
     """Write into motions (N, MOTION) the twists of leg rates (N, 6)."""
     for n in range(len(motions)):

@@ -22,7 +22,7 @@ a function of the rate alone, without a jump at standstill.
 from __future__ import annotations
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.jit import entry_point, inlined
+from stewart_dynamics.compilation.functions import entry_point, inlined
 
 # Coulomb friction grows linearly up to this rate [m/s] and is constant above it.
 COULOMB_RATE = 1e-3
@@ -41,7 +41,7 @@ def coulomb_damping(coulomb: Array) -> Array:
     return coulomb / COULOMB_RATE
 
 
-@entry_point
+@entry_point('f8[:,::1]', 'f8[::1]', 'f8[::1]', 'f8[:,::1]')
 def friction(rates: Array, viscous: Array, coulomb: Array, forces: Array) -> None:
     """
     Write the forces that overcome the friction.

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.vectors import read3, Symmetric3, Vector3
 from stewart_dynamics.parameters import Parameters
 

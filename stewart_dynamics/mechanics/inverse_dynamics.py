@@ -28,24 +28,24 @@ each sample's bits are the same in either case. Numbers in brackets are the pape
 
 ``solve`` computes ``LANES`` samples side by side in each of these steps, so that one vector
 instruction computes several; hence tuples instead of arrays, no branches, and inlined functions.
+``solve_one`` computes a single sample in the first lane.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import characteristic_length_of
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Rows, Tridiagonal, tridiagonal)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES,
     LENGTHS, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSITION, RATES, RESULT, ROTATION,
     UNIT_LOAD_FORCES, WRENCH)
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.vectors import add, dot6, Matrix3, scale, subtract, Vector3
 
 # Samples are computed in tiles, number by number: entry n of lane k is at n * LANES + k, so that
@@ -55,7 +55,7 @@ _WRENCH = MOTION * LANES
 _RESULT = _WRENCH + WRENCH * LANES
 _EIGENVALUE = _RESULT + RESULT * LANES  # of two matrices: J J^T and its inverse
 _TRIDIAGONAL = _EIGENVALUE + 2 * LANES
-_TILE = _TRIDIAGONAL + 22 * LANES
+TILE = _TRIDIAGONAL + 22 * LANES
 # Laguerre's iteration takes 4 to 7 steps, with a fourfold eigenvalue up to 42.
 _MOST_STEPS = 64
 
@@ -179,28 +179,67 @@ def _tile_dynamics(constants: Array, tile: Array, lanes: int) -> None:
         _dynamics(constants, tile, k)
 
 
+@inlined
+def _nearer_eigenvalues(tile: Array, k: int) -> int:
+    """Take one step to both largest eigenvalues of lane k; return whether it changed them."""
+    at = k + _EIGENVALUE
+    x, y = tile[at], tile[at + LANES]
+    nearer_x = laguerre_step(x, _tridiagonal(tile, k + _TRIDIAGONAL))
+    nearer_y = laguerre_step(y, _tridiagonal(tile, k + _TRIDIAGONAL + 11 * LANES))
+    tile[at] = nearer_x
+    tile[at + LANES] = nearer_y
+    return 1 if nearer_x < x or nearer_y < y else 0
+
+
+@inlined
+def _put_condition(tile: Array, k: int) -> None:
+    at = k + _EIGENVALUE
+    tile[k + _RESULT + CONDITION * LANES] *= math.sqrt(tile[at]) * math.sqrt(tile[at + LANES])
+
+
 @compiled
 def _tile_eigenvalues(tile: Array, lanes: int) -> None:
     """Iterate on both largest eigenvalues of all lanes until no step changes any of them."""
     for _ in range(_MOST_STEPS):
         changed = 0
         for k in range(min(lanes, LANES)):
-            at = k + _EIGENVALUE
-            x, y = tile[at], tile[at + LANES]
-            nearer_x = laguerre_step(x, _tridiagonal(tile, k + _TRIDIAGONAL))
-            nearer_y = laguerre_step(y, _tridiagonal(tile, k + _TRIDIAGONAL + 11 * LANES))
-            changed += 1 if nearer_x < x or nearer_y < y else 0
-            tile[at] = nearer_x
-            tile[at + LANES] = nearer_y
+            changed += _nearer_eigenvalues(tile, k)
         if changed == 0:
             break
     for k in range(min(lanes, LANES)):
-        at = k + _EIGENVALUE
-        tile[k + _RESULT + CONDITION * LANES] *= math.sqrt(tile[at]) * math.sqrt(tile[at + LANES])
+        _put_condition(tile, k)
 
 
-@entry_point
-def solve(constants: Array, motions: Array, wrenches: Array, results: Array) -> None:
+@compiled
+def solve_one(
+        constants: Array, motion: Array, wrench: Array, result: Array, tile: Array) -> None:
+    """Compute the result of one motion; the arrays are a row each of those of ``solve``."""
+    for n in range(MOTION):
+        tile[n * LANES] = motion[n]
+    for n in range(WRENCH):
+        tile[_WRENCH + n * LANES] = wrench[n]
+    _dynamics(constants, tile, 0)
+    for _ in range(_MOST_STEPS):
+        if _nearer_eigenvalues(tile, 0) == 0:
+            break
+    _put_condition(tile, 0)
+    for n in range(RESULT):
+        result[n] = tile[_RESULT + n * LANES]
+
+
+@entry_point('f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]')
+def solve_sample(constants: Array, motion: Array, wrench: Array, result: Array, sound: Array,
+                 tile: Array) -> None:
+    """Do the same; ``sound`` (1,) is 1 where all numbers are finite and J_inv can be solved."""
+    solve_one(constants, motion, wrench, result, tile)
+    finite = True
+    for n in range(RESULT):
+        finite = finite and math.isfinite(result[n])
+    sound[0] = 1.0 if finite and result[CONDITION] < UNSOLVABLE_CONDITION else 0.0
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[::1]')
+def solve(constants: Array, motions: Array, wrenches: Array, results: Array, tile: Array) -> None:
     """
     Compute the result of every motion.
 
@@ -215,9 +254,10 @@ def solve(constants: Array, motions: Array, wrenches: Array, results: Array) -> 
     results : (N, RESULT)
         Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
         d(det)/dt [m^3/s] and the condition number.
+    tile : (TILE,)
+        Scratch memory.
 
     """
-    tile = np.empty(_TILE)
     many = len(motions)
     one_wrench = len(wrenches) == 1
     for first in range(0, many, LANES):

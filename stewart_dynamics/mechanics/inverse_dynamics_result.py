@@ -16,15 +16,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 
-class InverseDynamics(NamedTuple):
+class InverseDynamics:
     """
     Lengths, rates and forces of the legs in a motion; (...) is the motion's leading shape.
 
@@ -48,32 +46,61 @@ class InverseDynamics(NamedTuple):
         three columns of J_inv are divided by the characteristic length first.
     time_to_crossing : (...)
         Time after which det(J) is zero at its present rate [s]; inf: never.
+    rows : (..., RESULT)
+        All numbers of each sample in a row, laid out as ``mechanics.rows`` says; the other
+        attributes are views of them.
 
     """
 
-    lengths: Array
-    rates: Array
-    forces: Array
-    unit_load_forces: Array
-    determinant: Array
-    determinant_rate: Array
-    condition_number: Array
+    __slots__ = ('rows',)
+
+    def __init__(self, rows: Array) -> None:
+        self.rows = rows
+
+    @property
+    def lengths(self) -> Array:
+        """Return the lengths (..., 6) [m]."""
+        return self.rows[..., LENGTHS]
+
+    @property
+    def rates(self) -> Array:
+        """Return the rates (..., 6) [m/s]."""
+        return self.rows[..., RATES]
+
+    @property
+    def forces(self) -> Array:
+        """Return the forces (..., 6) [N]."""
+        return self.rows[..., FORCES]
+
+    @property
+    def unit_load_forces(self) -> Array:
+        """Return the largest forces under a unit load (..., 6)."""
+        return self.rows[..., UNIT_LOAD_FORCES]
+
+    # [()] makes a number of an array without a shape.
+
+    @property
+    def determinant(self) -> Array:
+        """Return det(J) (...) [m^3]."""
+        return self.rows[..., DETERMINANT][()]
+
+    @property
+    def determinant_rate(self) -> Array:
+        """Return d(det(J))/dt (...) [m^3/s]."""
+        return self.rows[..., DETERMINANT_RATE][()]
+
+    @property
+    def condition_number(self) -> Array:
+        """Return the condition number of J_inv (...)."""
+        return self.rows[..., CONDITION][()]
 
     @property
     def time_to_crossing(self) -> Array:
-        """Time after which det(J) is zero at its present rate, (...) [s]; inf: never."""
+        """Return the time after which det(J) is zero (...) [s]."""
         return time_to_crossing(self.determinant, self.determinant_rate)
-
-    @classmethod
-    def of_rows(cls, results: Array) -> InverseDynamics:
-        """Return the fields of rows of results (..., RESULT)."""
-        return cls(
-            results[..., LENGTHS], results[..., RATES], results[..., FORCES],
-            results[..., UNIT_LOAD_FORCES],
-            # [()] makes a number of an array without a shape
-            results[..., DETERMINANT][()], results[..., DETERMINANT_RATE][()],
-            results[..., CONDITION][()])
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""
-        return f'<InverseDynamics of shape {self.lengths.shape[:-1]}: {", ".join(self._fields)}>'
+        return (f'<InverseDynamics of shape {self.rows.shape[:-1]}: lengths, rates, forces, '
+                'unit_load_forces, determinant, determinant_rate, condition_number, '
+                'time_to_crossing>')

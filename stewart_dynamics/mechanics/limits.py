@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Six
-from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, RATES
 from stewart_dynamics.parameters import Parameters
 

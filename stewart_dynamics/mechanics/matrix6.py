@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 
-from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.vectors import choose6, dot6, Vector6
 
 Rows = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
-from stewart_dynamics.mechanics.pose import as_rotation, matrix_of_quaternion, Pose, Samples
+from stewart_dynamics.mechanics.pose import (
+    as_rotation, matrix_of_quaternion, Pose, row_of_one, Samples)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
@@ -75,6 +76,13 @@ class Motion(Samples):
             linear_acceleration: ArrayLike | None = None,
             angular_acceleration: ArrayLike | None = None,
     ) -> None:
+        row = row_of_one(
+            MOTION, rotation, (POSITION, position), (LINEAR_VELOCITY, linear_velocity),
+            (ANGULAR_VELOCITY, angular_velocity), (LINEAR_ACCELERATION, linear_acceleration),
+            (ANGULAR_ACCELERATION, angular_acceleration))
+        if row is not None:
+            self.rows, self.shape = row, ()
+            return
         turn = as_rotation(rotation)
         parts = {'position': (POSITION, as_array('position', position, (3,)))}
         for name, where, part in (

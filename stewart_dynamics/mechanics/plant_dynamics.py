@@ -26,18 +26,15 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.end_stops import stop_force
-from stewart_dynamics.mechanics.forward_dynamics import acceleration, WORK
-from stewart_dynamics.mechanics.jit import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.forward_dynamics import acceleration
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, consecutive, MOTION, POSITION, ROTATION, TWIST)
-from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, Matrix3, read3, scale, Vector3)
+from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, read3, scale, Vector3
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
 STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
@@ -51,6 +48,9 @@ RESULT = RESULT_SOUND + 1
 # Six commands, and the wrench on the platform.
 COMMANDS, WRENCH = consecutive(6, 6)
 LOADS = WRENCH.stop
+# Scratch memory.
+_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN = consecutive(MOTION, 6, STATE, STATE, STATE)
+SCRATCH = _MEAN.stop
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
 # this part of its leg's length: a larger move would not be resolved.
@@ -152,9 +152,10 @@ def _next_state(constants: Array, stops: Array, loads: Array, state: Array, h: f
     return finite
 
 
-@entry_point
+@entry_point('f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'i8', 'f8',
+             'f8[::1]', 'f8[:,::1]')
 def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
-            result: Array, steps: int, h: float) -> None:
+            result: Array, steps: int, h: float, scratch: Array, work: Array) -> None:
     """
     Take steps of h [s] and write the state and the result.
 
@@ -175,10 +176,12 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
         Written.
     steps, h
         How many, and how long.
+    scratch, work : (SCRATCH,), forward_dynamics.WORK
+        Scratch memory.
 
     """
-    motion, forces, work = np.empty(MOTION), np.empty(6), np.empty(WORK)
-    after, slope, mean = np.empty(STATE), np.empty(STATE), np.empty(STATE)
+    motion, forces, after = scratch[_MOTION], scratch[_FORCES], scratch[_AFTER]
+    slope, mean = scratch[_SLOPE], scratch[_MEAN]
     for leg in range(6):
         most = largest_forces[leg]
         force = min(max(loads[COMMANDS.start + leg], -most), most)

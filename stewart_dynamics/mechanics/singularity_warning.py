@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.parameters import Parameters
 
 # At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of

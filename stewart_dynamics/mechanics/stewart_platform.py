@@ -37,6 +37,7 @@ from stewart_dynamics.mechanics.platform_arguments import (
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.rows import (
     FORCES, LENGTHS, MOTION, POSE, POSITION, RESULT, TWIST, WRENCH)
+from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters import Parameters
 
@@ -74,7 +75,12 @@ class StewartPlatform:
                              'reads a file, Parameters takes a dict')
         self.parameters = parameters
         self.constants = hexapod_constants(parameters)
+        self._single = SingleSample(self.constants)
         self._breakdown: ForceBreakdownRows | None = None
+
+    def __reduce__(self) -> tuple[type[StewartPlatform], tuple[Parameters]]:
+        """Pickle and copy the parameters alone."""
+        return type(self), (self.parameters,)
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> StewartPlatform:
@@ -112,13 +118,17 @@ class StewartPlatform:
             J_inv cannot be solved in a sample; names the sample.
 
         """
+        known = singular in ('raise', 'nan')
+        result = self._single.inverse_dynamics(motion, wrench) if known else None
+        if result is not None:
+            return InverseDynamics(result)
         rows, wrenches, shape = loaded(motion, wrench)
         results = self.solve(rows, wrenches)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
         unsolvable = find_unsolvable(rows, results, shape, singular)
         if len(unsolvable):
             results[unsolvable, FORCES] = np.nan
-        return InverseDynamics.of_rows(results.reshape(*shape, RESULT))
+        return InverseDynamics(results.reshape(*shape, RESULT))
 
     def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
         """
@@ -163,6 +173,9 @@ class StewartPlatform:
             External wrench on the platform, as in ``inverse_dynamics``.
 
         """
+        row = self._single.forward_dynamics(motion, forces, wrench)
+        if row is not None:
+            return Motion.of_rows(row)
         check_kind(motion, Motion)
         pushes = as_array('forces', forces, (6,))
         load = optional_array('wrench', wrench, (WRENCH,))
@@ -170,7 +183,8 @@ class StewartPlatform:
                              wrench=load.shape[:-1])
         rows = copies(motion.rows, shape)
         pushes, load = copies(pushes, shape), copies(load, shape)
-        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load)
+        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load,
+                       scratch=forward_dynamics.WORK)
         rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
         return Motion.of_rows(rows)
 
@@ -203,6 +217,9 @@ class StewartPlatform:
             The guess is singular, or a pose in the iteration.
 
         """
+        row = self._single.forward_kinematics(lengths, guess)
+        if row is not None:
+            return Pose.of_rows(row)
         wanted = as_array('lengths', lengths, (6,))
         check_kind(guess, Pose, Motion, name='guess')
         shape = common_shape(lengths=wanted.shape[:-1], guess=guess.shape)

@@ -21,7 +21,7 @@ Tuples become registers when compiled. Every function is inlined into the loop o
 from __future__ import annotations
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.jit import inlined
+from stewart_dynamics.compilation.functions import inlined
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]

@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 
 
 def dynamics() -> int:
-    """Run the node stewart_dynamics; return its exit code."""
+    """Run the node stewart_dynamics, or compile all; return the exit code."""
+    if '--compile' in sys.argv[1:]:
+        return int(_imported('compile_all').compile_all())
     return _run('parameters', 'Parameters', 'dynamics_node')
 
 
@@ -51,9 +53,11 @@ def trajectory() -> int:
 
 def usage(kind: type[ParameterSet]) -> str:
     """Return what ``--help`` prints."""
+    compiles = kind.node == 'stewart_dynamics'
     return '\n'.join([
-        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]', '',
-        'parameters:', *map(_described, kind.table.values())])
+        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
+        *(['       stewart_dynamics --compile    compile all machine code now, and end']
+          if compiles else []), '', 'parameters:', *map(_described, kind.table.values())])
 
 
 def _described(parameter: Parameter) -> str:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from functools import partial
 import gc
 import time
 from typing import Any, NamedTuple
@@ -26,11 +26,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 
-from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.compilation import machine_code
+from stewart_dynamics.compilation.preparation import Preparation
 from stewart_dynamics.errors import ParameterError, StewartError
-from stewart_dynamics.mechanics import jit
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.nodes import parameter_changes
 from stewart_dynamics.nodes.declared_parameters import declare_parameters
 from stewart_dynamics.nodes.diagnostics_publisher import DiagnosticsPublisher
@@ -45,14 +44,14 @@ from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics
 from stewart_dynamics.parameter_files import is_of_ros
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime import external_wrench, planned_trajectory
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, TICK, WARN
-from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench, Measurement
+from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench
 from stewart_dynamics.runtime.input_topics import WRENCH
-from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs
+from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs, NOT_COMPILED
 from stewart_dynamics.runtime.output_messages import OutputMessages
-from stewart_dynamics.runtime.planned_trajectory import compile_ahead
 from stewart_dynamics.runtime.rejections import NOT_EXCLUSIVE, Rejection
 from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
@@ -67,14 +66,6 @@ class _Models(NamedTuple):
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
         return cls(Step(parameters), ExternalWrench(parameters))
-
-    def compile_ahead(self) -> None:
-        """Make the first calls, which compile, so that no message waits for that."""
-        self.step(Setpoint(0, (0.0,) * MOTION), None)
-        compile_ahead(self.step.parameters)
-        with suppress(StewartError):  # no pose has such lengths
-            self.external_wrench(
-                Measurement(0, NO_WRENCH, NO_WRENCH, NO_WRENCH), None, NO_WRENCH, None)
 
 
 class DynamicsNode(LifecycleNode):
@@ -98,14 +89,17 @@ class DynamicsNode(LifecycleNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         timer = self.create_timer(PAUSE, lambda: self._planned.tick(), clock=steady)
         timer.cancel()
-        self._planned = PlannedTrajectoryQueue(timer.reset, timer.cancel, self._on_outcome)
+        self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
+        self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
+        self._planned = PlannedTrajectoryQueue(
+            timer.reset, timer.cancel, self._planned_code, self._on_outcome)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.create_timer(TICK, self._on_tick, clock=steady)
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
         set_parameters_together(self)
-        if jit.HINT:
-            self.get_logger().warning(jit.HINT)
+        if machine_code.HINT:
+            self.get_logger().warning(machine_code.HINT)
         if self._settings['autostart']:
             if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
                 raise StewartError(f'cannot be configured: {self._fault}')
@@ -168,9 +162,8 @@ class DynamicsNode(LifecycleNode):
 
     def _configure(self) -> None:
         begun = time.monotonic()
-        self._models = _Models.of(self._settings)
-        SIGNALS.interruptible(self._models.compile_ahead)
-        how = 'compiled ' if jit.COMPILED else ''
+        self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
+        how = 'compiled ' if machine_code.COMPILED else ''
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
@@ -241,6 +234,10 @@ class DynamicsNode(LifecycleNode):
     def _on_measured_legs(self, data: bytes) -> None:
         if not self._active:
             return
+        if not self._external_wrench_code.ready:
+            self._external_wrench_code.begin()
+            self._on_rejection(Rejection(MEASURED_LEGS, NOT_COMPILED), 'this takes seconds, once')
+            return
         now = time.monotonic()
         diagnostics, target = self._diagnostics.external_wrench, self._queue.target
         diagnostics.heard(now)
@@ -293,6 +290,10 @@ class DynamicsNode(LifecycleNode):
         self._log.write_last(now)
         if not self._active:
             return
+        for topic, code in ((planned.INPUT, self._planned_code),
+                            (MEASURED_LEGS, self._external_wrench_code)):
+            if not code.ready and self._topics.writers_of(topic):
+                code.begin()  # the first message will come soon
         self._markers.publish_due(now)  # the last answer before a silence
         if self._diagnostics.due_at_tick(now):
             self._report()

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
+from stewart_dynamics.compilation.preparation import Preparation
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 # So many are in work or wait.
@@ -37,15 +38,18 @@ class PlannedTrajectoryQueue:
     ----------
     start, stop : callable
         Start and stop the timer; it ticks once after each start.
+    code : Preparation
+        Of what the work calls; it waits until that is ready.
     done : callable
         Gets an outcome, and when the trajectory came [s].
 
     """
 
     def __init__(self, start: Callable[[], None], stop: Callable[[], None],
-                 done: Callable[[Outcome, float], None]) -> None:
+                 code: Preparation, done: Callable[[Outcome, float], None]) -> None:
         self._start = start
         self._stop = stop
+        self._code = code
         self._done = done
         self._waiting: deque[tuple[Iterator[Outcome | None], float]] = deque()
 
@@ -56,6 +60,7 @@ class PlannedTrajectoryQueue:
 
     def add(self, work: Iterator[Outcome | None], came: float) -> None:
         """Add the work on a trajectory that came at a time [s]."""
+        self._code.begin()
         self._waiting.append((work, came))
         self._start()
 
@@ -63,6 +68,9 @@ class PlannedTrajectoryQueue:
         """Do one piece of the work on the first one."""
         self._stop()
         if not self._waiting:  # dropped
+            return
+        if not self._code.ready:
+            self._start()
             return
         work, came = self._waiting[0]
         outcome = next(work)

@@ -29,6 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
+from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.nodes.command_line import parameter_files
 from stewart_dynamics.nodes.rclpy_workarounds import (
@@ -66,6 +67,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         warning = check_environment(sys.argv)
         reject_impossible_times()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        machine_code.announce = get_logger(kind.node).info
         warnings.showwarning = lambda message, *_: get_logger(kind.node).warning(str(message))
         with without_security_libraries():
             node = make_node()

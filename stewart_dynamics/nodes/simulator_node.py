@@ -33,7 +33,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import Six
-from stewart_dynamics.mechanics import jit
+from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
@@ -86,8 +86,8 @@ class SimulatorNode(Node):
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = bool(self.get_parameter('use_sim_time').value)
         self._series = Series()
-        if jit.HINT:
-            self.get_logger().warning(jit.HINT)
+        if machine_code.HINT:
+            self.get_logger().warning(machine_code.HINT)
         begun = time.monotonic()
         self._plant = SIGNALS.interruptible(partial(Plant, self._settings))
         self._state_messages = StateMessages(self._settings)

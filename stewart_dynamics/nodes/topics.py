@@ -114,18 +114,18 @@ class Topics:
         self.setpoints = {
             topic: self._subscribe(_TYPES[_INPUT_TYPES[topic]], topic, partial(on_setpoint, topic))
             for topic in SOURCES[parameters['setpoint.source']]}
-        self._names = {topic: subscription.topic_name
-                       for topic, subscription in self.setpoints.items()}
-        for topic, callback in others.items():
-            self._subscribe(
+        inputs = {**self.setpoints, **{
+            topic: self._subscribe(
                 _TYPES[_INPUT_TYPES[topic]], topic, callback, _QUEUES.get(topic, QUEUE))
+            for topic, callback in others.items()}}
+        self._names = {topic: subscription.topic_name for topic, subscription in inputs.items()}
 
     def writers(self) -> dict[str, int]:
         """Return how many publishers each setpoint topic has."""
-        return {topic: self.writers_of(topic) for topic in self._names}
+        return {topic: self.writers_of(topic) for topic in self.setpoints}
 
     def writers_of(self, topic: str) -> int:
-        """Return how many publishers a setpoint topic has."""
+        """Return how many publishers an input topic has."""
         return int(self._node.count_publishers(self._names[topic]))
 
     def destroy(self) -> None:

@@ -146,7 +146,7 @@ def _options(given: argparse.Namespace) -> Options:
 
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
-    from stewart_dynamics.mechanics import jit
+    from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters import Parameters
     from stewart_dynamics.replay.bags import FLEET_PAGE, folders_of_results
@@ -159,8 +159,8 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
         options = options._replace(plotly=share_plotly(given.output))
-    if jit.HINT:
-        print(f'stewart_replay: {jit.HINT}', file=sys.stderr)
+    if HINT:
+        print(f'stewart_replay: {HINT}', file=sys.stderr)
     for mistake in likely_mistakes(parameters):
         _complain(f'warning: {mistake}')
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:

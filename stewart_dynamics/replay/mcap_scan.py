@@ -20,14 +20,14 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Bytes, Integers
-from stewart_dynamics.mechanics.jit import entry_point
+from stewart_dynamics.compilation.functions import entry_point
 
 # Columns of the result; of schemas and channels the first is minus the opcode.
 CHANNEL, TIME, START, SIZE, _FOUND = range(5)
 
 
-@entry_point
-def scan(data: Bytes, only_messages: bool, found: Integers) -> tuple[int, int]:
+@entry_point('u1[::1]', 'b1', 'i8[:,::1]', 'i8[::1]')
+def scan(data: Bytes, only_messages: bool, found: Integers, totals: Integers) -> None:
     """
     Find the messages in a sequence of records.
 
@@ -40,8 +40,8 @@ def scan(data: Bytes, only_messages: bool, found: Integers) -> tuple[int, int]:
     found : (K, 4)
         Output: channel, time, start, size; of schemas and channels minus the opcode in place
         of the channel. Messages beyond K rows are only counted.
-
-    Returns the number of messages, and the number of bytes of the whole records.
+    totals : (2,)
+        Output: the number of messages, and the number of bytes of the whole records.
 
     """
     count, at = 0, 0
@@ -72,13 +72,13 @@ def scan(data: Bytes, only_messages: bool, found: Integers) -> tuple[int, int]:
                     found[count, 3] = length
             count += 1
         at += 9 + int(length)
-    return count, at
+    totals[0], totals[1] = count, at
 
 
 def scanned(data: bytes, only_messages: bool) -> tuple[Integers, int, Bytes]:
     """Return the messages (K, 4), the number of bytes of whole records, and all bytes."""
-    array = np.frombuffer(bytearray(data), np.uint8)  # numba compiles again for read-only arrays
-    count, _ = scan(array, only_messages, np.empty((0, _FOUND), np.int64))
-    found = np.empty((count, _FOUND), np.int64)
-    _, consumed = scan(array, only_messages, found)
-    return found, consumed, array
+    array, totals = np.frombuffer(data, np.uint8), np.empty(2, np.int64)
+    scan(array, only_messages, np.empty((0, _FOUND), np.int64), totals)
+    found = np.empty((totals[0], _FOUND), np.int64)
+    scan(array, only_messages, found, totals)
+    return found, int(totals[1]), array

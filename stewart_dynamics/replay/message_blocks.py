@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers
-from stewart_dynamics.mechanics.jit import entry_point
+from stewart_dynamics.compilation.functions import entry_point
 import zstandard
 
 # Messages in a block: enough that the overhead of a numpy call is small, few enough that they fit
@@ -132,13 +132,14 @@ def split(block: Block, time: float) -> tuple[Block, Block]:
     return block.chosen(slice(at)), lean(block.chosen(slice(at, None)))
 
 
-@entry_point
+@entry_point('u1[::1]', 'i8[::1]', 'i8[::1]', 'u1[::1]')
 def _gather(data: Bytes, starts: Integers, sizes: Integers, out: Bytes) -> None:
     """Copy messages, one after the other."""
     at = 0
     for n in range(len(starts)):
-        out[at:at + sizes[n]] = data[starts[n]:starts[n] + sizes[n]]
-        at += sizes[n]
+        for k in range(starts[n], starts[n] + sizes[n]):
+            out[at] = data[k]
+            at += 1
 
 
 def lean(block: Block) -> Block:

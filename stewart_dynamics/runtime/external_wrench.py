@@ -41,7 +41,7 @@ the difference quotient alone has sqrt(2) M s / dt.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 import math
 from struct import Struct
@@ -50,12 +50,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
 from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.home_pose import homes
-from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.rows import consecutive, FORCES, MOTION, RESULT, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
@@ -68,12 +68,12 @@ EXTERNAL_WRENCH = 'external_wrench'
 _OUT_OF_RANGE = 3
 
 # One measurement as numbers, since an array costs time to pass: what is given, what is written.
-# Motion before (or the guess where there is none) and after lie side by side: two rows.
 _MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
     MOTION, WRENCH, 6, 1, 1, 1)
-(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION,
- _WRITTEN) = consecutive(CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, _CODE.stop)
-_MOTIONS = slice(_MOTION.start, _MOTION.start + 2 * MOTION)
+# The motion given is the one before, or the guess where there is none.
+(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _WRITTEN,
+ _RESULT, _TILE) = consecutive(CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, _CODE.stop,
+                               RESULT, inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
 _GIVES = Struct(f'{_CODE.stop}d')
 
@@ -138,7 +138,7 @@ def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
             wrench[3 + n] += force * m[n]
 
 
-@entry_point
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
 def _many(constants: Array, motions: Array, model_forces: Array, measured_forces: Array,
           wrenches: Array) -> None:
     for n in range(len(motions)):
@@ -174,13 +174,14 @@ def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: A
     return wrenches
 
 
-@entry_point
+@entry_point('f8[::1]')
 def _one(numbers: Array) -> None:
     """Write what one measurement gives."""
     constants, written = numbers[_PLATFORM], numbers[_WRITTEN]
     before, motion, wrench, differences = (
         numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
-    motion[:] = before
+    for n in range(MOTION):
+        motion[n] = before[n]
     code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
         constants, numbers[_LENGTHS], motion)
     written[_CODE.start] = code
@@ -194,12 +195,12 @@ def _one(numbers: Array) -> None:
         wrench[n] = 0.0
         differences[n] = 0.0
     if dt > 0.0:
-        motions = numbers[_MOTIONS].reshape(2, MOTION)
-        forces, results = numbers[_FORCES], np.empty((2, RESULT))
-        inverse_dynamics.solve(constants, motions, numbers[_KNOWN].reshape(1, WRENCH), results)
+        forces, result = numbers[_FORCES], numbers[_RESULT]
         for end in range(2):  # the mean of both ends
-            model_forces = results[end, FORCES]
-            _add_external_wrench(constants, motions[end], model_forces, forces, 0.5, wrench)
+            at = motion if end else before
+            inverse_dynamics.solve_one(constants, at, numbers[_KNOWN], result, numbers[_TILE])
+            model_forces = result[FORCES]
+            _add_external_wrench(constants, at, model_forces, forces, 0.5, wrench)
             for n in range(6):
                 differences[n] += 0.5 * (forces[n] - model_forces[n])
         for n in range(6):
@@ -208,6 +209,10 @@ def _one(numbers: Array) -> None:
     for n in range(_STEPS.start):
         if not math.isfinite(written[n]):
             written[_CODE.start] = _OUT_OF_RANGE
+
+
+# The machine code that a measurement needs.
+FUNCTIONS = (_one,)
 
 
 class ExternalWrench:
@@ -224,7 +229,7 @@ class ExternalWrench:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._numbers = np.zeros(_WRITTEN.stop)
+        self._numbers = np.zeros(_TILE.stop)
         self._memory = self._numbers.data  # the same as bytes
         self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
         self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
@@ -286,7 +291,7 @@ class ExternalWrench:
         gain = -math.expm1(-self._rate * interval)
         _GIVEN.pack_into(
             self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion)
-        _one(self._numbers)
+        self._bound()
         return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
 
     def _guesses(self, before: Estimate | None, target: Sequence[float] | None,
@@ -296,6 +301,10 @@ class ExternalWrench:
         if target is not None:
             yield target
         yield from self._homes
+
+    @cached_property
+    def _bound(self) -> Callable[[], object]:
+        return _one.bound(self._numbers)
 
     @cached_property
     def _homes(self) -> list[list[float]]:

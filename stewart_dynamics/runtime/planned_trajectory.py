@@ -31,18 +31,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.errors import MotionError
-from stewart_dynamics.mechanics import forward_kinematics
+from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
 from stewart_dynamics.mechanics.cubics import Cubics
 from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.jit import COMPILED
 from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, MOTION, RATES, WRENCH
+from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, RATES, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.planned_trajectory_checks import Checks, Violation
 from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
+
+# The machine code that a check needs.
+FUNCTIONS = inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses
 
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
@@ -162,16 +164,6 @@ def first_not_increasing(times: Stamps, before: int = -1) -> int | None:
     """Return the index of the first time [ns] that is not after the one before it."""
     stuck = np.diff(times, prepend=before) <= 0
     return int(np.argmax(stuck)) if stuck.any() else None
-
-
-def compile_ahead(parameters: Parameters) -> None:
-    """Compile what a check calls, so that setpoints do not wait for the first trajectory."""
-    platform, rows = StewartPlatform(parameters), np.zeros((1, MOTION))
-    platform.solve(rows)
-    forward_kinematics.twists(platform.constants, np.zeros((1, 6)), rows)
-    codes, steps = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64)
-    forward_kinematics.poses(
-        platform.constants, np.zeros((1, 6)), rows, codes, steps, np.empty(1))
 
 
 class _RejectedError(Exception):

@@ -30,11 +30,12 @@ import numpy as np
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.end_stops import stops_of
+from stewart_dynamics.mechanics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.integration_step_size import substeps
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.plant_dynamics import (
     advance, LARGEST_MOVE, LOADS, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
-    RESULT_RATES, RESULT_SOUND, STATE, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
+    RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
 from stewart_dynamics.mechanics.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
@@ -90,8 +91,6 @@ class Plant:
         self.steps = round(period / parameters['step']) * self.substeps
         """Steps in a period."""
         self._step = period / self.steps
-        self._constants = StewartPlatform(parameters).constants
-        self._stops = stops_of(parameters)
         self._limits = Limits(parameters)
         self._loads = np.zeros(LOADS)
         numbers = np.zeros(STATE + RESULT)
@@ -100,6 +99,10 @@ class Plant:
         pose = parameters['initial_pose']
         self._state[STATE_POSITION] = pose[:3]
         self._state[STATE_QUATERNION] = to_quaternion(from_euler(pose[3:]))
+        self._take_none, self._take_steps = (advance.bound(
+            StewartPlatform(parameters).constants, stops_of(parameters), self._limits.force_max,
+            self._loads, self._state, self._result, steps, self._step, np.empty(SCRATCH),
+            np.empty(WORK)) for steps in (0, self.steps))
         self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         """The present one."""
         self._check_lengths()
@@ -148,8 +151,7 @@ class Plant:
                               forces=numbers[RESULT_FORCES])
 
     def _run(self, steps: int) -> State:
-        advance(self._constants, self._stops, self._limits.force_max, self._loads, self._state,
-                self._result, steps, self._step)
+        (self._take_steps if steps else self._take_none)()
         numbers = _NUMBERS.unpack_from(self._memory)
         state, result = numbers[:STATE], numbers[STATE:]
         lengths = result[RESULT_LENGTHS]

@@ -28,9 +28,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
+from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
-from stewart_dynamics.mechanics.jit import entry_point, inlined
 from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
 from stewart_dynamics.mechanics.rows import (
     CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
@@ -173,8 +173,9 @@ _THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
 
 # One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
 _RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING = consecutive(RESULT, 6, STATE, 1, 1)
-_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BEFORE, _RESTART, _IS_STAMP, _WRITTEN = consecutive(
-    CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, STATE, 1, 1, _EXCEEDING.stop)
+(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BEFORE, _RESTART, _IS_STAMP, _WRITTEN,
+ _TILE) = consecutive(CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, STATE, 1, 1, _EXCEEDING.stop,
+                      inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
 _GIVES = Struct(f'{_EXCEEDING.stop}d')
 
@@ -203,11 +204,12 @@ def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart
     return True, any_exceeded(limits, result)
 
 
-@entry_point
-def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array, results: Array,
+@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
+             'b1[::1]', 'b1[::1]')
+def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, state: Array, results: Array,
                 forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
     """Go through results in their order and write what becomes of them, see Outputs."""
-    state, limits = before.copy(), settings[_LIMITS]
+    limits = settings[_LIMITS]
     restart = False
     for n in range(len(results)):
         # Where this one cannot be answered, the next one is the restart.
@@ -216,18 +218,19 @@ def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, before: Array,
         answered[n], exceeding[n] = _watch(
             settings, limits, is_stamp, state, restart, results[n], forces[n])
         restart = restart and not answered[n]
-        states[n] = state
+        for k in range(STATE):
+            states[n, k] = state[k]
 
 
-@entry_point
+@entry_point('f8[::1]')
 def _one(numbers: Array) -> None:
     """Do with one setpoint what solve and watch do with many."""
     settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
-    state[:] = numbers[_BEFORE]
-    inverse_dynamics.solve(
-        numbers[_PLATFORM], numbers[_MOTION].reshape(1, MOTION),
-        numbers[_WRENCH].reshape(1, WRENCH), result.reshape(1, RESULT))
+    for n in range(STATE):
+        state[n] = numbers[_BEFORE.start + n]
+    inverse_dynamics.solve_one(
+        numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], result, numbers[_TILE])
     written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
         settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0, state,
         numbers[_RESTART.start] > 0.0, result, written[_FORCES])
@@ -252,7 +255,7 @@ class Step:
         self.parameters = parameters
         self._platform = StewartPlatform(parameters)
         self._limits = Limits(parameters)
-        self._numbers = np.zeros(_WRITTEN.stop)
+        self._numbers = np.zeros(_TILE.stop)
         self._memory = self._numbers.data  # the same as bytes
         self._numbers[_PLATFORM] = self._platform.constants
         self._settings = settings = self._numbers[_SETTINGS]
@@ -260,6 +263,7 @@ class Step:
         settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
         settings[_LIMITS] = self._limits.thresholds.ravel()
         settings[_FORCE_MAX] = self._limits.force_max
+        self._solve = _one.bound(self._numbers)
 
     def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
         """
@@ -277,7 +281,7 @@ class Step:
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
             *(before or _FIRST).numbers, setpoint.restart, -STAMPS_END <= stamp < STAMPS_END)
-        _one(self._numbers)
+        self._solve()
         written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
         if not written[_ANSWERED.start]:
             return None

@@ -1,0 +1,155 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The calls of the library for one sample, as fast as a control loop or an MPC needs them.
+
+A call takes the time of the arithmetic and little more: arguments are copied to memory whose
+address the machine code knows already. A call returns None where an argument must be converted
+or is wrong, and where the result is not sound; the call for batches then does what is needed, or
+says what is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.entry_point import EntryPoint
+from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, RESULT, WRENCH
+
+_NO_WRENCH = np.zeros(WRENCH)
+_POSE = POSE.stop
+
+# The numbers of each array, the arrays, and what calls the function with them.
+_Memory = tuple[tuple[Any, ...], tuple[NDArray[Any], ...], Callable[[], object]]
+
+# What a memoryview raises where an argument is no array of floats of its shape.
+_NO_FLOATS = (TypeError, ValueError)
+
+
+class SingleSample:
+    """
+    The calls for one sample of a hexapod, from any number of threads.
+
+    Parameters
+    ----------
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
+
+    """
+
+    def __init__(self, constants: Array) -> None:
+        self._inverse_dynamics = _Memories(
+            inverse_dynamics.solve_sample, constants, np.empty(MOTION), np.empty(WRENCH),
+            np.empty(RESULT), np.empty(1), np.empty(inverse_dynamics.TILE))
+        self._forward_dynamics = _Memories(
+            forward_dynamics.solve, constants, np.empty((1, MOTION)), np.empty((1, 6)),
+            np.empty((1, WRENCH)), np.empty(forward_dynamics.WORK))
+        self._forward_kinematics = _Memories(
+            forward_kinematics.poses, constants, np.empty((1, 6)), np.zeros((1, MOTION)),
+            np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1))
+
+    def inverse_dynamics(self, motion: Motion, wrench: Any) -> Array | None:
+        """Return the row of results (RESULT,) of a motion (MOTION,) under a wrench (6,)."""
+        if type(motion) is not Motion:
+            return None
+        memory = self._inverse_dynamics.take()
+        (of_motion, of_wrench, _, sound, _), arrays, solve = memory
+        try:
+            of_motion[:] = motion.rows
+            of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+        except _NO_FLOATS:
+            self._inverse_dynamics.free(memory)
+            return None
+        solve()
+        result = arrays[2].copy() if sound[0] else None
+        self._inverse_dynamics.free(memory)
+        return result
+
+    def forward_dynamics(self, motion: Motion, forces: Any, wrench: Any) -> Array | None:
+        """Return the row of the motion (MOTION,) that follows from leg forces (6,)."""
+        if type(motion) is not Motion:
+            return None
+        memory = self._forward_dynamics.take()
+        (of_motion, of_forces, of_wrench, _), arrays, solve = memory
+        try:
+            of_motion[:] = motion.rows
+            of_forces[:] = forces
+            of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+        except _NO_FLOATS:
+            self._forward_dynamics.free(memory)
+            return None
+        solve()
+        result = arrays[0][0].copy()
+        self._forward_dynamics.free(memory)
+        return result if math.isfinite(sum(result[ACCELERATION].tolist())) else None
+
+    def forward_kinematics(self, lengths: Any, guess: Pose | Motion) -> Array | None:
+        """Return the row of the pose (12,) of leg lengths (6,), from a guess."""
+        if type(guess) is not Pose and type(guess) is not Motion:
+            return None
+        memory = self._forward_kinematics.take()
+        (of_lengths, of_motion, code, _, _), arrays, solve = memory
+        try:
+            of_lengths[:] = lengths
+            of_motion[:_POSE] = guess.rows[..., :_POSE]
+        except _NO_FLOATS:
+            self._forward_kinematics.free(memory)
+            return None
+        solve()
+        result = arrays[1][0, :_POSE].copy() if code[0] == forward_kinematics.FOUND else None
+        self._forward_kinematics.free(memory)
+        return result
+
+
+class _Memories:
+    """
+    The memory of calls of a function: as much as there are calls at the same time.
+
+    Parameters
+    ----------
+    function : EntryPoint
+        Called with the constants and with arrays.
+    constants : (CONSTANTS,)
+        Of the hexapod.
+    arrays
+        Like those of each call.
+
+    """
+
+    def __init__(self, function: EntryPoint, constants: Array, *arrays: NDArray[Any]) -> None:
+        self._function, self._constants, self._arrays = function, constants, arrays
+        self._free: list[_Memory] = []
+
+    def take(self) -> _Memory:
+        """Return memory that no other thread uses."""
+        try:
+            return self._free.pop()  # atomic
+        except IndexError:
+            arrays = tuple(array.copy() for array in self._arrays)
+            return (tuple(array.reshape(-1).data for array in arrays), arrays,
+                    self._function.bound(self._constants, *arrays))
+
+    def free(self, memory: _Memory) -> None:
+        """Take it back."""
+        self._free.append(memory)
