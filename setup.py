@@ -30,6 +30,7 @@ version = re.findall(r"^__version__ = '(.+)'$", Path(package_name, '__init__.py'
 # pip has them under other names. Everything else that an executable imports is listed here.
 install_requires = [
     'jinja2>=3.1',  # the replay's pages
+    'llvmlite>=0.40; platform_machine in "x86_64 AMD64 aarch64 arm64"',
     'lz4>=4',
     'mcap>=1.2',
     'numba>=0.57; platform_machine in "x86_64 AMD64 aarch64 arm64"',
