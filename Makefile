@@ -71,8 +71,7 @@ demo-loop: $(INSTALLED)
 	@.venv/bin/python demo/loop.py
 
 bench: $(INSTALLED)
-	.venv/bin/python benchmarks/inverse_dynamics.py --write
-	.venv/bin/python benchmarks/forward.py --write
+	.venv/bin/python benchmarks/bench.py --write
 
 bench-loop: $(INSTALLED)
 	.venv/bin/python benchmarks/simulator.py --write

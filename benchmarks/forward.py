@@ -20,12 +20,11 @@ Run by hand, ``make bench``; README.md beside this file says what is compared an
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 from inverse_dynamics import (
-    Contestant, example_hexapod, measure, measured_on, once, random_motions, repeated, ROUNDS,
-    table, Tree, write)
+    Contestant, example_hexapod, Figure, measure, measured_on, microseconds, once, random_motions,
+    ratio, repeated, table, Tree)
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import root
@@ -43,7 +42,9 @@ FAR, FAR_ANGLE = 0.2 * HOME[2], 0.2
 GUESSES = 1_000_000
 SAMPLES = 20_000
 ABA = '`pin.aba` alone'
-NEWTON = '`forward_kinematics.poses`, one row, from afar'
+CALL = '`StewartPlatform.forward_dynamics`, one `Motion`'
+NEWTON = 'the compiled function alone, from afar'
+FROM_POSE = '`StewartPlatform.forward_kinematics` from afar, guess a `Pose`'
 
 
 def turns_about(axes: Any, angle: float) -> Any:
@@ -106,21 +107,22 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     one = Motion(motion.position[0], motion.rotation[0], motion.linear_velocity[0],
                  motion.angular_velocity[0])
     row, force, no_wrench = motion.rows[:1].copy(), forces[:1].copy(), np.zeros((1, 6))
+    work = np.empty(forward_dynamics.WORK)
     tree = Tree(platform.parameters)
     q, v, _, _ = tree.state(one)
     dynamics = [
-        Contestant('`forward_dynamics.solve`, one row', repeated(
-            'solve(constants, rows, forces, wrenches)', solve=forward_dynamics.solve,
-            constants=platform.constants, rows=row, forces=force, wrenches=no_wrench), ABA),
+        Contestant('the compiled function alone', repeated(
+            'solve()', solve=forward_dynamics.solve.bound(
+                platform.constants, row, force, no_wrench, work)), ABA),
         Contestant(ABA, repeated(
             'aba(model, data, q, v, tau)', aba=pin.aba, model=tree.model, data=tree.data, q=q,
             v=v, tau=np.zeros(tree.model.nv)), ABA),
-        Contestant('`StewartPlatform.forward_dynamics`, one `Motion`', repeated(
+        Contestant(CALL, repeated(
             'solve(motion, forces)', solve=platform.forward_dynamics, motion=one,
             forces=forces[0]), ABA),
         Contestant(f'`forward_dynamics.solve`, a sample of {SAMPLES:,}', once(
             SAMPLES, forward_dynamics.solve, platform.constants, motion.rows.copy(), forces,
-            no_wrench), ABA)]
+            no_wrench, work), ABA)]
 
     random = np.random.default_rng(20260103)
     pose = legal_poses(platform, random, 1)
@@ -129,10 +131,11 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     codes, steps, residuals = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int64), np.empty(1)
 
     def newton(begin: Any) -> Any:
+        rows = begin.copy()
         return repeated(
-            'rows[:] = begin; poses(constants, lengths, rows, codes, steps, residuals)',
-            poses=forward_kinematics.poses, constants=platform.constants, lengths=lengths,
-            rows=begin.copy(), begin=begin, codes=codes, steps=steps, residuals=residuals)
+            'rows[:] = begin; find()', find=forward_kinematics.poses.bound(
+                platform.constants, lengths, rows, codes, steps, residuals),
+            rows=rows, begin=begin)
 
     near = pose.rows.copy()
     near[0, :3] += [1e-4, -2e-4, 1e-4]  # 0.2 m/s at 1 kHz
@@ -155,27 +158,18 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     return dynamics, kinematics
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
-    options = parser.parse_args()
-    if options.rounds < 1:
-        parser.error('--rounds must be at least 1')
-
+def run(rounds: int) -> tuple[list[str], list[Figure]]:
+    """Measure; return the lines for the page, and the figures with targets."""
     platform = StewartPlatform(example_hexapod())
     dynamics, kinematics = contestants(platform)
-    turns = measure(dynamics + kinematics, options.rounds)
+    turns = measure(dynamics + kinematics, rounds)
     lines = [
         '', *table('forward dynamics', dynamics, turns),
         '', *table('forward kinematics', kinematics, turns),
         '', *steps_table(platform),
-        '', f'{measured_on()} Medians of {options.rounds} rounds.', '']
-    print('\n'.join(lines))
-    if options.write:
-        write(lines, BEGIN, END)
-
-
-if __name__ == '__main__':
-    main()
+        '', f'{measured_on()} Medians of {rounds} rounds.', '']
+    return lines, [
+        Figure('`forward_dynamics(motion, forces)`', ratio(CALL, dynamics, turns), 1.5,
+               'times `pin.aba`'),
+        Figure('`forward_kinematics` with a `Pose`, from afar', microseconds(FROM_POSE, turns),
+               6.0, 'us')]

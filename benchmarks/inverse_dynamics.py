@@ -20,9 +20,9 @@ Run by hand, ``make bench``; README.md beside this file says what is compared an
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 import ctypes
+from importlib.metadata import version
 import os
 from pathlib import Path
 import platform
@@ -33,7 +33,6 @@ import time
 import timeit
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 import pinocchio as pin
@@ -261,6 +260,10 @@ def once(samples: int, function: Callable[..., Any], *arguments: Any) -> Callabl
 
 
 RNEA = '`pin.rnea` alone'
+STEP = 'the compiled step alone'
+CALL = '`StewartPlatform.inverse_dynamics`, one `Motion`'
+MOTION = '`Motion` of six arrays'
+BATCH = '`inverse_dynamics.solve`, one core'
 PLAIN_C = 'plain C, one core'
 
 
@@ -272,11 +275,12 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     motion = random_motions(samples)
     rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
     results, c_results = (np.empty((samples, RESULT)) for _ in range(2))
+    tile = np.empty(inverse_dynamics.TILE)
     c, tree = PlainC(), Tree(parameters)
 
     wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
     for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
-        inverse_dynamics.solve(numbers, rows, wrench, results)
+        inverse_dynamics.solve(numbers, rows, wrench, results, tile)
         c.function(*c.arguments(numbers, rows, wrench, c_results))
         check(name, c_results, results)
     forces = results[:, FORCES]
@@ -290,22 +294,23 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     row, result = rows[:1].copy(), np.empty((1, RESULT))
     q, v, a, _ = tree.state(one)
     single = [
-        Contestant('`inverse_dynamics.solve`, one row: the compiled step', repeated(
-            'solve(constants, rows, wrenches, results)', solve=inverse_dynamics.solve,
-            constants=numbers, rows=row, wrenches=no_wrench, results=result), RNEA),
+        Contestant(STEP, repeated('solve()', solve=inverse_dynamics.solve_sample.bound(
+            numbers, row[0], no_wrench[0], result[0], np.empty(1), tile)), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),
-        Contestant('`StewartPlatform.solve`, one row: what the node calls', repeated(
-            'solve(rows)', solve=hexapod.solve, rows=row), RNEA),
-        Contestant('`StewartPlatform.inverse_dynamics`, one `Motion`', repeated(
+        Contestant(CALL, repeated(
             'solve(motion)', solve=hexapod.inverse_dynamics, motion=one), RNEA),
+        Contestant(MOTION, repeated(
+            'make(*arrays)', make=Motion, arrays=[part.copy() for part in (
+                one.position, one.rotation, one.linear_velocity, one.angular_velocity,
+                one.linear_acceleration, one.angular_acceleration)]), RNEA),
         Contestant('plain C through ctypes', repeated(
             'solve(*arguments)', solve=c.function,
             arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
     batch = [
-        Contestant('`inverse_dynamics.solve`, one core', once(
-            samples, inverse_dynamics.solve, numbers, rows, no_wrench, results), PLAIN_C),
+        Contestant(BATCH, once(
+            samples, inverse_dynamics.solve, numbers, rows, no_wrench, results, tile), PLAIN_C),
         Contestant(PLAIN_C, once(
             samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),
         Contestant('`StewartPlatform.solve`: the default, all cores', once(
@@ -343,6 +348,47 @@ def measure(all_of_them: list[Contestant], rounds: int) -> dict[str, Turns]:
     return turns
 
 
+class Figure(NamedTuple):
+    """A figure that has a target."""
+
+    name: str
+    value: float
+    most: float
+    unit: str
+
+
+def ratio(name: str, rows: list[Contestant], turns: dict[str, Turns]) -> float:
+    """Return the median of a contestant's times, in relation to the one beside it."""
+    measure, = (one.measure for one in rows if one.name == name)
+    return statistics.median(mine / its for mine, its in zip(
+        turns[name].seconds, turns[measure].seconds, strict=True))
+
+
+def microseconds(name: str, turns: dict[str, Turns]) -> float:
+    """Return the median of a contestant's times."""
+    return 1e6 * statistics.median(turns[name].seconds)
+
+
+def summary(figures: list[Figure]) -> list[str]:
+    """Return the lines of a table: each figure, its target, and whether it is met."""
+    cells = [('figure', 'measured', 'at most', 'met'), *(
+        (each.name, f'{each.value:.3g} {each.unit}', f'{each.most:g} {each.unit}',
+         'yes' if each.value <= each.most else 'no') for each in figures)]
+    return markdown(cells)
+
+
+def markdown(cells: list[tuple[str, ...]]) -> list[str]:
+    """Return the lines of a Markdown table that is also readable as it is."""
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = ['| ' + ' | '.join(
+        cell.rjust(width) if n else cell.ljust(width)
+        for n, (cell, width) in enumerate(zip(row, widths, strict=True))) + ' |'
+        for row in cells]
+    lines.insert(1, '| ' + ' | '.join(
+        '-' * (width - 1) + (':' if n else '-') for n, width in enumerate(widths)) + ' |')
+    return lines
+
+
 def table(title: str, rows: list[Contestant], turns: dict[str, Turns]) -> list[str]:
     """Return the lines of a Markdown table that is also readable as it is."""
     cells = [(title, 'ns', 'cores', f'times {rows[0].measure}', 'min .. max')]
@@ -354,14 +400,7 @@ def table(title: str, rows: list[Contestant], turns: dict[str, Turns]) -> list[s
             one.name, f'{1e9 * statistics.median(own.seconds):,.0f}',
             f'{statistics.median(own.cores):.1f}', f'{statistics.median(ratios):.2f}',
             '' if one.name == one.measure else f'{min(ratios):.2f} .. {max(ratios):.2f}'))
-    widths = [max(len(row[n]) for row in cells) for n in range(5)]
-    lines = ['| ' + ' | '.join(
-        cell.rjust(width) if n else cell.ljust(width)
-        for n, (cell, width) in enumerate(zip(row, widths, strict=True))) + ' |'
-        for row in cells]
-    lines.insert(1, '| ' + ' | '.join(
-        '-' * (width - 1) + (':' if n else '-') for n, width in enumerate(widths)) + ' |')
-    return lines
+    return markdown(cells)
 
 
 def measured_on() -> str:
@@ -370,7 +409,7 @@ def measured_on() -> str:
                          text=True).stdout.strip()
     cpus = len(os.sched_getaffinity(0))
     return (f'{processor_name()}, {cpus} cores. Python {platform.python_version()}, '
-            f'numpy {np.__version__}, numba {numba.__version__}, '
+            f'numpy {np.__version__}, numba {version("numba")}, '
             f'Pinocchio {pin.__version__}, gcc {gcc}.')
 
 
@@ -395,27 +434,15 @@ def write(lines: list[str], begin: str = BEGIN, end: str = END) -> None:
     README.write_text(text, encoding='utf-8')
 
 
-def main() -> None:
-    """Check, measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument('--rounds', type=int, default=ROUNDS, help='turns of each (%(default)s)')
-    parser.add_argument('--samples', type=int, default=SAMPLES,
-                        help='in a batch (%(default)s)')
-    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
-    options = parser.parse_args()
-    if options.rounds < 1 or options.samples < 1:
-        parser.error('--rounds and --samples must be at least 1')
-
-    single, batch = contestants(options.samples)
-    turns = measure(single + batch, options.rounds)
-    lines = [
-        '', *table('one call from Python', single, turns),
-        '', *table(f'a sample in a batch of {options.samples:,}', batch, turns),
-        '', f'{measured_on()} Medians of {options.rounds} rounds.', '']
-    print('\n'.join(lines))
-    if options.write:
-        write(lines)
-
-
-if __name__ == '__main__':
-    main()
+def run(rounds: int, samples: int = SAMPLES) -> tuple[list[str], list[Figure]]:
+    """Check and measure; return the lines for the page, and the figures with targets."""
+    single, batch = contestants(samples)
+    turns = measure(single + batch, rounds)
+    lines = ['', *table('one call from Python', single, turns), '',
+             *table(f'a sample in a batch of {samples:,}', batch, turns),
+             '', f'{measured_on()} Medians of {rounds} rounds.', '']
+    return lines, [
+        Figure('the compiled step', ratio(STEP, single, turns), 1.0, 'times `pin.rnea`'),
+        Figure('`inverse_dynamics(motion)`', ratio(CALL, single, turns), 1.5, 'times `pin.rnea`'),
+        Figure(MOTION, microseconds(MOTION, turns), 5.0, 'us'),
+        Figure('a sample of a batch', ratio(BATCH, batch, turns), 1.0, 'times plain C')]

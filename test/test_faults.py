@@ -951,7 +951,8 @@ def test_a_trajectory_in_work_is_dropped_when_the_node_ends(renew: Start) -> Non
         node.peer.spin(0.1)
         for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
             assert node.change(transition)
-        return node.has_said('planned trajectories dropped, because the node is deactivated: ')
+        return ('planned trajectories dropped, because the node is deactivated: '
+                in node.program.stderr)
 
     node.until(dropped, 'a trajectory in work is dropped')
     node.until_active()

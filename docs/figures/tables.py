@@ -117,15 +117,15 @@ def measured(row: str, column: str) -> str:
 
 def accuracy_and_speed() -> str:
     """Return the README's four figures."""
-    step, times = '`inverse_dynamics.solve`, one row: the compiled step', 'times `pin.rnea` alone'
+    call, times = '`StewartPlatform.inverse_dynamics`, one `Motion`', 'times `pin.rnea` alone'
     node, replay = 'separate, `stewart_dynamics`', '`stewart_replay`'
-    micro = 1e-3 * float(measured(step, 'ns').replace(',', ''))
+    micro = 1e-3 * float(measured(call, 'ns').replace(',', ''))
     return '\n'.join((
         '| figure | value | command |', '| --- | --- | --- |',
         '| largest difference of leg forces from Pinocchio, random hexapods and motions | '
         '1e-12 of the largest force | `make test` |',
-        f'| computing one setpoint, compared with `rnea` of Pinocchio | {micro:.1f} us, '
-        f'{measured(step, times)} times | `make bench` |',
+        '| `platform.inverse_dynamics(motion)` of one sample, compared with `rnea` of Pinocchio | '
+        f'{micro:.1f} us, {measured(call, times)} times | `make bench` |',
         '| node at 1 kHz: median and 99th percentile of the latency, compared with an rclpy node '
         'that takes and publishes the same messages and computes nothing; setpoints lost | '
         f'{measured(node, "p50, times typed")} and {measured(node, "p99, times typed")} times; '

@@ -59,17 +59,17 @@ class InverseDynamics:
 
     @property
     def lengths(self) -> Array:
-        """Return the lengths (..., 6) [m]."""
+        """Return the lengths [m], (..., 6)."""
         return self.rows[..., LENGTHS]
 
     @property
     def rates(self) -> Array:
-        """Return the rates (..., 6) [m/s]."""
+        """Return the rates [m/s], (..., 6)."""
         return self.rows[..., RATES]
 
     @property
     def forces(self) -> Array:
-        """Return the forces (..., 6) [N]."""
+        """Return the forces [N], (..., 6)."""
         return self.rows[..., FORCES]
 
     @property

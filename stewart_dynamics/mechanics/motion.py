@@ -77,7 +77,7 @@ class Motion(Samples):
             angular_acceleration: ArrayLike | None = None,
     ) -> None:
         row = row_of_one(
-            MOTION, rotation, (POSITION, position), (LINEAR_VELOCITY, linear_velocity),
+            MOTION, position, rotation, (LINEAR_VELOCITY, linear_velocity),
             (ANGULAR_VELOCITY, angular_velocity), (LINEAR_ACCELERATION, linear_acceleration),
             (ANGULAR_ACCELERATION, angular_acceleration))
         if row is not None:

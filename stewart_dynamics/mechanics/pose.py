@@ -141,7 +141,7 @@ class Pose(Samples):
     """
 
     def __init__(self, position: ArrayLike, rotation: ArrayLike) -> None:
-        row = row_of_one(POSE.stop, rotation, (POSITION, position))
+        row = row_of_one(POSE.stop, position, rotation)
         if row is not None:
             self.rows, self.shape = row, ()
             return
@@ -194,16 +194,18 @@ class Pose(Samples):
         return cls(given[..., :3, 3], given[..., :3, :3])
 
 
-def row_of_one(size: int, rotation: Any, *parts: tuple[slice, Any]) -> Array | None:
+def row_of_one(size: int, position: Any, rotation: Any, *parts: tuple[slice, Any],
+               ) -> Array | None:
     """
     Return the row of one sample whose arguments are arrays of floats and well within the rules.
 
     This takes a tenth of the time that arguments of any kind and shape take; for these, and for
-    wrong ones, it returns None. The other numbers of the row are zero.
+    wrong ones, it returns None. Parts of the row that are None are zero.
     """
     row = np.zeros(size)
     numbers = row.data
     try:
+        numbers[POSITION] = position
         numbers[ROTATION] = rotation.reshape(9)
         for where, part in parts:
             if part is not None:

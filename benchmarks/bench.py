@@ -1,0 +1,63 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What ``make bench`` runs: the library's calls and the starts, then all figures with their targets.
+
+README.md beside this file says what is compared and how.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import forward
+import inverse_dynamics
+from inverse_dynamics import Figure, summary, write
+import starts
+
+BEGIN, END = '<!-- summary: begin -->', '<!-- summary: end -->'
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument('--rounds', type=int, default=inverse_dynamics.ROUNDS,
+                        help='turns of each call (%(default)s)')
+    parser.add_argument('--samples', type=int, default=inverse_dynamics.SAMPLES,
+                        help='in a batch (%(default)s)')
+    parser.add_argument('--starts', type=int, default=12, help='of each program (%(default)s)')
+    parser.add_argument('--write', action='store_true', help='put the tables into README.md')
+    options = parser.parse_args()
+    if min(options.rounds, options.samples, options.starts) < 1:
+        parser.error('--rounds, --samples and --starts must be at least 1')
+
+    figures: list[Figure] = []
+    for begin, end, (lines, found) in (
+            (inverse_dynamics.BEGIN, inverse_dynamics.END,
+             inverse_dynamics.run(options.rounds, options.samples)),
+            (forward.BEGIN, forward.END, forward.run(options.rounds)),
+            (starts.BEGIN, starts.END, starts.run(options.starts))):
+        print('\n'.join(lines))
+        figures += found
+        if options.write:
+            write(lines, begin, end)
+    lines = ['', *summary(figures), '']
+    print('\n'.join(lines))
+    if options.write:
+        write(lines, BEGIN, END)
+
+
+if __name__ == '__main__':
+    main()

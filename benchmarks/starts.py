@@ -1,0 +1,161 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How long programs take to start: for the first time on a computer, and each time after that.
+
+Run by hand, ``make bench``, on Linux; README.md beside this file says what is compared and how.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import os
+import signal
+from statistics import median
+import subprocess
+import sys
+import tempfile
+import time
+from typing import NamedTuple
+
+from inverse_dynamics import Figure, HERE, markdown, processor_name
+
+from stewart_dynamics.executables import executable
+
+BEGIN, END = '<!-- starts: begin -->', '<!-- starts: end -->'
+DOMAIN = '101'  # the tests have those below
+PARAMETERS = str(HERE.parent / 'config' / 'platform.yaml')
+NODE = [str(executable('stewart_dynamics')), '--ros-args', '--params-file', PARAMETERS]
+FIRST_CALL = [sys.executable, '-c', f"""
+import numpy as np
+from stewart_dynamics import Motion, StewartPlatform
+platform = StewartPlatform.from_yaml({PARAMETERS!r})
+platform.inverse_dynamics(Motion(np.array([0.0, 0.0, 1.1]), np.eye(3)))
+"""]
+# What a node like ours cannot do without: rclpy, the types, and its publishers and subscriptions.
+BARE_NODE = [sys.executable, '-c', """
+import numpy
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from visualization_msgs.msg import MarkerArray
+rclpy.init()
+node = LifecycleNode('bare')
+for n, kind in enumerate((JointState, Float64MultiArray, Float64MultiArray, Float64, Bool,
+                          WrenchStamped, JointTrajectory, DiagnosticArray, MarkerArray)):
+    node.create_publisher(kind, f'output_{n}', 10)
+for n, kind in enumerate((PoseStamped, TwistStamped, AccelStamped, WrenchStamped, JointState,
+                          MultiDOFJointTrajectory)):
+    node.create_subscription(kind, f'input_{n}', print, 10, raw=True)
+node.trigger_configure()
+node.trigger_activate()
+node.get_logger().info('ready')
+rclpy.spin(node)
+"""]
+
+
+class Start(NamedTuple):
+    """What a start took."""
+
+    seconds: float
+    """Until it was ready, or had ended."""
+    processor: float
+    """Of the program and of those that it started [s]."""
+
+
+def until_ready(command: Sequence[str], environment: Mapping[str, str]) -> Start:
+    """Start a program, stop it when it logs that it is ready, and return what that took."""
+    begun = time.perf_counter()
+    program = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    assert program.stderr is not None
+    if not any(line.rstrip().endswith('ready') or ' ready after ' in line
+               for line in program.stderr):
+        raise SystemExit(f'{command[0]} has ended before it was ready')
+    seconds = time.perf_counter() - begun
+    program.send_signal(signal.SIGTERM)
+    _, _, usage = os.wait4(program.pid, 0)
+    program.returncode = 0
+    return Start(seconds, usage.ru_utime + usage.ru_stime)
+
+
+def until_ended(command: Sequence[str], environment: Mapping[str, str]) -> Start:
+    """Start a program and return what it took."""
+    begun = time.perf_counter()
+    program = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(program.pid, 0)
+    program.returncode = os.waitstatus_to_exitcode(status)
+    if program.returncode:
+        raise SystemExit(f'{" ".join(command)[:200]}: exit code {program.returncode}')
+    return Start(time.perf_counter() - begun, usage.ru_utime + usage.ru_stime)
+
+
+Run = Callable[[Sequence[str], Mapping[str, str]], Start]
+COLD: dict[str, tuple[Run, Sequence[str]]] = {
+    'the node, until it is ready': (until_ready, NODE),
+    'the first inverse dynamics of the library': (until_ended, FIRST_CALL),
+}
+WARM: dict[str, tuple[Run, Sequence[str]]] = {
+    **COLD,
+    'a bare lifecycle node with the same topics': (until_ready, BARE_NODE),
+    '`import stewart_dynamics`': (
+        until_ended, [sys.executable, '-c', 'import stewart_dynamics']),
+    '`from stewart_dynamics import StewartPlatform`': (
+        until_ended, [sys.executable, '-c', 'from stewart_dynamics import StewartPlatform']),
+    '`import numpy`': (until_ended, [sys.executable, '-c', 'import numpy']),
+    'Python': (until_ended, [sys.executable, '-c', 'pass']),
+    '`stewart_replay --help`': (until_ended, [str(executable('stewart_replay')), '--help']),
+}
+
+
+def run(rounds: int) -> tuple[list[str], list[Figure]]:
+    """Measure; return the lines for the page, and the figures with targets."""
+    environment = {
+        **os.environ, 'ROS_DOMAIN_ID': DOMAIN, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    cold: dict[str, list[Start]] = {name: [] for name in COLD}
+    warm: dict[str, list[Start]] = {name: [] for name in WARM}
+    for number in range(-1, rounds):  # the first does not count
+        for name, (take, command) in WARM.items():
+            start = take(command, environment)
+            if number >= 0:
+                warm[name].append(start)
+        if number >= 0 and number % 4 == 0:
+            for name, (take, command) in COLD.items():
+                with tempfile.TemporaryDirectory() as folder:
+                    cold[name].append(take(
+                        command, {**environment, 'STEWART_DYNAMICS_CACHE_DIR': folder}))
+
+    def of(starts: list[Start]) -> Start:
+        return Start(*map(median, zip(*starts, strict=True)))
+
+    compiling = {name: of(cold[name]).processor - of(warm[name]).processor for name in COLD}
+    cells = [('start', 's', 'processor s', 'of that compiling'), *(
+        (f'for the first time: {name}', f'{of(starts).seconds:.2f}', f'{of(starts).processor:.2f}',
+         f'{compiling[name]:.1f}') for name, starts in cold.items()), *(
+        (name, f'{of(starts).seconds:.2f}', f'{of(starts).processor:.2f}', '')
+        for name, starts in warm.items())]
+    node, call = COLD
+    return ['', *markdown(cells), '', f'{processor_name()}. Medians of {rounds} starts, of '
+            f'{len(cold[node])} of the first ones.', ''], [
+        Figure('compiling for the node', compiling[node], 8.0, 'processor s'),
+        Figure('compiling for the first inverse dynamics', compiling[call], 3.0, 'processor s'),
+        Figure('start of the node', of(warm[node]).seconds, 0.5, 's'),
+        Figure('`import stewart_dynamics`', of(warm['`import stewart_dynamics`']).seconds, 0.12,
+               's'),
+        Figure('`stewart_replay --help`', of(warm['`stewart_replay --help`']).seconds, 0.2, 's')]
