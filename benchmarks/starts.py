@@ -119,6 +119,8 @@ WARM: dict[str, tuple[Run, Sequence[str]]] = {
     '`from stewart_dynamics import StewartPlatform`': (
         until_ended, [sys.executable, '-c', 'from stewart_dynamics import StewartPlatform']),
     '`import numpy`': (until_ended, [sys.executable, '-c', 'import numpy']),
+    '`import numba`, as the compiler does': (
+        until_ended, [sys.executable, '-c', 'import numba']),
     'Python': (until_ended, [sys.executable, '-c', 'pass']),
     '`stewart_replay --help`': (until_ended, [str(executable('stewart_replay')), '--help']),
 }

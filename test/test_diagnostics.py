@@ -25,7 +25,7 @@ from referees import symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.runtime.input_topics import ACCEL, POSE, TWIST
 from stewart_dynamics.runtime.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.runtime.step import Output, Setpoint, Step

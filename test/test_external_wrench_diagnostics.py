@@ -23,7 +23,7 @@ from stewart_dynamics import Motion
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.external_wrench import ExternalWrenchDiagnostics
-from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
 from stewart_dynamics.runtime.rejections import Rejection

@@ -35,7 +35,7 @@ from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.nodes import markers as module  # noqa: E402
 from stewart_dynamics.nodes.markers import Markers  # noqa: E402
-from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, WARN  # noqa: E402
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, WARN  # noqa: E402
 from stewart_dynamics.runtime.step import Output, Setpoint, Step  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 

@@ -20,7 +20,7 @@ from referees import ROOT
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'

@@ -29,6 +29,7 @@ from importlib import import_module
 import os
 import sys
 from threading import Thread
+import time
 from typing import Any, cast
 
 from llvmlite import ir
@@ -47,6 +48,7 @@ _library_class: Any = codegen.JITCodeLibrary
 _context_class: Any = cpu.CPUContext
 
 _INTEGER = ir.IntType(64)
+_LOOK = 0.2  # [s]
 
 
 # Machine code is made of the whole alone, by _object_file, not of each function that it calls.
@@ -129,16 +131,16 @@ def _entry(module: Any, compiled: Any, context: Any, types: tuple[Any, ...]) -> 
     return module
 
 
-def _end_with_parent() -> None:
-    """End when the program that started this one has closed its end of stdin."""
-    while os.read(0, 1):
-        pass
+def _end_with(parent: int) -> None:
+    """End when the program that started this one does."""
+    while os.getppid() == parent:
+        time.sleep(_LOOK)
     os._exit(1)
 
 
 if __name__ == '__main__':
     gc.disable()  # it ends soon, and the collector takes a tenth of the time
-    Thread(target=_end_with_parent, daemon=True).start()
+    Thread(target=_end_with, args=[os.getppid()], daemon=True).start()
     code = object_file(*sys.argv[1:])
     packages = 'stewart_dynamics', sys.argv[1].partition('.')[0]
     read = ' '.join(name for name in sys.modules if name.partition('.')[0] in packages)

@@ -50,7 +50,7 @@ class EntryPoint:
     """
 
     def __init__(self, function: Callable[..., None], types: Sequence[str]) -> None:
-        self._function, self._types = function, tuple(types)
+        self._function = function
         self._kinds = [_kind(text) for text in types]
         self._lock = Lock()
         self._call: Callable[..., object] | None = None

@@ -95,22 +95,19 @@ def is_kept(module: str, name: str) -> bool:
 
 def _compile(module: str, name: str) -> bytes:
     """Return what the compiler writes: the modules it has read, and the object file."""
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'stewart_dynamics.compilation.compiler', module, name],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))})
-    with process:
-        try:
-            # Not communicate(), which closes stdin: the compiler ends when that is closed.
-            answer = process.stdout.read()  # type: ignore[union-attr]
-            if process.wait() == 0:
-                return answer
-            text = process.stderr.read().decode(errors='replace')  # type: ignore[union-attr]
-        except BaseException:
-            process.kill()
-            raise
-    last = text.strip().rpartition('\n')[2] or f'exit code {process.returncode}'
-    raise CompilationError(f'{module}.{name} cannot be compiled: {last}')
+    failed = f'{module}.{name} cannot be compiled'
+    try:
+        # In a session of its own: what a terminal sends to this process is not for the compiler.
+        done = subprocess.run(
+            [sys.executable, '-m', 'stewart_dynamics.compilation.compiler', module, name],
+            stdin=subprocess.DEVNULL, capture_output=True, check=False, start_new_session=True,
+            env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))})
+    except OSError as exc:
+        raise CompilationError(f'{failed}: {sys.executable}: {exc.strerror}') from exc
+    if done.returncode:
+        last = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
+        raise CompilationError(f'{failed}: {last or f"exit code {done.returncode}"}')
+    return done.stdout
 
 
 def _load(answer: bytes, symbol: str) -> int:

@@ -26,7 +26,7 @@ from std_msgs.msg import Header
 from stewart_dynamics.nodes.repeated_log import RepeatedLog
 from stewart_dynamics.nodes.topics import DIAGNOSTICS, Topics
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.report import OK, Status
+from stewart_dynamics.runtime.diagnostics.periodic_report import OK, Status
 
 # The topics for controllers; diagnostics give the number of their subscribers.
 _READ = ('leg_states', 'leg_forces')

@@ -47,7 +47,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import external_wrench, planned_trajectory
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, TICK, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench
 from stewart_dynamics.runtime.input_topics import WRENCH
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs, NOT_COMPILED

@@ -30,7 +30,7 @@ from stewart_dynamics.mechanics.home_pose import level_axes
 from stewart_dynamics.mechanics.rotation import quaternion_of
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics.report import ERROR, OK, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, WARN
 from stewart_dynamics.runtime.diagnostics.singularity import singularity_state
 from stewart_dynamics.runtime.step import Output
 from visualization_msgs.msg import Marker

@@ -22,7 +22,7 @@ from typing import Any
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics.report import LogLine, OK, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import LogLine, OK, WARN
 
 
 def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool) -> Parameters:

@@ -21,7 +21,7 @@ import math
 import time
 from typing import Any
 
-from stewart_dynamics.runtime.diagnostics.report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
 from stewart_dynamics.runtime.repeated_events import Series
 
 

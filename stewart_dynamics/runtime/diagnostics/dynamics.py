@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.external_wrench import ExternalWrenchDiagnostics
 from stewart_dynamics.runtime.diagnostics.limits import LimitsDiagnostics
+from stewart_dynamics.runtime.diagnostics.periodic_report import Report, TICK
 from stewart_dynamics.runtime.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
-from stewart_dynamics.runtime.diagnostics.report import Report, TICK
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers, SetpointDiagnostics
 from stewart_dynamics.runtime.diagnostics.singularity import SingularityDiagnostics
 from stewart_dynamics.runtime.diagnostics.timing import TimingDiagnostics

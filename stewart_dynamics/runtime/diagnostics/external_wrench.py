@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import math
 
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics.report import (
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
     ERROR, Held, Level, LevelLog, LogLine, OK, STALE, Status, WARN)
 from stewart_dynamics.runtime.external_wrench import Estimate, Overload
 from stewart_dynamics.runtime.rejections import Rejection

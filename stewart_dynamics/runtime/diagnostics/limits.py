@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 
 from stewart_dynamics.mechanics.limits import Exceedance, FORCE_MAX, LIMITS
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics.report import (
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status)
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers
 from stewart_dynamics.runtime.step import Output

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from stewart_dynamics.runtime.diagnostics.report import (
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
     ERROR, Level, LevelLog, LogLine, OK, Status, WARN)
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 

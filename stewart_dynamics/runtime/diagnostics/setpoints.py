@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 import math
 
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics.report import (
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
     ERROR, Held, Level, LogLine, STALE, Status, WARN)
 from stewart_dynamics.runtime.rejections import NOT_JOINED, Rejection
 from stewart_dynamics.runtime.repeated_events import SECONDS

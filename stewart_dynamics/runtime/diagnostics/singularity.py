@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from stewart_dynamics.mechanics.singularity_warning import Cause, LEAVING
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.diagnostics.report import (
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LevelLog, LogLine, OK, PERIOD, Status, WARN)
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers
 from stewart_dynamics.runtime.step import Output

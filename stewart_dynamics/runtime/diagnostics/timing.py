@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import Counter
 from statistics import median
 
-from stewart_dynamics.runtime.diagnostics.report import (
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
     Held, Level, LevelLog, LogLine, Status, WARN)
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers
 from stewart_dynamics.runtime.rejections import DROPPED, NOT_JOINED, Rejection
