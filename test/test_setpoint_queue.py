@@ -37,6 +37,7 @@ class Fed:
         self.rejected: list[tuple[str, str]] = []
         self.held: list[Setpoint] = []
         self.rounds = 0
+        self.gathers = True
         self.queue = SetpointQueue(
             STEP, self._publish, lambda *why: self.rejected.append(why), self._take,
             self._answered)
@@ -53,8 +54,9 @@ class Fed:
         for setpoint in held:
             self.queue.add(setpoint, 0.5)
 
-    def _answered(self) -> None:
+    def _answered(self) -> bool:
         self.rounds += 1
+        return self.gathers
 
     def add(self, *stamps: int, setpoint: Setpoint = HOME) -> None:
         """Let setpoints come."""
@@ -81,6 +83,18 @@ def test_until_nothing_has_waited_setpoints_are_gathered() -> None:
     fed.queue.answer()
     assert fed.rounds == 2, 'nothing waited'
     fed.add(4)
+    assert [stamp for stamp, _ in fed.published] == [1, 2, 3, 4]
+
+
+def test_where_nothing_waits_each_setpoint_is_answered_at_once() -> None:
+    fed = Fed()
+    fed.gathers = False
+    fed.add(1, 2)
+    assert fed.published == [(1, 1.0), (2, 2.0)]
+    fed.gathers = True
+    fed.add(3, 4)
+    assert [stamp for stamp, _ in fed.published] == [1, 2, 3]
+    fed.queue.answer()
     assert [stamp for stamp, _ in fed.published] == [1, 2, 3, 4]
 
 

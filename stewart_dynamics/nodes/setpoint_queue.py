@@ -41,14 +41,14 @@ class SetpointQueue:
     take_waiting : callable
         Adds the setpoints that wait in the middleware.
     answered : callable
-        Called once all that waited is answered. It calls ``answer`` again, behind the messages
-        that have come meanwhile.
+        Called once all that waited is answered. Returns whether it will call ``answer`` again,
+        behind the messages that have come meanwhile; until then setpoints are gathered.
 
     """
 
     def __init__(self, step: Step, publish: Callable[[Setpoint, Output, float], None],
                  reject: Callable[[str, str], None], take_waiting: Callable[[], None],
-                 answered: Callable[[], None]) -> None:
+                 answered: Callable[[], bool]) -> None:
         self.step = step
         self.target: tuple[float, ...] | None = None
         """The motion of the last setpoint that was answered."""
@@ -83,7 +83,7 @@ class SetpointQueue:
             self._drop_all_but_the_newest()
         while self._waiting:
             self._answer_one(*self._waiting.popleft())
-        self._answered()
+        self._busy = self._answered()
 
     def _answer_one(self, setpoint: Setpoint, came: float) -> None:
         if self._restarting:
