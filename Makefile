@@ -78,6 +78,7 @@ bench-loop: $(INSTALLED)
 
 bench-node: $(INSTALLED)
 	.venv/bin/python benchmarks/node.py --write
+	.venv/bin/python benchmarks/rates.py --write
 
 bench-planned: $(INSTALLED)
 	.venv/bin/python benchmarks/planned.py --write

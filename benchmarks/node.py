@@ -38,10 +38,9 @@ import time
 from timeit import repeat
 from typing import NamedTuple
 
-from inverse_dynamics import Array, HERE, processor_name, write
+from inverse_dynamics import Array, HERE, markdown, processor_name, write
 from latency import FIRST_STAMP, legs, MOTION, PARAMETERS, PERIOD
 import numpy as np
-from replay import table
 
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.executables import executable
@@ -69,7 +68,7 @@ TICKS = os.sysconf('SC_CLK_TCK')
 EACH = [50.0, 99.0, 99.9, 100.0]
 HEADER: tuple[str, ...] = (
     'latency (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core', 'p50, times typed',
-    'p99, times typed')
+    'p99, times typed', 'p50, times serialized', 'p99, times serialized')
 
 
 class Contestant(NamedTuple):
@@ -305,20 +304,22 @@ def in_turns(contestants: Sequence[Contestant], rounds: int, seconds: int, folde
 
 
 def latency_rows(label: str, contestants: Sequence[Contestant], of_each: list[list[Turn]],
-                 beside: int) -> list[tuple[str, ...]]:
-    """Return rows of the table of latencies; ratios are to one of the contestants."""
+                 beside: int, least: int | None = None) -> list[tuple[str, ...]]:
+    """Return rows of the table of latencies; ratios are to one or two of the contestants."""
+    def ratios(turns: list[Turn], to: int) -> Iterator[str]:
+        of_turns = [np.percentile(turn.latencies, (50, 99)) / np.percentile(
+            other.latencies, (50, 99)) for turn, other in zip(turns, of_each[to], strict=True)]
+        return (f'{middle:.2f}' for middle in np.median(of_turns, axis=0))
+
     rows = []
     for contestant, turns in zip(contestants, of_each, strict=True):
         latencies = np.concatenate([turn.latencies for turn in turns])
-        ratios = [np.percentile(turn.latencies, (50, 99)) / np.percentile(
-            other.latencies, (50, 99)) for turn, other in zip(turns, of_each[beside], strict=True)]
-        middle = np.median(ratios, axis=0)
         rows.append((
             f'{label}, {contestant.title}',
             *(f'{value:,.0f}' for value in np.percentile(latencies, EACH)),
             str(sum(turn.lost for turn in turns)),
             f'{np.mean([turn.cores for turn in turns]):.0%}',
-            f'{middle[0]:.2f}', f'{middle[1]:.2f}'))
+            *ratios(turns, beside), *(ratios(turns, least) if least else ('', ''))))
     return rows
 
 
@@ -360,18 +361,18 @@ def node_lines(rounds: int, seconds: int, minutes: int, folder: Path) -> list[st
     cells = [HEADER]
     for source, contestants in CONTESTANTS.items():
         turns = in_turns(contestants, rounds, seconds, folder)
-        cells += latency_rows(source, contestants, turns, beside=1)
+        cells += latency_rows(source, contestants, turns, beside=1, least=2)
     called = [CALLED, CONTESTANTS['separate'][1]]
     turns = in_turns(called, rounds, seconds, folder, beside='call')
     cells += latency_rows('separate, services called', called, turns, beside=1)
     for label, transport in (('one host', ONE_HOST), ('TLS', tls(folder))):
         turns = in_turns(called, rounds, seconds, folder, transport)
         cells += latency_rows(f'separate, {label}', called, turns, beside=1)
-    lines = ['', *table(cells), '', *table(stall_rows(folder)), '', killed_words(folder), '']
+    lines = ['', *markdown(cells), '', *markdown(stall_rows(folder)), '', killed_words(folder), '']
     if minutes:
         run = Measurement([CALLED], [(0, minutes * 60 * RATE)], folder)
         turn, = run.run()
-        lines += [*table(long_rows(turn, run.memory, minutes)), '',
+        lines += [*markdown(long_rows(turn, run.memory, minutes)), '',
                   f'{turn.sent:,} setpoints in {minutes} minutes, {turn.lost} lost.', '']
     return lines
 
@@ -380,22 +381,22 @@ def markers_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
     """Return the table of a node whose markers are viewed beside one whose are not."""
     nodes = [ours('viewed', 'separate'), ours('alone', 'separate')]
     turns = in_turns(nodes, rounds, seconds, folder, beside='view')
-    cells = [HEADER[:-2] + ('p50, times alone', 'p99, times alone')]
+    cells = [HEADER[:-4] + ('p50, times alone', 'p99, times alone')]
     for title, row in zip(('`~/markers` viewed', 'nobody looks'),
                           latency_rows('', nodes, turns, beside=1), strict=True):
-        cells.append((title, *row[1:]))
-    return ['', *table(cells), '', picture_words(), '']
+        cells.append((title, *row[1:-2]))
+    return ['', *markdown(cells), '', picture_words(), '']
 
 
 def legs_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
     """Return the table of a node whose legs are measured beside one whose are not."""
     nodes = [ours('measured', 'separate'), ours('alone', 'separate')]
     turns = in_turns(nodes, rounds, seconds, folder, beside='measure')
-    cells = [HEADER[:-2] + ('p50, times alone', 'p99, times alone')]
+    cells = [HEADER[:-4] + ('p50, times alone', 'p99, times alone')]
     for title, row in zip(('`~/measured_legs` at 1 kHz', 'no measured legs'),
                           latency_rows('', nodes, turns, beside=1), strict=True):
-        cells.append((title, *row[1:]))
-    return ['', *table(cells), '', measurement_words(), '']
+        cells.append((title, *row[1:-2]))
+    return ['', *markdown(cells), '', measurement_words(), '']
 
 
 def measurement_words() -> str:

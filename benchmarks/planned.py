@@ -29,12 +29,11 @@ import platform
 import tempfile
 import time
 
-from inverse_dynamics import Array, processor_name, write
+from inverse_dynamics import Array, markdown, processor_name, write
 from latency import trajectory
 from node import (
     DOMAIN, EACH, Measurement, ours, PARAMETERS, Process, RATE, role, SETTLE, SHARED_MEMORY, Turn)
 import numpy as np
-from replay import table
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import NO_WRENCH
@@ -140,7 +139,7 @@ def main() -> None:
     for label, times in (('alone', alone), ('beside setpoints at 1 kHz', streaming)):
         rows.append((label, f'{np.median(times.sum(axis=1)):.0f}',
                      f'{times.sum(axis=1).max():.0f}', str(len(times))))
-    lines = ['', *table(rows), '']
+    lines = ['', *markdown(rows), '']
     rows = [('latency of setpoints (us)', 'p50', 'p99', 'p99.9', 'max', 'lost', 'of a core')]
     for label, turns in (('no planned trajectory', without), ('one each second', beside)):
         latencies = np.concatenate([turn.latencies for turn in turns])
@@ -149,7 +148,7 @@ def main() -> None:
                      f'{np.mean([turn.cores for turn in turns]):.0%}'))
     largest, many = pieces()
     message = np.concatenate([alone, streaming])[:, 0]
-    lines += [*table(rows), '', (
+    lines += [*markdown(rows), '', (
         f'The work is done in {many} pieces, the largest of which takes {largest:.2f} ms of the '
         f'processor. To hand the middleware a message of {len(trajectory(POINTS)) / 1e6:.1f} MB '
         f'takes {np.median(message):.1f} ms in the middle, {np.percentile(message, 90):.1f} ms '

@@ -37,7 +37,7 @@ import time
 from typing import NamedTuple
 import zlib
 
-from inverse_dynamics import Array, HERE, processor_name, write
+from inverse_dynamics import Array, HERE, markdown, processor_name, write
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -317,7 +317,7 @@ def measure(bag: Path, setpoints: int, single: Path, rounds: int) -> dict[str, l
     return turns
 
 
-def speed_table(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
+def speed_markdown(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
     """Return what each took, beside what rosbags alone took in the same round."""
     cells = [(f'{setpoints:,} setpoints', 's', 'min .. max', 'of it start', 'processor s',
               'times rosbags', 'min .. max', 'without start')]
@@ -338,10 +338,10 @@ def speed_table(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
             f'{statistics.median(ratios):.2f}',
             '' if one is ALONE else f'{min(ratios):.2f} .. {max(ratios):.2f}',
             f'{statistics.median(without_start):.2f}'))
-    return table(cells)
+    return markdown(cells)
 
 
-def memory_table(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
+def memory_markdown(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
     """Return how time, memory and report grow with the bag."""
     cells = [('', 'setpoints', 's', 'peak memory (MB)', 'report.html (MB)', 'opened in (s)')]
     for one in CONTESTANTS:
@@ -351,19 +351,7 @@ def memory_table(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
              f'{turn.opened:.1f}' if turn.opened else '')
             for setpoints, turns in by_setpoints.items()
             for turn in [turns.get(one.name)] if turn is not None]
-    return table(cells)
-
-
-def table(cells: list[tuple[str, ...]]) -> list[str]:
-    """Return the lines of a Markdown table that is also readable as it is."""
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    lines = ['| ' + ' | '.join(
-        cell.rjust(width) if n else cell.ljust(width)
-        for n, (cell, width) in enumerate(zip(row, widths, strict=True))) + ' |'
-        for row in cells]
-    lines.insert(1, '| ' + ' | '.join(
-        '-' * (width - 1) + (':' if n else '-') for n, width in enumerate(widths)) + ' |')
-    return lines
+    return markdown(cells)
 
 
 def measured_on(size: float, rounds: int) -> str:
@@ -406,7 +394,7 @@ def main() -> None:
             make_bag(bag, options.long)
             memory[options.long] = {one.name: take_turn(one, bag, options.long)
                                     for one in CONTESTANTS if one is not ALONE}
-    lines = ['', *speed_table(options.setpoints, rounds), '', *memory_table(memory), '',
+    lines = ['', *speed_markdown(options.setpoints, rounds), '', *memory_markdown(memory), '',
              measured_on(size, options.rounds), '']
     print('\n'.join(lines))
     if options.json:

@@ -33,7 +33,7 @@ import tempfile
 import time
 from typing import Any
 
-from inverse_dynamics import HERE, processor_name, write
+from inverse_dynamics import HERE, markdown, processor_name, write
 from node import DOMAIN, Process, SHARED_MEMORY
 import numpy as np
 import rclpy
@@ -41,7 +41,6 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
-from replay import table
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -272,8 +271,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         nodes = node_rows(options.seconds, Path(name))
     versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
-    lines = ['', *table(period_rows(options.rounds)), '', *table(nodes), '',
-             *table(energy_rows()), '',
+    lines = ['', *markdown(period_rows(options.rounds)), '', *markdown(nodes), '',
+             *markdown(energy_rows()), '',
              f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
              f'{platform.python_version()}, {versions}. Medians of {options.rounds} turns of '
              f'{PERIODS:,} periods; {options.seconds} s of each run of the node.', '']
