@@ -46,6 +46,7 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
+from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import to_quaternion
@@ -60,6 +61,7 @@ STEP = 1_000_000  # between setpoints [ns]: 1 kHz
 # As the recorder of ROS 2 does by default.
 CHUNK_BYTES = 768 * 1024
 MEGA = 1e6
+FLEET, FLEET_SETPOINTS = 30, 60_000
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 
 # Name of the topic, its type, how many numbers it has.
@@ -317,7 +319,7 @@ def measure(bag: Path, setpoints: int, single: Path, rounds: int) -> dict[str, l
     return turns
 
 
-def speed_markdown(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
+def speed_table(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
     """Return what each took, beside what rosbags alone took in the same round."""
     cells = [(f'{setpoints:,} setpoints', 's', 'min .. max', 'of it start', 'processor s',
               'times rosbags', 'min .. max', 'without start')]
@@ -341,7 +343,7 @@ def speed_markdown(setpoints: int, turns: dict[str, list[Round]]) -> list[str]:
     return markdown(cells)
 
 
-def memory_markdown(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
+def memory_table(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
     """Return how time, memory and report grow with the bag."""
     cells = [('', 'setpoints', 's', 'peak memory (MB)', 'report.html (MB)', 'opened in (s)')]
     for one in CONTESTANTS:
@@ -352,6 +354,27 @@ def memory_markdown(by_setpoints: dict[int, dict[str, Turn]]) -> list[str]:
             for setpoints, turns in by_setpoints.items()
             for turn in [turns.get(one.name)] if turn is not None]
     return markdown(cells)
+
+
+def fleet_words(folder: Path) -> str:
+    """Return how long many bags take with one process and with two, in turns."""
+    bags = [folder / f'fleet_{n:02d}.mcap' for n in range(FLEET)]
+    make_bag(bags[0], FLEET_SETPOINTS)
+    for bag in bags[1:]:
+        shutil.copy(bags[0], bag)
+    seconds: dict[int, list[float]] = {1: [], 2: []}
+    for jobs in (1, 2, 2, 1):
+        results = folder / 'fleet'
+        begun = time.perf_counter()
+        subprocess.run(
+            [str(executable('stewart_replay')), *map(str, bags), '--params', str(PARAMETERS),
+             '--output', str(results), '--jobs', str(jobs)], check=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        seconds[jobs].append(time.perf_counter() - begun)
+        shutil.rmtree(results)
+    one, two = (statistics.mean(seconds[jobs]) for jobs in (1, 2))
+    return (f'{FLEET} bags of a minute with all outputs: {one:.1f} s with `--jobs 1`, {two:.1f} s '
+            f'with `--jobs 2`, {one / two:.2f} times faster.')
 
 
 def measured_on(size: float, rounds: int) -> str:
@@ -394,8 +417,10 @@ def main() -> None:
             make_bag(bag, options.long)
             memory[options.long] = {one.name: take_turn(one, bag, options.long)
                                     for one in CONTESTANTS if one is not ALONE}
-    lines = ['', *speed_markdown(options.setpoints, rounds), '', *memory_markdown(memory), '',
-             measured_on(size, options.rounds), '']
+        bag.unlink()
+        fleet = fleet_words(Path(folder))
+    lines = ['', *speed_table(options.setpoints, rounds), '', *memory_table(memory), '',
+             fleet, '', measured_on(size, options.rounds), '']
     print('\n'.join(lines))
     if options.json:
         options.json.write_text(json.dumps(rounds, indent=1) + '\n', encoding='utf-8')

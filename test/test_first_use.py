@@ -22,10 +22,11 @@ import shutil
 from typing import Any
 
 import pytest
-from running import DynamicsNode, MOVING, Planner
+from running import DynamicsNode, Planner
 from stewart_dynamics.compilation.machine_code import COMPILED, folder_to_write
 from stewart_dynamics.runtime.measured_legs import NOT_COMPILED
-from test_external_wrench_node import Felt, STATUS
+from test_dynamics_node import MOVING
+from test_external_wrench_node import Felt
 from test_planned_trajectory_node import check, MOTION
 
 # What the test lets the node compile: the first of a planned trajectory, and the external wrench.
@@ -49,12 +50,11 @@ def test_what_is_needed_later_is_compiled_while_setpoints_are_answered(
     planner, felt = Planner(node), Felt(node)
     felt.until_connected()
     planner.send(MOTION, step=500_000_000)
-    key = f'rejected: {NOT_COMPILED}'
 
     def rejected() -> bool:
         felt.rest()
         node.answer(MOVING)
-        return int(node.values(STATUS).get(key, '0')) > 0
+        return f'measured_legs rejected: {NOT_COMPILED}: ' in node.program.stderr
 
     node.until(rejected, 'measured legs are rejected')
     assert not felt.raw
