@@ -716,6 +716,14 @@ def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str])
     assert 'usage: stewart_replay' in capsys.readouterr().err
 
 
+def test_where_results_cannot_be_written_the_folder_is_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag, file = write_bag(tmp_path / 'bag', motion(3)), tmp_path / 'file'
+    file.touch()
+    text = rejected(capsys, bag, '--params', PARAMS, '--output', file / 'out')
+    assert text == f'stewart_replay: {file / "out"}: cannot be written: Not a directory\n'
+
+
 # Several bags
 
 def test_bags_of_one_name_are_rejected_before_anything_is_written(

@@ -53,8 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {each: signal.signal(each, _end_at_once) for each in _SIGNALS}
     try:
         return _run(given, _options(given))
-    except (StewartError, OSError) as exc:
+    except StewartError as exc:
         _complain(exc)
+        return BAD_INPUT
+    except OSError as exc:  # what cannot be read is a StewartError
+        where = f'{exc.filename}: ' if exc.filename else ''
+        _complain(f'{where}cannot be written: {exc.strerror or exc}')
         return BAD_INPUT
     except Exception as exc:  # exit codes and one line also for errors that no rule covers
         _complain(unexpected(exc))
@@ -146,11 +150,13 @@ def _options(given: argparse.Namespace) -> Options:
 
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
+    from stewart_dynamics.compilation.entry_point import prepare
     from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters import Parameters
     from stewart_dynamics.replay.bags import FLEET_PAGE, folders_of_results
     from stewart_dynamics.replay.many_bags import replay_fleet
+    from stewart_dynamics.replay.one_bag import FUNCTIONS
     from stewart_dynamics.replay.report import share_plotly
 
     for each in _SIGNALS:
@@ -161,6 +167,7 @@ def _run(given: argparse.Namespace, options: Options) -> int:
         options = options._replace(plotly=share_plotly(given.output))
     if HINT:
         print(f'stewart_replay: {HINT}', file=sys.stderr)
+    prepare(FUNCTIONS)  # now, side by side, and not in each process
     for mistake in likely_mistakes(parameters):
         _complain(f'warning: {mistake}')
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:

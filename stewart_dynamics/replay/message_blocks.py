@@ -142,6 +142,10 @@ def _gather(data: Bytes, starts: Integers, sizes: Integers, out: Bytes) -> None:
             at += 1
 
 
+# The machine code that blocks need.
+FUNCTIONS = (_gather,)
+
+
 def lean(block: Block) -> Block:
     """Return a block without the bytes that belong to no message of it, if these are many."""
     total = int(block.sizes.sum())

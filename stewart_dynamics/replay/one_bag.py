@@ -35,6 +35,7 @@ from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay import mcap_scan, message_blocks
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
@@ -49,6 +50,7 @@ from stewart_dynamics.replay.results_folder import check_free, whole_folder, wri
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import input_topics as inputs
+from stewart_dynamics.runtime import step
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.runtime.setpoint_joining import Messages, Setpoints
@@ -58,6 +60,9 @@ _SECOND = 1_000_000_000
 _STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
+
+# The machine code that every replay needs.
+FUNCTIONS = *step.FUNCTIONS, *message_blocks.FUNCTIONS, mcap_scan.scan
 
 
 class Replayed(NamedTuple):

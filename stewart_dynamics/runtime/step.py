@@ -236,6 +236,9 @@ def _one(numbers: Array) -> None:
         numbers[_RESTART.start] > 0.0, result, written[_FORCES])
 
 
+# The machine code that a batch needs.
+FUNCTIONS = inverse_dynamics.solve, _watch_many
+
 _FIRST = Singularity()
 
 
