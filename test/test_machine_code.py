@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import os
 from pathlib import Path
-import resource
 import subprocess
 import sys
 from threading import Thread
@@ -145,8 +144,8 @@ def test_a_damaged_file_is_replaced(kept: Path, announced: list[str]) -> None:
     whole = file.read_bytes()
     file.write_bytes(whole[:-1])
     check(imported('scaled_sums'))
-    assert announced == ['compiling scaled_sums.scaled_sums for this processor: this happens '
-                         'once, for seconds']
+    assert announced == ['compiling scaled_sums.scaled_sums for this processor: this takes '
+                         'seconds, only this once']
     assert file.read_bytes() == whole
     assert len(list(kept.iterdir())) == 2
 
@@ -170,18 +169,13 @@ def test_a_changed_source_is_compiled_anew(kept: Path, folder: Path) -> None:
     assert is_kept('scaled_sums', 'scaled_sums')
 
 
-def test_where_no_file_can_be_written_the_function_works_with_a_warning(kept: Path) -> None:
-    file_of(kept).unlink()
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+def test_where_no_file_can_be_written_the_function_works_with_a_warning(
+        kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('STEWART_DYNAMICS_CACHE_DIR', str(file_of(kept) / 'within'))
     with pytest.warns(RuntimeWarning, match=(
-            r'^the compiled dynamics cannot be kept on disk \(File too large\): every start takes '
-            'seconds; let STEWART_DYNAMICS_CACHE_DIR name a folder that can be written to$')):
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
-        try:
-            check(imported('scaled_sums'))
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert not list(kept.glob('scaled_sums*'))
+            r'^the compiled dynamics cannot be kept on disk \(Not a directory\): every start takes'
+            ' seconds; let STEWART_DYNAMICS_CACHE_DIR name a folder that can be written to$')):
+        check(imported('scaled_sums'))
 
 
 def test_a_read_only_installation_is_used_and_the_users_cache_for_what_it_lacks(
@@ -191,6 +185,7 @@ def test_a_read_only_installation_is_used_and_the_users_cache_for_what_it_lacks(
     (installed / '__pycache__').parent.mkdir()
     kept.rename(installed / '__pycache__')
     file_of(installed / '__pycache__', 'negative_sums').unlink()
+    (installed / 'compilation').symlink_to(Path(machine_code.__file__).parent)
     monkeypatch.setattr(machine_code, '_PACKAGE', installed)
     monkeypatch.setattr(os, 'access', lambda path, mode: installed not in path.parents)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
@@ -228,6 +223,29 @@ def dictionary(numbers):
             r'^dictionary\.dictionary cannot be compiled: .*: the dynamics run uncompiled')):
         imported('dictionary')(numbers)
     assert numbers[0] == 3.0
+
+
+@pytest.mark.parametrize('python', ['/bin/true', '/bin/false', '/nowhere', '', None])
+def test_a_program_that_is_no_python_compiles_nothing(
+        kept: Path, monkeypatch: pytest.MonkeyPatch, python: Any) -> None:
+    file_of(kept).unlink()
+    monkeypatch.setattr(sys, 'executable', python)
+    with pytest.warns(RuntimeWarning, match='cannot be compiled: .*: the dynamics run uncompiled'):
+        check(imported('scaled_sums'))
+    assert not list(kept.glob('scaled_sums*'))
+
+
+def test_the_compiler_reads_nothing_from_the_present_folder_and_may_print(
+        kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file_of(kept).unlink()
+    for name in ('numba', 'numbers', 'json', 'scaled_sums', 'stewart_dynamics'):
+        (tmp_path / f'{name}.py').write_text("raise SystemExit('this is another one')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('NUMBA_DUMP_ASSEMBLY', '1')
+    function = imported('scaled_sums')
+    check(function)
+    assert function.compiled
+    assert is_kept('scaled_sums', 'scaled_sums')
 
 
 @pytest.mark.parametrize('wrong', [

@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from referees import random_motion, random_parameters, random_wrench, rng, symmetric_parameters
+from referees import (
+    random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
 from stewart_dynamics import Motion, MotionError, Pose, PoseError, StewartError, StewartPlatform
 from stewart_dynamics.mechanics.single_sample import SingleSample
@@ -65,6 +66,8 @@ def test_one_sample_is_the_batch_bit_for_bit(
         assert np.array_equal(platform.inverse_dynamics(motion[n], wrench[n]).rows, batch.rows[n])
         assert platform.forward_dynamics(motion[n], batch.forces[n], wrench[n]) == back[n]
         assert platform.forward_kinematics(lengths[n], guess[n]) == poses[n]
+        for at in (motion[n], motion[n].pose):
+            assert np.array_equal(platform.inverse_kinematics(at), batch.lengths[n])
     no_load = platform.inverse_dynamics(motion)
     for n in range(MANY):  # no load is left from the calls above
         assert np.array_equal(platform.inverse_dynamics(motion[n]).rows, no_load.rows[n])
@@ -79,6 +82,14 @@ def test_results_do_not_share_memory(platform: StewartPlatform, motion: Motion) 
     assert np.array_equal(first.rows, kept)
     other.forces[:] = 0.0
     assert np.array_equal(platform.inverse_dynamics(motion[0]).rows, kept)
+
+
+def test_the_home_pose_may_be_changed_by_who_gets_it() -> None:
+    platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
+    first = platform.home_pose()
+    truth = first.rows.copy()
+    first.rows[:] = 0.0
+    assert np.array_equal(platform.home_pose().rows, truth)
 
 
 def test_arguments_of_other_types_are_converted(

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-A program that compiles one function: ``python -m stewart_dynamics.compilation.compiler``.
+The program that compiles one function; ``machine_code`` starts it.
 
-It takes a module and a function in it. To stdout it writes a line with the modules that it has
-read, on which the machine code depends, and an object file with one symbol, named as the function,
-of the type ``int (const int64_t *arguments)``. The arguments are integers: those of the function
-as they are, floats by their bits, an array as the address of its data and its shape. No memory is
-allocated, and nothing of Python or numba is called.
+It writes a file: a line with the modules that it has read, on which the machine code depends, and
+an object file with one symbol, named as the function, of the type ``int (const int64_t
+*arguments)``. The arguments are integers: those of the function as they are, floats by their bits,
+an array as the address of its data and its shape. No memory is allocated, and nothing of Python or
+numba is called.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from __future__ import annotations
 import gc
 from importlib import import_module
 import os
+from pathlib import Path
 import sys
 from threading import Thread
 import time
@@ -138,10 +139,12 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-if __name__ == '__main__':
-    gc.disable()  # it ends soon, and the collector takes a tenth of the time
-    Thread(target=_end_with, args=[os.getppid()], daemon=True).start()
-    code = object_file(*sys.argv[1:])
-    packages = 'stewart_dynamics', sys.argv[1].partition('.')[0]
-    read = ' '.join(name for name in sys.modules if name.partition('.')[0] in packages)
-    sys.stdout.buffer.write(read.encode() + b'\n' + code)
+def main(parent: int, module: str, name: str, target: str) -> None:
+    """Compile a function of a module into a file; end when the parent process ends."""
+    gc.disable()  # the process ends soon, and the collector takes a tenth of the time
+    Thread(target=_end_with, args=[parent], daemon=True).start()
+    code = object_file(module, name)
+    packages = 'stewart_dynamics', module.partition('.')[0]
+    read = ' '.join(each for each in sys.modules if each.partition('.')[0] in packages)
+    Path(f'{target}.new').write_bytes(read.encode() + b'\n' + code)
+    Path(f'{target}.new').rename(target)

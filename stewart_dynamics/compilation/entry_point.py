@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 import ctypes
 from functools import partial, update_wrapper
 import os
 from struct import pack, unpack
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, cast
 
 import numpy as np
@@ -130,8 +130,25 @@ class EntryPoint:
 
 def prepare(functions: Iterable[EntryPoint]) -> None:
     """Have functions compiled that are not, side by side."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(EntryPoint.prepare, functions))
+    waiting = [each for each in functions if not each.load()]
+    errors: list[Exception] = []
+
+    def work() -> None:
+        with suppress(IndexError):  # nothing waits any more
+            while True:
+                try:
+                    waiting.pop(0).prepare()
+                except RuntimeWarning as exc:  # where warnings are errors
+                    errors.append(exc)
+
+    # Not a pool, which an interrupted program would wait for.
+    threads = [Thread(target=work, daemon=True) for _ in range(os.cpu_count() or 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    if errors:
+        raise errors[0]
 
 
 def _kind(text: str) -> tuple[np.dtype[Any], int]:

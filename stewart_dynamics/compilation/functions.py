@@ -16,7 +16,7 @@
 Decorators of the functions that are compiled.
 
 numba compiles them, in a process of its own (``compiler``); a program loads the machine code
-(``machine_code``), and needs neither numba nor its half second of import. Where nothing can be
+(``machine_code``) without the half second that the import of numba takes. Where nothing can be
 compiled they run as the plain Python that they are, and give the same bits: no fast-math flag is
 set, so the compiler may neither reorder a sum nor fuse a product into it, and a sample computed in
 a vector lane equals the same sample computed alone.

@@ -28,10 +28,12 @@ from functools import cache
 import hashlib
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+import json
 import os
 from pathlib import Path
 import subprocess
 import sys
+from tempfile import TemporaryDirectory
 from typing import Any
 from uuid import uuid4
 import warnings
@@ -42,6 +44,13 @@ _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a t
                'slower, a millisecond or more for each setpoint')
 
 _PACKAGE = Path(__file__).parents[1]
+_COMPILER = """
+import sys
+import json
+sys.path, *arguments = json.loads(sys.argv[1])
+from stewart_dynamics.compilation.compiler import main
+main(*arguments)
+"""
 _DIGEST = hashlib.sha256
 _DIGEST_SIZE = 32
 
@@ -78,14 +87,15 @@ def address_of(module: str, name: str) -> int:
     for folder in _folders():
         if code := _kept(folder, module, name):
             return _load(code, f'{module}.{name}')
-    announce(f'compiling {module}.{name} for this processor: this happens once, for seconds')
+    announce(f'compiling {module}.{name} for this processor: this takes seconds, only this once')
     try:
         answer = _compile(module, name)
     except CompilationError as exc:
         warnings.warn(f'{exc}: {_UNCOMPILED}', RuntimeWarning, stacklevel=2)
         return 0
+    address = _load(answer, f'{module}.{name}')
     _keep(module, name, answer)
-    return _load(answer, f'{module}.{name}')
+    return address
 
 
 def is_kept(module: str, name: str) -> bool:
@@ -95,19 +105,22 @@ def is_kept(module: str, name: str) -> bool:
 
 def _compile(module: str, name: str) -> bytes:
     """Return what the compiler writes: the modules it has read, and the object file."""
-    failed = f'{module}.{name} cannot be compiled'
-    try:
-        # In a session of its own: what a terminal sends to this process is not for the compiler.
-        done = subprocess.run(
-            [sys.executable, '-m', 'stewart_dynamics.compilation.compiler', module, name],
-            stdin=subprocess.DEVNULL, capture_output=True, check=False, start_new_session=True,
-            env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))})
-    except OSError as exc:
-        raise CompilationError(f'{failed}: {sys.executable}: {exc.strerror}') from exc
-    if done.returncode:
-        last = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
-        raise CompilationError(f'{failed}: {last or f"exit code {done.returncode}"}')
-    return done.stdout
+    # The compiler reads this copy of the package, whatever the present folder is.
+    paths = [str(_PACKAGE.parent), *(os.path.abspath(path) for path in sys.path if path)]
+    with TemporaryDirectory() as folder:
+        target = Path(folder, 'answer')
+        arguments = json.dumps([paths, os.getpid(), module, name, str(target)])
+        said = ''
+        try:
+            # In a session of its own: what a terminal sends to this process is not for it. What it
+            # prints is not its answer: numba and the start of Python can be told to print.
+            done = subprocess.run(
+                [sys.executable, '-I', '-c', _COMPILER, arguments], stdin=subprocess.DEVNULL,
+                capture_output=True, check=False, start_new_session=True)
+            said = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
+            return target.read_bytes()
+        except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
+            raise CompilationError(f'{module}.{name} cannot be compiled: {said or exc}') from exc
 
 
 def _load(answer: bytes, symbol: str) -> int:

@@ -45,5 +45,7 @@ class Preparation:
             self._thread.start()
 
     def _run(self) -> None:
-        prepare(self._functions)
-        self.ready = True
+        try:
+            prepare(self._functions)
+        finally:  # what is not compiled runs uncompiled
+            self.ready = True

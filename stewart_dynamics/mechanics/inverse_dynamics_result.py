@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -51,8 +53,6 @@ class InverseDynamics:
         attributes are views of them.
 
     """
-
-    __slots__ = ('rows',)
 
     def __init__(self, rows: Array) -> None:
         self.rows = rows
@@ -97,7 +97,15 @@ class InverseDynamics:
     @property
     def time_to_crossing(self) -> Array:
         """Return the time after which det(J) is zero (...) [s]."""
-        return time_to_crossing(self.determinant, self.determinant_rate)
+        time: Array = time_to_crossing(self.determinant, self.determinant_rate)[()]
+        return time
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether shape and all numbers are equal."""
+        return type(other) is type(self) and np.array_equal(self.rows, other.rows)
+
+    # The arrays are mutable.
+    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         """Return the shape, not the arrays."""

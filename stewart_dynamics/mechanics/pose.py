@@ -210,7 +210,7 @@ def row_of_one(size: int, position: Any, rotation: Any, *parts: tuple[slice, Any
         for where, part in parts:
             if part is not None:
                 numbers[where] = part
-    except (AttributeError, TypeError, ValueError):
+    except Exception:  # an arbitrary object may raise any; the check of all kinds names it
         return None
     values = row.tolist()
     a, b, c, d, e, f, g, h, i = values[ROTATION]

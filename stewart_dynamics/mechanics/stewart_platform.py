@@ -77,6 +77,7 @@ class StewartPlatform:
         self.constants = hexapod_constants(parameters)
         self._single = SingleSample(self.constants)
         self._breakdown: ForceBreakdownRows | None = None
+        self._home: Pose | None = None
 
     def __reduce__(self) -> tuple[type[StewartPlatform], tuple[Parameters]]:
         """Pickle and copy the parameters alone."""
@@ -190,6 +191,9 @@ class StewartPlatform:
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array:
         """Return the six leg lengths at a pose, (..., 6) [m]."""
+        lengths = self._single.inverse_kinematics(pose)
+        if lengths is not None:
+            return lengths
         rows = motion_rows(pose)
         lengths = self.solve(rows)[:, LENGTHS].reshape(*pose.shape, 6).copy()
         return check_finite('leg lengths', lengths, len(pose.shape))
@@ -353,7 +357,9 @@ class StewartPlatform:
             The parameters do not give the height of the platform.
 
         """
-        return home_pose.home_pose(self.parameters)
+        if self._home is None:
+            self._home = home_pose.home_pose(self.parameters)
+        return Pose.of_rows(self._home.rows.copy())
 
     def check(self) -> tuple[str, ...]:
         """Return likely mistakes in the parameters, each in one line."""

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 def dynamics() -> int:
     """Run the node stewart_dynamics, or compile all; return the exit code."""
     if '--compile' in sys.argv[1:]:
+        SIGNALS.watch(end_at_once=True)
         return int(_imported('compile_all').compile_all())
     return _run('parameters', 'Parameters', 'dynamics_node')
 
