@@ -31,7 +31,7 @@ from referees import ROOT
 from stewart_dynamics.compilation import entry_point, machine_code
 from stewart_dynamics.compilation.entry_point import EntryPoint
 from stewart_dynamics.compilation.functions import entry_point as marked
-from stewart_dynamics.compilation.machine_code import COMPILED, is_kept
+from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.compilation.preparation import Preparation
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
@@ -79,6 +79,11 @@ def announced(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     texts: list[str] = []
     monkeypatch.setattr(machine_code, 'announce', texts.append)
     return texts
+
+
+def is_kept(module: str, name: str) -> bool:
+    """Return whether the machine code of a function is on disk and valid."""
+    return any(machine_code._kept(folder, module, name) for folder in machine_code._folders())
 
 
 def imported(name: str) -> EntryPoint:

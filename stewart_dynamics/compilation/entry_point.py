@@ -86,9 +86,10 @@ class EntryPoint:
 
     def load(self) -> bool:
         """Load the machine code if it is on disk; return whether a call compiles nothing."""
-        if self._call is None and machine_code.is_kept(*self._name):
-            self._prepared()
-        return self._call is not None
+        with self._lock:
+            if self._call is None:
+                self._use(machine_code.kept_address(*self._name))
+            return self._call is not None
 
     @property
     def _name(self) -> tuple[str, str]:
@@ -97,14 +98,22 @@ class EntryPoint:
     def _prepared(self) -> Callable[..., object]:
         with self._lock:
             if self._call is None:
-                self._address = machine_code.address_of(*self._name)
-                if self._address:
-                    # This one lets other threads run.
-                    self._native = ctypes.CFUNCTYPE(ctypes.c_int)(self._address)
-                    self._call = self._call_native
-                else:
-                    self._call = np.errstate(all='ignore')(self._function)
-        return self._call
+                self._use(machine_code.kept_address(*self._name))
+            if self._call is None:
+                self._use(machine_code.compiled_address(*self._name))
+            return cast('Callable[..., object]', self._call)
+
+    def _use(self, address: int | None) -> None:
+        """Call what is at an address from now on; 0: plain Python; None: not yet known."""
+        if address is None:
+            return
+        self._address = address
+        if address:
+            # This one lets other threads run.
+            self._native = ctypes.CFUNCTYPE(ctypes.c_int)(address)
+            self._call = self._call_native
+        else:
+            self._call = np.errstate(all='ignore')(self._function)
 
     def _call_native(self, *arguments: Any) -> None:
         if self._native(self._block(arguments)):

@@ -80,13 +80,22 @@ announce: Callable[[str], None] = _print
 """Called with a line when a compilation begins; a program may put a function of its own here."""
 
 
-def address_of(module: str, name: str) -> int:
-    """Return where the machine code of a function is in memory; 0 where nothing is compiled."""
+def kept_address(module: str, name: str) -> int | None:
+    """
+    Load the machine code of a function from the disk, and return where it is in memory.
+
+    0 where nothing is compiled; None where it has to be compiled first.
+    """
     if not COMPILED:
         return 0
     for folder in _folders():
         if code := _kept(folder, module, name):
             return _load(code, f'{module}.{name}')
+    return None
+
+
+def compiled_address(module: str, name: str) -> int:
+    """Compile a function, and return where it is in memory; 0 where that is not possible."""
     announce(f'compiling {module}.{name} for this processor: this takes seconds, only this once')
     try:
         answer = _compile(module, name)
@@ -96,11 +105,6 @@ def address_of(module: str, name: str) -> int:
     address = _load(answer, f'{module}.{name}')
     _keep(module, name, answer)
     return address
-
-
-def is_kept(module: str, name: str) -> bool:
-    """Return whether the machine code of a function is on disk and valid, or not needed."""
-    return not COMPILED or any(_kept(folder, module, name) for folder in _folders())
 
 
 def _compile(module: str, name: str) -> bytes:

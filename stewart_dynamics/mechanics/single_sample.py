@@ -39,7 +39,6 @@ from stewart_dynamics.mechanics.rows import ACCELERATION, LENGTHS, MOTION, POSE,
 
 _NO_WRENCH = np.zeros(WRENCH)
 _POSE = POSE.stop
-_REST = np.zeros(MOTION - _POSE)
 
 # The numbers of each array, the arrays, and what calls the function with them.
 _Memory = tuple[tuple[Any, ...], tuple[NDArray[Any], ...], Callable[[], object]]
@@ -89,21 +88,12 @@ class SingleSample:
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array | None:
         """Return the leg lengths (6,) at a pose."""
-        if type(pose) is not Pose and type(pose) is not Motion:
+        if type(pose) is not Pose and type(pose) is not Motion or pose.shape:
             return None
-        memory = self._inverse_dynamics.take()
-        (of_motion, of_wrench, _, sound, _), arrays, solve = memory
-        try:
-            of_motion[:_POSE] = pose.rows[..., :_POSE]
-        except _NO_FLOATS:
-            self._inverse_dynamics.free(memory)
-            return None
-        of_motion[_POSE:] = _REST
-        of_wrench[:] = _NO_WRENCH
-        solve()
-        lengths = arrays[2][LENGTHS].copy() if sound[0] else None
-        self._inverse_dynamics.free(memory)
-        return lengths
+        at_rest = np.zeros(MOTION)
+        at_rest[POSE] = pose.rows[POSE]
+        result = self.inverse_dynamics(Motion.of_rows(at_rest), None)
+        return None if result is None else result[LENGTHS].copy()
 
     def forward_dynamics(self, motion: Motion, forces: Any, wrench: Any) -> Array | None:
         """Return the row of the motion (MOTION,) that follows from leg forces (6,)."""
