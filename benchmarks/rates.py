@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Where the node ends: setpoints at 1, 2 and 4 kHz, and for three nodes on one computer.
+Where the node ends: setpoints at 1 to 8 kHz, and for three nodes on one computer.
 
 Run by hand, ``make bench-node``, on Linux; README.md beside this file says what is measured.
 """
