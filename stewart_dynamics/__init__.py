@@ -24,6 +24,7 @@ from typing import Any, TYPE_CHECKING
 if TYPE_CHECKING:
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
+    from stewart_dynamics.mechanics.base_motion import BaseMotion
     from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown
     from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
     from stewart_dynamics.mechanics.motion import Motion
@@ -37,13 +38,15 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 
 __all__ = [
-    'BagError', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionError', 'NaturalModes',
-    'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError', 'SingularityError',
-    'StewartError', 'StewartPlatform', '__version__', 'check_planned_trajectory']
+    'BagError', 'BaseMotion', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionError',
+    'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError',
+    'SingularityError', 'StewartError', 'StewartPlatform', '__version__',
+    'check_planned_trajectory']
 
 _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
+    'mechanics.base_motion': ('BaseMotion',),
     'mechanics.force_breakdown': ('ForceBreakdown',),
     'mechanics.inverse_dynamics_result': ('InverseDynamics',),
     'mechanics.motion': ('Motion',),

@@ -32,6 +32,12 @@ from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameter_set import ParameterSet
 
 
+# The length of a given quaternion may differ from one by this; the quaternion is normalized.
+QUATERNION_TOLERANCE = 1e-3
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+"""[m/s^2]"""
+
+
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
     return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
 
@@ -73,8 +79,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
     _legs('actuator.coulomb_friction',
           'Coulomb friction along the leg; linear at rates below 1 mm/s', 'N', minimum=0.0),
-    Parameter('gravity', 'double', 'acceleration of free fall, base axes', 'm/s^2',
-              (0.0, 0.0, -9.80665), sizes=(3,)),
+    Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
+              'base.source is pose or motion; not used where it is imu', 'm/s^2',
+              STANDARD_GRAVITY, sizes=(3,)),
     _legs('limits.length_min', 'minimum length of a leg; none: not checked', 'm', (), minimum=0.0),
     _legs('limits.length_max', 'maximum length of a leg; none: not checked', 'm', (), minimum=0.0,
           above=True),
@@ -109,6 +116,22 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               maximum=1e9),
     Parameter('setpoint.exclusive', 'bool',
               'reject setpoints while a topic has more than one publisher', default=False),
+    Parameter('base.source', 'string', 'how the base moves: not at all, by its orientation in the '
+              'world (~/base/pose, at rest), by its motion in the world (~/base/pose, twist and '
+              'accel), or as an IMU on it measures (~/base/imu)', '', 'fixed',
+              choices=('fixed', 'pose', 'motion', 'imu')),
+    Parameter('base.timeout', 'double',
+              'age of the last base motion above which no forces are published', 's', 0.1,
+              minimum=0.0, above=True, maximum=1e9),
+    Parameter('base.imu.position', 'double', 'position of the IMU, base frame', 'm',
+              (0.0, 0.0, 0.0), sizes=(3,)),
+    Parameter('base.imu.orientation', 'double',
+              'quaternion x y z w that turns IMU axes into base axes', '', (0.0, 0.0, 0.0, 1.0),
+              sizes=(4,)),
+    Parameter('base.imu.cutoff', 'double', 'cut-off frequency of the low-pass filter on the angular '
+              'acceleration, the derivative of the angular velocity', 'Hz', 20.0, minimum=0.0,
+              above=True),
+    Parameter('world_frame', 'string', 'frame of ~/base/pose, twist and accel', default='world'),
     Parameter('trajectory.effort', 'bool', 'publish forces with the points of ~/leg_trajectory; '
               'a joint_trajectory_controller without an effort command interface rejects points '
               'with effort', default=True),
@@ -154,6 +177,11 @@ class Parameters(ParameterSet):
             raise ParameterError(
                 f'{source}: singularity.stop_condition: {stop}: must be at least '
                 f'singularity.warn_condition, {warn}')
+        length = float(np.linalg.norm(self['base.imu.orientation']))
+        if abs(length - 1.0) > QUATERNION_TOLERANCE:
+            raise ParameterError(
+                f'{source}: base.imu.orientation: {self["base.imu.orientation"].tolist()}: length '
+                f'{length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1')
         platform_joints = self['geometry.platform_joints']
         size = float(np.mean(np.linalg.norm(
             platform_joints - platform_joints.mean(axis=0), axis=1)))

@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics import Motion, Parameters
+from stewart_dynamics import BaseMotion, Motion, Parameters
 
 Array = NDArray[np.float64]
 
@@ -120,6 +120,16 @@ def random_motion(parameters: Parameters, random: np.random.Generator, many: int
          for _ in range(many)],
         size * random.uniform(-1.0, 1.0, (many, 3)), random.uniform(-2.0, 2.0, (many, 3)),
         size * random.uniform(-5.0, 5.0, (many, 3)), random.uniform(-10.0, 10.0, (many, 3)))
+
+
+def random_base_motion(parameters: Parameters, random: np.random.Generator, many: int,
+                       ) -> BaseMotion:
+    """Return gravity of any direction, accelerations and turning, a batch."""
+    size = size_of(parameters)
+    return BaseMotion(
+        [STANDARD_GRAVITY * random_direction(random) for _ in range(many)],
+        size * random.uniform(-5.0, 5.0, (many, 3)), random.uniform(-2.0, 2.0, (many, 3)),
+        random.uniform(-10.0, 10.0, (many, 3)))
 
 
 def random_wrench(parameters: Parameters, random: np.random.Generator, many: int) -> Array:
@@ -300,10 +310,12 @@ def printed_compiled_and_not(code: str) -> set[str]:
 
 class PinocchioReferee:
     """
-    Leg forces by the recursive Newton-Euler algorithm of Pinocchio.
+    Leg forces and base wrench by the recursive Newton-Euler algorithm of Pinocchio.
 
-    The hexapod as an open tree: from the base a universal joint (two revolute ones) and a
-    prismatic joint for each leg, and the platform on a joint of its own with six freedoms. The
+    The hexapod as an open tree: the base on a joint with six freedoms, whose motion is
+    prescribed, with a velocity that must not matter; from the base a universal joint (two
+    revolute ones) and a prismatic joint for each leg, and the platform on a joint of its own
+    with six freedoms. The
     platform's motion gives all joints' positions, velocities and accelerations, by closed form
     and by Pinocchio's frame Jacobians; its algorithm gives the generalized forces of the tree,
     and virtual work those of the six prismatic joints that do the same on the closed hexapod.
@@ -316,14 +328,15 @@ class PinocchioReferee:
         self._pin = pin
         self._p = p = parameters
         self._model = pin.Model()
-        self._model.gravity.linear = np.array(p['gravity'])
+        base = self._model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), 'base')
+        self._base_velocity = random.uniform(-10.0, 10.0, 3)
         self._mounts = []
         self._tips = []
         for i in range(6):
             # The universal joint stands anyhow, its last axis roughly up.
             mount = rotation_about(random_direction(random), random.uniform(0.0, 0.3))
             placement = pin.SE3(mount, np.array(p['geometry.base_joints'][i]))
-            first = self._model.addJoint(0, pin.JointModelRX(), placement, f'first {i}')
+            first = self._model.addJoint(base, pin.JointModelRX(), placement, f'first {i}')
             second = self._model.addJoint(first, pin.JointModelRY(), pin.SE3.Identity(),
                                           f'second {i}')
             piston = self._model.addJoint(second, pin.JointModelPZ(), pin.SE3.Identity(),
@@ -338,7 +351,7 @@ class PinocchioReferee:
             self._tips.append(self._model.addFrame(pin.Frame(
                 f'tip {i}', piston, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)))
             self._mounts.append(mount)
-        platform = self._model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(),
+        platform = self._model.addJoint(base, pin.JointModelFreeFlyer(), pin.SE3.Identity(),
                                         'platform')
         xx, xy, xz, yy, yz, zz = p['platform.inertia']
         self._model.appendBodyToJoint(platform, pin.Inertia(
@@ -346,22 +359,32 @@ class PinocchioReferee:
             np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])), pin.SE3.Identity())
         self._data = self._model.createData()
 
-    def forces(self, motion: Motion, wrench: Array) -> Array:
+    def forces(self, motion: Motion, wrench: Array, base: BaseMotion | None = None) -> Array:
         """Return the forces of the six actuators in one sample."""
+        return self.forces_and_base_wrench(motion, wrench, base)[0]
+
+    def forces_and_base_wrench(self, motion: Motion, wrench: Array,
+                               base: BaseMotion | None = None) -> tuple[Array, Array]:
+        """Return the forces of the six actuators, and what the base's joint must hold."""
         pin, p, model, data = self._pin, self._p, self._model, self._data
+        base = BaseMotion(p['gravity']) if base is None else base
+        model.gravity.linear = np.array(base.gravity)
         t, r = motion.position, motion.rotation
         v, w = motion.linear_velocity, motion.angular_velocity
         arms = p['geometry.platform_joints'] @ r.T
         legs = t + arms - p['geometry.base_joints']
 
+        # The joints of the legs and of the platform move relative to the base; their motion is
+        # computed with the base at rest.
         q = np.zeros(model.nq)
+        q[6] = 1.0
         for i in range(6):
             length = np.linalg.norm(legs[i])
             x, y, z = self._mounts[i].T @ legs[i] / length
             # Rx(q1) Ry(q2) e_z = (sin q2, -sin q1 cos q2, cos q1 cos q2)
-            q[3 * i:3 * i + 3] = np.arctan2(-y, z), np.arcsin(x), length
-        q[18:21] = t
-        q[21:25] = pin.Quaternion(np.array(r)).coeffs()
+            q[7 + 3 * i:10 + 3 * i] = np.arctan2(-y, z), np.arcsin(x), length
+        q[25:28] = t
+        q[28:32] = pin.Quaternion(np.array(r)).coeffs()
 
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
@@ -370,12 +393,12 @@ class PinocchioReferee:
         own = []
         for i in range(6):
             tip = pin.getFrameJacobian(model, data, self._tips[i], pin.LOCAL_WORLD_ALIGNED)
-            own.append(tip[:3, 3 * i:3 * i + 3])
+            own.append(tip[:3, 6 + 3 * i:9 + 3 * i])
             x, y, z = arms[i]
             of_platform = np.hstack([np.eye(3), [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]])
-            along_freedoms[3 * i:3 * i + 3] = np.linalg.solve(own[i], of_platform)
-        along_freedoms[18:21, :3] = r.T
-        along_freedoms[21:24, 3:] = r.T
+            along_freedoms[6 + 3 * i:9 + 3 * i] = np.linalg.solve(own[i], of_platform)
+        along_freedoms[24:27, :3] = r.T
+        along_freedoms[27:30, 3:] = r.T
         qd = along_freedoms @ np.concatenate([v, w])
 
         pin.forwardKinematics(model, data, q, qd, qdd)
@@ -385,12 +408,17 @@ class PinocchioReferee:
             joint_acceleration = (
                 motion.linear_acceleration + np.cross(motion.angular_acceleration, arms[i])
                 + np.cross(w, np.cross(w, arms[i])))
-            qdd[3 * i:3 * i + 3] = np.linalg.solve(own[i], joint_acceleration - drift)
-        qdd[18:21] = r.T @ motion.linear_acceleration - np.cross(r.T @ w, r.T @ v)
-        qdd[21:24] = r.T @ motion.angular_acceleration
+            qdd[6 + 3 * i:9 + 3 * i] = np.linalg.solve(own[i], joint_acceleration - drift)
+        qdd[24:27] = r.T @ motion.linear_acceleration - np.cross(r.T @ w, r.T @ v)
+        qdd[27:30] = r.T @ motion.angular_acceleration
 
+        qd[:3], qd[3:6] = self._base_velocity, base.angular_velocity
+        # Pinocchio's acceleration is the time derivative of the numbers of the velocity.
+        qdd[:3] = base.linear_acceleration - np.cross(base.angular_velocity, self._base_velocity)
+        qdd[3:6] = base.angular_acceleration
         tau = pin.rnea(model, data, q, qd, qdd)
-        pistons = [3 * i + 2 for i in range(6)]
+        pistons = [6 + 3 * i + 2 for i in range(6)]
         force = np.linalg.solve(along_freedoms[pistons].T, along_freedoms.T @ tau - wrench)
+        on_base = np.concatenate([wrench[:3], wrench[3:] + np.cross(t, wrench[:3])]) - tau[:6]
         return (force + p['actuator.reflected_mass'] * qdd[pistons]
-                + friction(p, qd[pistons]))
+                + friction(p, qd[pistons])), on_base

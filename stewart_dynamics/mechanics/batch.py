@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.mechanics import inverse_dynamics
-from stewart_dynamics.mechanics.rows import RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import NO_BASE, RESULT, WRENCH
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.
 _SAMPLES_FOR_A_THREAD = 4096
@@ -35,9 +35,11 @@ _PARTS_OF_A_THREAD = 8
 _CPUS = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count() or 1
 
 _NO_WRENCH = np.zeros((1, WRENCH))
+_NO_BASE: Array = np.array([NO_BASE])
 
 
-def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Array:
+def solve(constants: Array, motions: Array, wrenches: Array | None = None,
+          bases: Array | None = None) -> Array:
     """
     Return the rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
@@ -49,12 +51,15 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None) -> Ar
         Rows of motion, laid out as ``rows`` says.
     wrenches : (N, WRENCH) or (1, WRENCH), optional
         External wrenches at the platform's origin, base axes [N, N m]; one row for all.
+    bases : (N, BASE) or (1, BASE), optional
+        Rows of the base's motion, one row for all; none: it is still.
 
     """
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
+    bases = _NO_BASE if bases is None else compact(bases)
     results = np.empty((len(motions), RESULT))
-    in_parts(inverse_dynamics.solve, constants, motions, wrenches, results,
+    in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results,
              scratch=(inverse_dynamics.TILE,))
     return results
 

@@ -70,7 +70,7 @@ def leg_line(
 
 
 @inlined
-def _leg_inertia(leg: Leg, length: float, inverse_length: float) -> tuple[float, float]:
+def leg_inertia(leg: Leg, length: float, inverse_length: float) -> tuple[float, float]:
     """Return m2 c2 with c2 = L - S2 [kg m], and the effective mass across a leg [kg]."""
     piston_distance = length - leg.piston_center
     piston_moment = leg.piston_mass * piston_distance
@@ -102,7 +102,7 @@ def leg_dynamics(
     across_gravity = subtract(gravity, scale(along_gravity, s))
 
     # M_i, C_i, G_i as in ``lagrange``; skew(s)^2 y is -(y across the leg)
-    piston_moment, inertia = _leg_inertia(own, length, inverse_length)
+    piston_moment, inertia = leg_inertia(own, length, inverse_length)
     gravity_mass = (own.cylinder_moment + piston_moment) * inverse_length
     coriolis_mass = piston_moment * inverse_length - inertia
     force = add(

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Force breakdown by source: gravity, inertia, velocity, friction and external wrench.
+Force breakdown by source: gravity, inertia, velocity, friction, external wrench, base motion.
 
 The leg forces are linear in them: ``J_inv^T f = M X'' + C X' + G - wrench``, and friction adds
 to f along the leg. So each part is the inverse dynamics of a motion and a
@@ -30,7 +30,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.friction import friction
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
-from stewart_dynamics.mechanics.rows import ACCELERATION, CONDITION, FORCES, MOTION, RATES, TWIST
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
 
@@ -53,6 +54,8 @@ class ForceBreakdown(NamedTuple):
         Overcomes the friction of the actuators.
     wrench : (..., 6)
         Balances the external wrench.
+    base_motion : (..., 6)
+        Accelerates platform and legs along with a moving base; zero on a still one.
 
     """
 
@@ -62,6 +65,7 @@ class ForceBreakdown(NamedTuple):
     velocity: Array
     friction: Array
     wrench: Array
+    base_motion: Array
 
     @property
     def total(self) -> Array:
@@ -75,7 +79,8 @@ class ForceBreakdown(NamedTuple):
 
 
 # Their names in texts, in the order of ForceBreakdown.
-SOURCES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench')
+SOURCES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench',
+           'base motion')
 
 _NO_GRAVITY = {'gravity': [0.0, 0.0, 0.0]}
 _NO_FRICTION = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
@@ -107,9 +112,9 @@ class ForceBreakdownRows:
         self._platform_only = hexapod_constants(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION, **_NO_LEGS}))
 
-    def __call__(self, motions: Array, wrenches: Array) -> Array:
+    def __call__(self, motions: Array, wrenches: Array, bases: Array | None = None) -> Array:
         """
-        Return the forces (N, 6, 6) [N]: sample, source in the order of SOURCES, leg.
+        Return the forces (N, 7, 6) [N]: sample, source in the order of SOURCES, leg.
 
         They sum to the demanded forces. nan where J_inv cannot be solved.
 
@@ -119,21 +124,30 @@ class ForceBreakdownRows:
             Rows of motion, laid out as ``rows`` says.
         wrenches : (N, WRENCH) or (1, WRENCH)
             External wrenches at the platform's origin, base axes [N, N m]; one row for all.
+        bases : (N, BASE) or (1, BASE), optional
+            Rows of the base's motion; one row for all. By default it is still.
 
         """
         forces = np.empty((len(motions), len(SOURCES), 6))
-        loaded = bool(wrenches.any())
+        loads = wrenches if wrenches.any() else None
         for first in range(0, len(motions), _TOGETHER):
             part = slice(first, first + _TOGETHER)
-            load = wrenches if len(wrenches) == 1 else wrenches[part]
-            self._split(motions[part], load if loaded else None, forces[part])
+            load, base = (each if each is None or len(each) == 1 else each[part]
+                          for each in (loads, bases))
+            self._split(motions[part], load, base, forces[part])
         return forces
 
-    def _split(self, motions: Array, wrenches: Array | None, forces: Array) -> None:
+    def _split(self, motions: Array, wrenches: Array | None, bases: Array | None, forces: Array,
+               ) -> None:
         by = ForceBreakdown(*(forces[:, n] for n in range(len(SOURCES))))
         rows = motions.copy()
         rows[:, TWIST.start:MOTION] = 0.0  # at rest
-        results = batch.solve(self._whole, rows)
+        gravity = bases
+        if bases is not None:
+            gravity, bases = bases.copy(), bases.copy()
+            gravity[:, GRAVITY.stop:] *= 0.0  # nan stays nan
+            bases[:, GRAVITY] *= 0.0
+        results = batch.solve(self._whole, rows, None, gravity)
         by.gravity[:] = results[:, FORCES]
         unsolvable = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
         by.wrench[:] = 0.0 if wrenches is None else batch.solve(
@@ -152,4 +166,6 @@ class ForceBreakdownRows:
         own = np.empty((len(rows), 6))
         friction(results[:, RATES].copy(), self._viscous, self._coulomb, own)
         by.friction[:] = own
+        by.base_motion[:] = 0.0 if bases is None else (
+            batch.solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
         forces[unsolvable] = np.nan

@@ -15,12 +15,12 @@
 """
 Forward dynamics: how the platform accelerates under given leg forces.
 
-``X'' = M^-1 (J_inv^T (f - friction) + wrench - C X' - G)``, with the functions of the
-inverse dynamics for the load without acceleration, and with M as a sum over the legs,
-``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with J_i = [1, -skew(a_i)], j_i
-the leg's row of J_inv and e_i its effective mass across the leg. M is positive definite for
-every hexapod, so Cholesky solves it without a pivot (Golub and Van Loan, Matrix Computations,
-4th ed., 4.2).
+``X'' = M^-1 (J_inv^T (f - friction) + wrench - C X' - G)``, the wrench less the load of a moving
+base, with the functions of the inverse dynamics for the load without acceleration, and with M as
+a sum over the legs, ``M = M_p + sum (e_i J_i^T J_i + (m2 + m_r - e_i) j_i j_i^T)`` with
+J_i = [1, -skew(a_i)], j_i the leg's row of J_inv and e_i its effective mass across the leg. M is
+positive definite for every hexapod, so Cholesky solves it without a pivot (Golub and Van Loan,
+Matrix Computations, 4th ed., 4.2).
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.base_load import row_load
 from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import (
     characteristic_length_of, leg_of, platform_of)
@@ -114,8 +115,8 @@ def _solve(work: Array) -> None:
 
 
 @compiled
-def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, work: Array,
-                 ) -> None:
+def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, base: Array,
+                 work: Array) -> None:
     """
     Write the acceleration of a motion under leg forces.
 
@@ -129,6 +130,8 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         Of the actuators [N], + pushes; their friction is subtracted here.
     wrench : (6,)
         Force [N] and moment [N m] on the platform at its origin, base axes.
+    base : (BASE,)
+        A row of the base's motion; one of nan adds no load.
     work : WORK
         Scratch memory.
 
@@ -145,8 +148,9 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
     moment = scale(mass, com)
     inertia = _sum6(_turned(rotation, platform_inertia), _point_inertia(mass, com))
     body_force, body_moment = platform_dynamics(constants, rotation, omega, _REST, _REST)
-    force = subtract(read3(wrench, 0), body_force)
-    torque = subtract(read3(wrench, 3), body_moment)
+    load_force, load_moment = row_load(constants, motion, base)
+    force = subtract(subtract(read3(wrench, 0), load_force), body_force)
+    torque = subtract(subtract(read3(wrench, 3), load_moment), body_moment)
     work[:] = 0.0
     for n in range(6):
         leg = leg_dynamics(constants, n, position, rotation, velocity, omega, _REST, _REST)
@@ -173,13 +177,15 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         motion[ANGULAR_ACCELERATION.start + n] = inverse_size * work[_RIGHT, 3 + n]
 
 
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
-def solve(constants: Array, motions: Array, forces: Array, wrenches: Array, work: Array) -> None:
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
+def solve(constants: Array, motions: Array, forces: Array, wrenches: Array, bases: Array,
+          work: Array) -> None:
     """
     Write the accelerations of motions (N, MOTION) under forces (N, 6), see ``acceleration``.
 
-    The wrenches are (N, WRENCH), or (1, WRENCH): one row for all.
+    The wrenches are (N, WRENCH), or (1, WRENCH): one row for all; so are the bases, (N, BASE).
     """
-    one_wrench = len(wrenches) == 1
+    one_wrench, one_base = len(wrenches) == 1, len(bases) == 1
     for n in range(len(motions)):
-        acceleration(constants, motions[n], forces[n], wrenches[0 if one_wrench else n], work)
+        acceleration(constants, motions[n], forces[n], wrenches[0 if one_wrench else n],
+                     bases[0 if one_base else n], work)

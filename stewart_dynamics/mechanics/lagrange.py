@@ -240,3 +240,71 @@ def gravity_vector(parameters: Parameters, position: Array, rotation: Array) -> 
     force = weight + np.sum(g, axis=-2)
     moment = np.cross(com, weight) + np.sum(np.cross(at.arms, g), axis=-2)
     return np.concatenate([force, moment], axis=-1)
+
+
+def base_coriolis_matrix(
+        parameters: Parameters, position: Array, rotation: Array, spin: Array) -> Array:
+    """
+    Return what the angular velocity W of a base adds to C, (..., 6, 6): a skew matrix.
+
+    Platform: ``2 m J_c^T skew(W) J_c``, and ``I skew(W) + skew(W) I - skew(I W)`` of its turning.
+    Leg: ``2 m2 c2 / L (q s^T - s q^T) + 2 (I_e / L^2 + m_ce) (W . s) skew(s)`` with q = W x s.
+    """
+    at = legs(parameters, position, rotation)
+    terms = _leg_terms(parameters, at)
+    inertia, turn = _platform_inertia(parameters, rotation), skew(spin)
+    turning = inertia @ turn + turn @ inertia - skew((inertia @ spin[..., None])[..., 0])
+    j_com = _joint_jacobian(_center_of_mass(parameters, rotation))
+    j = _joint_jacobian(at.arms)
+    q = np.cross(spin[..., None, :], at.directions)
+    outer = q[..., :, None] * at.directions[..., None, :]
+    piston = parameters['legs.piston.mass'] * terms.piston_distance / at.lengths
+    along = np.sum(spin[..., None, :] * at.directions, axis=-1)
+    of_legs = (_each(2.0 * piston) * (outer - _transposed(outer))
+               + _each(2.0 * terms.inertia * along) * skew(at.directions))
+    coriolis: Array = (
+        2.0 * parameters['platform.mass'] * _transposed(j_com) @ turn @ j_com
+        + _turning(turning) + np.sum(_transposed(j) @ of_legs @ j, axis=-3))
+    return coriolis
+
+
+def base_gravity_vector(
+        parameters: Parameters, position: Array, rotation: Array, gravity: Array,
+        acceleration: Array, spin: Array, spin_rate: Array) -> Array:
+    """
+    Return G on a moving base, (..., 6) [N, N m]: the wrench that holds platform and legs on it.
+
+    A point at rest on the base, at r, feels ``a_B - g + W' x r + W x (W x r)`` in place of -g.
+    Leg: ``-G_i(A_b)`` with A_b that of its base joint, and
+    ``(I_e / L^2 + m_ce) L across - m2 c2 |q|^2 s`` with across the part of ``W' x s + W x q``
+    across the leg, q = W x s.
+    """
+    at = legs(parameters, position, rotation)
+    terms = _leg_terms(parameters, at)
+    field = skew(spin_rate) + skew(spin) @ skew(spin)
+
+    def felt(arm: Array) -> Array:
+        """Return what is felt at points (..., k, 3) on the base."""
+        field_at: Array = np.einsum('...ij,...kj->...ki', field, arm)
+        return (acceleration - gravity)[..., None, :] + field_at
+
+    com = _center_of_mass(parameters, rotation)
+    inertia = _platform_inertia(parameters, rotation)
+    force = parameters['platform.mass'] * felt((position + com)[..., None, :])[..., 0, :]
+    momentum = (inertia @ spin[..., None])[..., 0]
+    moment = (np.cross(com, force) + (inertia @ spin_rate[..., None])[..., 0]
+              + np.cross(spin, momentum))
+
+    piston_mass = parameters['legs.piston.mass']
+    m_ge = (parameters['legs.cylinder.mass'] * parameters['legs.cylinder.center_of_mass']
+            + piston_mass * terms.piston_distance) / at.lengths
+    weight = _each(m_ge) * terms.across + _each(piston_mass) * terms.along
+    q_squared = np.sum(np.cross(spin[..., None, :], at.directions) ** 2, axis=-1)
+    carried = np.einsum('...ij,...kj->...ki', field, at.directions)
+    on_legs = (
+        (weight @ felt(parameters['geometry.base_joints'])[..., None])[..., 0]
+        + (_each(terms.inertia * at.lengths) * terms.across @ carried[..., None])[..., 0]
+        - (piston_mass * terms.piston_distance * q_squared)[..., None] * at.directions)
+    force = force + np.sum(on_legs, axis=-2)
+    moment = moment + np.sum(np.cross(at.arms, on_legs), axis=-2)
+    return np.concatenate([force, moment], axis=-1)

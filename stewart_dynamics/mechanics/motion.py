@@ -23,13 +23,13 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
 from stewart_dynamics.mechanics.pose import (
-    as_rotation, matrix_of_quaternion, Pose, row_of_one, Samples)
+    as_rotation, matrix_of_quaternion, Pose, Posed, row_of_one)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
 
 
-class Motion(Samples):
+class Motion(Posed):
     """
     Pose, twist and acceleration of the platform in one sample or any leading shape of samples.
 

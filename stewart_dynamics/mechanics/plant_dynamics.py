@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.end_stops import stop_force
 from stewart_dynamics.mechanics.forward_dynamics import acceleration
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
-    ACCELERATION, consecutive, MOTION, POSITION, ROTATION, TWIST)
+    ACCELERATION, BASE, consecutive, MOTION, POSITION, ROTATION, TWIST)
 from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, read3, scale, Vector3
 
 # The state: position, quaternion x y z w, linear and angular velocity, base axes.
@@ -45,9 +45,9 @@ _LINEAR, _ANGULAR = STATE_TWIST.start, STATE_TWIST.start + 3
 RESULT_LENGTHS, RESULT_RATES, RESULT_FORCES, RESULT_ACCELERATION = consecutive(6, 6, 6, 6)
 RESULT_SOUND = RESULT_ACCELERATION.stop
 RESULT = RESULT_SOUND + 1
-# Six commands, and the wrench on the platform.
-COMMANDS, WRENCH = consecutive(6, 6)
-LOADS = WRENCH.stop
+# Six commands, the wrench on the platform, and the motion of the base.
+COMMANDS, WRENCH, BASE_MOTION = consecutive(6, 6, BASE)
+LOADS = BASE_MOTION.stop
 # Scratch memory.
 _MOTION, _FORCES, _AFTER, _SLOPE, _MEAN = consecutive(MOTION, 6, STATE, STATE, STATE)
 SCRATCH = _MEAN.stop
@@ -89,7 +89,7 @@ def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: A
         a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
         forces[leg] = loads[COMMANDS.start + leg] + stop_force(stops, leg, length, rate)
-    acceleration(constants, motion, forces, loads[WRENCH.start:], work)
+    acceleration(constants, motion, forces, loads[WRENCH], loads[BASE_MOTION], work)
     at = STATE_QUATERNION.start
     vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))
@@ -168,7 +168,8 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
     largest_forces : (6,)
         To which the commands are clipped [N].
     loads : (LOADS,)
-        Commands [N], force and moment on the platform [N, N m]; commands are clipped in place.
+        Commands [N], force and moment on the platform [N, N m], a row of the base's motion;
+        commands are clipped in place.
     state : (STATE,)
         The initial state, overwritten with the final one. Where a step cannot be computed: the
         last state that could be, at rest.

@@ -21,10 +21,13 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import MotionError, SingularityError
-from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
+from stewart_dynamics.mechanics.arguments import (
+    as_array, common_shape, optional_array, wrong_type)
+from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import Pose
-from stewart_dynamics.mechanics.rows import CONDITION, MOTION, POSE, POSITION, WRENCH
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, MOTION, NO_BASE, POSE, POSITION, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 
 
@@ -37,16 +40,28 @@ def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '')
     raise wrong_type(name, value, ' or '.join(f'a {kind.__name__}' for kind in kinds) + hint)
 
 
-def loaded(motion: Motion, wrench: ArrayLike | None) -> tuple[Array, Array, tuple[int, ...]]:
-    """Return rows of motion, rows of wrenches (one if it is for all), and the leading shape."""
+def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
+           ) -> tuple[Array, Array, Array, tuple[int, ...]]:
+    """Return rows of motion, of wrenches and of the base (one if for all), and the shape."""
     check_kind(motion, Motion)
-    if wrench is None:
-        return motion.rows.reshape(-1, MOTION), np.zeros((1, WRENCH)), motion.shape
-    load = as_array('wrench', wrench, (WRENCH,))
-    shape = common_shape(motion=motion.shape, wrench=load.shape[:-1])
+    load = optional_array('wrench', wrench, (WRENCH,))
+    bases = base_rows(base)
+    shape = common_shape(motion=motion.shape, wrench=load.shape[:-1], base=bases.shape[:-1])
     rows = (copies(motion.rows, shape) if shape != motion.shape
             else motion.rows.reshape(-1, MOTION))
-    return rows, copies(load, shape), shape
+    load, bases = (array.reshape(1, -1) if array.ndim == 1 else copies(array, shape)
+                   for array in (load, bases))
+    return rows, load, bases, shape
+
+
+def base_rows(base: BaseMotion | None) -> Array:
+    """Return the rows (..., BASE) of the base's motion; a row of nan for none."""
+    if base is None:
+        return np.array(NO_BASE)
+    if not isinstance(base, BaseMotion):
+        raise wrong_type('base', base, 'a BaseMotion')
+    rows: Array = base.rows
+    return rows
 
 
 def motion_rows(pose: Pose | Motion, shape: tuple[int, ...] | None = None) -> Array:

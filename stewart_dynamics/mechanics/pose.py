@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,37 +27,16 @@ from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.arguments import as_array, common_shape
 from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
+from stewart_dynamics.mechanics.samples import listed, Samples
 
 # A rotation matrix further from orthogonal than this is rejected.
 ORTHOGONALITY = 1e-6
 # Rounding cannot make one that is nearer than this exceed it.
 _WELL = 0.9 * ORTHOGONALITY
 
-Self = TypeVar('Self', bound='Samples')
 
-
-class Samples:
-    """
-    Poses or motions of any leading shape: indexing, comparison and representation of both.
-
-    Attributes
-    ----------
-    rows : (..., n)
-        All numbers of each sample in a row, SI units, base axes.
-    shape : tuple of int
-        The leading shape; () for one sample.
-
-    """
-
-    rows: Array
-    shape: tuple[int, ...]
-
-    @classmethod
-    def of_rows(cls: type[Self], rows: Array) -> Self:
-        """Return the samples of rows (..., n), which are neither checked nor copied."""
-        samples = cls.__new__(cls)
-        samples.rows, samples.shape = rows, rows.shape[:-1]
-        return samples
+class Posed(Samples):
+    """The pose that is part of each sample of a Pose or a Motion."""
 
     @property
     def position(self) -> Array:
@@ -74,43 +53,11 @@ class Samples:
         """Return the rotation as unit quaternions x y z w, (..., 4), w >= 0."""
         return rotations.to_quaternion(self.rotation)
 
-    def _part(self, which: slice) -> Array:
-        view = self.rows[..., which]
-        view.setflags(write=False)
-        return view
-
-    def __len__(self) -> int:
-        """Return the number of samples along the first axis; TypeError for a single sample."""
-        if not self.shape:
-            raise TypeError(f'one {type(self).__name__} has no length')
-        return self.shape[0]
-
-    def __getitem__(self: Self, index: Any) -> Self:
-        """Return some of the samples: an index, a slice or a mask, as of an array."""
-        where = index if isinstance(index, tuple) else (index,)
-        try:
-            return self.of_rows(self.rows[(*where, slice(None))] if any(
-                each is Ellipsis for each in where) else self.rows[(*where, ..., slice(None))])
-        except IndexError as exc:
-            raise IndexError(f'{type(self).__name__} of shape {self.shape}: {exc}') from exc
-
-    def __eq__(self, other: object) -> bool:
-        """Return whether shape and all numbers are equal."""
-        return type(other) is type(self) and np.array_equal(self.rows, other.rows)
-
-    # The arrays are mutable.
-    __hash__ = None  # type: ignore[assignment]
-
-    def __repr__(self) -> str:
-        """Return the shape, or the pose of a single sample."""
-        name = type(self).__name__
-        if self.shape:
-            return f'<{name} of shape {self.shape}>'
-        return (f'<{name}: position {_listed(self.position)} m, quaternion '
-                f'{_listed(self.quaternion)}>')
+    def _in_words(self) -> str:
+        return f'position {listed(self.position)} m, quaternion {listed(self.quaternion)}'
 
 
-class Pose(Samples):
+class Pose(Posed):
     """
     Pose of the platform in the base frame, one sample or any leading shape of samples.
 
@@ -253,7 +200,3 @@ def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
             f'be within {rotations.QUATERNION_TOLERANCE:g} of 1')
     x, y, z, w = np.moveaxis(q / length[..., None], -1, 0)
     return np.stack(rotations.from_quaternion(x, y, z, w), axis=-1).reshape(*q.shape[:-1], 3, 3)
-
-
-def _listed(numbers: Array) -> str:
-    return '[' + ', '.join(f'{number + 0.0:.6g}' for number in numbers) + ']'

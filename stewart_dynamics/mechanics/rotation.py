@@ -24,6 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.parameters import QUATERNION_TOLERANCE
+
+__all__ = ['euler_rate_matrix', 'euler_rate_matrix_rate', 'from_euler', 'from_quaternion',
+           'is_unit', 'quaternion_length', 'QUATERNION_TOLERANCE', 'to_quaternion']
 
 
 def from_euler(angles: ArrayLike) -> Array:
@@ -67,9 +71,6 @@ def euler_rate_matrix_rate(angles: ArrayLike, rates: ArrayLike) -> Array:
 
 
 Number = TypeVar('Number', float, Array)
-
-# The length of a given quaternion may differ from one by this; the quaternion is normalized.
-QUATERNION_TOLERANCE = 1e-3
 
 
 def quaternion_length(x: Number, y: Number, z: Number, w: Number) -> Number:

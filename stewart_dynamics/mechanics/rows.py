@@ -16,11 +16,13 @@
 """
 The layout of a sample as a row of numbers.
 
-All layers pass motions, wrenches and results as rows of float64, SI units, base axes;
-``rows[..., FORCES]`` is a quantity of all samples.
+All layers pass motions, wrenches, base motions and results as rows of float64, SI units, base
+axes; ``rows[..., FORCES]`` is a quantity of all samples.
 """
 
 from __future__ import annotations
+
+import math
 
 # A row of a motion. The rotation is row by row.
 POSITION, ROTATION = slice(0, 3), slice(3, 12)
@@ -33,6 +35,13 @@ MOTION = 24
 
 # A row of a wrench: force and moment.
 WRENCH = 6
+
+# A row of a base's motion, base axes. One of nan adds no load: the base is still, or its motion is
+# not known.
+GRAVITY, BASE_ACCELERATION = slice(0, 3), slice(3, 6)
+BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION = slice(6, 9), slice(9, 12)
+BASE = 12
+NO_BASE = (math.nan,) * BASE
 
 # A row of a result.
 LENGTHS, RATES, FORCES = slice(0, 6), slice(6, 12), slice(12, 18)

@@ -33,11 +33,14 @@ from numpy.typing import NDArray
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.entry_point import EntryPoint
 from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import Pose
-from stewart_dynamics.mechanics.rows import ACCELERATION, LENGTHS, MOTION, POSE, RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, BASE, LENGTHS, MOTION, NO_BASE, POSE, RESULT, WRENCH)
 
 _NO_WRENCH = np.zeros(WRENCH)
+_NO_BASE = np.array(NO_BASE)
 _POSE = POSE.stop
 
 # The numbers of each array, the arrays, and what calls the function with them.
@@ -61,28 +64,29 @@ class SingleSample:
     def __init__(self, constants: Array) -> None:
         self._inverse_dynamics = _Memories(
             inverse_dynamics.solve_sample, constants, np.empty(MOTION), np.empty(WRENCH),
-            np.empty(RESULT), np.empty(1), np.empty(inverse_dynamics.TILE))
+            np.empty(BASE), np.empty(RESULT), np.empty(1), np.empty(inverse_dynamics.TILE))
         self._forward_dynamics = _Memories(
             forward_dynamics.solve, constants, np.empty((1, MOTION)), np.empty((1, 6)),
-            np.empty((1, WRENCH)), np.empty(forward_dynamics.WORK))
+            np.empty((1, WRENCH)), np.empty((1, BASE)), np.empty(forward_dynamics.WORK))
         self._forward_kinematics = _Memories(
             forward_kinematics.poses, constants, np.empty((1, 6)), np.zeros((1, MOTION)),
             np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1))
 
-    def inverse_dynamics(self, motion: Motion, wrench: Any) -> Array | None:
+    def inverse_dynamics(self, motion: Motion, wrench: Any, base: Any) -> Array | None:
         """Return the row of results (RESULT,) of a motion (MOTION,) under a wrench (6,)."""
-        if type(motion) is not Motion:
+        if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):
             return None
         memory = self._inverse_dynamics.take()
-        (of_motion, of_wrench, _, sound, _), arrays, solve = memory
+        (of_motion, of_wrench, of_base, _, sound, _), arrays, solve = memory
         try:
             of_motion[:] = motion.rows
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+            of_base[:] = _NO_BASE if base is None else base.rows
         except _NO_FLOATS:
             self._inverse_dynamics.free(memory)
             return None
         solve()
-        result = arrays[2].copy() if sound[0] else None
+        result = arrays[3].copy() if sound[0] else None
         self._inverse_dynamics.free(memory)
         return result
 
@@ -92,19 +96,21 @@ class SingleSample:
             return None
         at_rest = np.zeros(MOTION)
         at_rest[POSE] = pose.rows[POSE]
-        result = self.inverse_dynamics(Motion.of_rows(at_rest), None)
+        result = self.inverse_dynamics(Motion.of_rows(at_rest), None, None)
         return None if result is None else result[LENGTHS].copy()
 
-    def forward_dynamics(self, motion: Motion, forces: Any, wrench: Any) -> Array | None:
+    def forward_dynamics(self, motion: Motion, forces: Any, wrench: Any, base: Any,
+                         ) -> Array | None:
         """Return the row of the motion (MOTION,) that follows from leg forces (6,)."""
-        if type(motion) is not Motion:
+        if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):
             return None
         memory = self._forward_dynamics.take()
-        (of_motion, of_forces, of_wrench, _), arrays, solve = memory
+        (of_motion, of_forces, of_wrench, of_base, _), arrays, solve = memory
         try:
             of_motion[:] = motion.rows
             of_forces[:] = forces
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+            of_base[:] = _NO_BASE if base is None else base.rows
         except _NO_FLOATS:
             self._forward_dynamics.free(memory)
             return None

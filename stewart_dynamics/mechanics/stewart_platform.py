@@ -25,18 +25,21 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics import (
-    batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility, stiffness)
+    base_wrench, batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility,
+    stiffness)
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
+from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.platform_arguments import (
-    check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
+    base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.rows import (
-    FORCES, LENGTHS, MOTION, POSE, POSITION, RESULT, TWIST, WRENCH)
+    BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, FORCES, GRAVITY,
+    LENGTHS, MOTION, POSE, POSITION, RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters import Parameters
@@ -98,7 +101,8 @@ class StewartPlatform:
                 f'{platform:.3g} m (platform)>')
 
     def inverse_dynamics(
-            self, motion: Motion, wrench: ArrayLike | None = None, *,
+            self, motion: Motion, wrench: ArrayLike | None = None,
+            base: BaseMotion | None = None, *,
             singular: Literal['raise', 'nan'] = 'raise') -> InverseDynamics:
         """
         Return leg lengths, rates and forces of a motion, and how near a singularity it is.
@@ -110,6 +114,8 @@ class StewartPlatform:
         wrench : (..., 6), optional
             External wrench on the platform at its origin: force [N] and moment [N m], base
             axes; zero by default.
+        base : BaseMotion, optional
+            How the base moves; by default it is still, and gravity is the parameter.
         singular : 'raise' or 'nan'
             Where J_inv cannot be solved: raise, or return nan as forces.
 
@@ -120,44 +126,71 @@ class StewartPlatform:
 
         """
         known = singular in ('raise', 'nan')
-        result = self._single.inverse_dynamics(motion, wrench) if known else None
+        result = self._single.inverse_dynamics(motion, wrench, base) if known else None
         if result is not None:
             return InverseDynamics(result)
-        rows, wrenches, shape = loaded(motion, wrench)
-        results = self.solve(rows, wrenches)
+        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        results = self.solve(rows, wrenches, bases)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
         unsolvable = find_unsolvable(rows, results, shape, singular)
         if len(unsolvable):
             results[unsolvable, FORCES] = np.nan
         return InverseDynamics(results.reshape(*shape, RESULT))
 
-    def solve(self, rows: Array, wrenches: Array | None = None) -> Array:
+    def solve(self, rows: Array, wrenches: Array | None = None, bases: Array | None = None,
+              ) -> Array:
         """
         Return rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
 
         They are laid out as ``mechanics.rows`` says. The wrenches are (N, 6), or (1, 6) for all
-        samples. Large batches use all processors.
+        samples; so are the bases, (N, BASE), of which a row of nan adds no load. Large batches
+        use all processors.
         """
-        return batch.solve(self.constants, rows, wrenches)
+        return batch.solve(self.constants, rows, wrenches, bases)
 
     def force_breakdown(
-            self, motion: Motion, wrench: ArrayLike | None = None, *,
+            self, motion: Motion, wrench: ArrayLike | None = None,
+            base: BaseMotion | None = None, *,
             singular: Literal['raise', 'nan'] = 'raise') -> ForceBreakdown:
         """Return the leg forces by source; arguments and errors are ``inverse_dynamics``'s."""
-        rows, wrenches, shape = loaded(motion, wrench)
-        results = self.solve(rows, wrenches)
+        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        results = self.solve(rows, wrenches, bases)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
         unsolvable = find_unsolvable(rows, results, shape, singular)
         if self._breakdown is None:
             self._breakdown = ForceBreakdownRows(self.parameters)
-        forces = self._breakdown(rows, wrenches)
+        forces = self._breakdown(rows, wrenches, None if base is None else bases)
         known = forces.copy()
         known[unsolvable] = 0.0
         check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
         return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
 
+    def base_wrench(self, motion: Motion, wrench: ArrayLike | None = None,
+                    base: BaseMotion | None = None) -> Array:
+        """
+        Return what the hexapod puts on its base, at the base's origin (..., 6) [N, N m].
+
+        Force and moment, base axes: for foundation, deck or truss. Arguments are those of
+        ``inverse_dynamics``. Forces within the hexapod, friction among them, do not matter, and
+        singular poses are allowed.
+        """
+        rows, wrenches, bases, shape = loaded(motion, wrench, base)
+        results = self.base_wrenches(rows, wrenches, None if base is None else bases)
+        return check_finite('motion', results.reshape(*shape, WRENCH), len(shape))
+
+    def base_wrenches(self, rows: Array, wrenches: Array, bases: Array | None = None) -> Array:
+        """Return rows (N, 6) of ``base_wrench`` of rows of motion, unchecked, see ``solve``."""
+        if bases is None:  # still
+            bases = np.zeros((1, BASE))
+            bases[0, GRAVITY] = self.parameters['gravity']
+        results = np.empty((len(rows), WRENCH))
+        batch.in_parts(base_wrench.base_wrenches, self.constants, *map(
+            batch.compact, (rows, wrenches, bases)), results)
+        return results
+
     def forward_dynamics(
-            self, motion: Motion, forces: ArrayLike, wrench: ArrayLike | None = None) -> Motion:
+            self, motion: Motion, forces: ArrayLike, wrench: ArrayLike | None = None,
+            base: BaseMotion | None = None) -> Motion:
         """
         Return a motion with the accelerations that follow from leg forces.
 
@@ -172,19 +205,22 @@ class StewartPlatform:
             Of the actuators [N], + pushes. Their friction is subtracted.
         wrench : (..., 6), optional
             External wrench on the platform, as in ``inverse_dynamics``.
+        base : BaseMotion, optional
+            How the base moves, as in ``inverse_dynamics``.
 
         """
-        row = self._single.forward_dynamics(motion, forces, wrench)
+        row = self._single.forward_dynamics(motion, forces, wrench, base)
         if row is not None:
             return Motion.of_rows(row)
         check_kind(motion, Motion)
         pushes = as_array('forces', forces, (6,))
         load = optional_array('wrench', wrench, (WRENCH,))
+        bases = base_rows(base)
         shape = common_shape(motion=motion.shape, forces=pushes.shape[:-1],
-                             wrench=load.shape[:-1])
-        rows = copies(motion.rows, shape)
-        pushes, load = copies(pushes, shape), copies(load, shape)
-        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load,
+                             wrench=load.shape[:-1], base=bases.shape[:-1])
+        rows, pushes, load, bases = (
+            copies(array, shape) for array in (motion.rows, pushes, load, bases))
+        batch.in_parts(forward_dynamics.solve, self.constants, rows, pushes, load, bases,
                        scratch=forward_dynamics.WORK)
         rows = check_finite('accelerations', rows.reshape(*shape, MOTION), len(shape))
         return Motion.of_rows(rows)
@@ -285,25 +321,44 @@ class StewartPlatform:
             return check_finite('pose', lagrange.mass_matrix(
                 self.parameters, pose.position, pose.rotation), len(pose.shape))
 
-    def coriolis_matrix(self, motion: Motion, christoffel: bool = False) -> Array:
+    def coriolis_matrix(self, motion: Motion, christoffel: bool = False,
+                        base: BaseMotion | None = None) -> Array:
         """
         Return C (..., 6, 6); without friction.
 
         C X' is the same either way. The paper's C has X'^T (M' - 2 C) X' = 0; with
-        ``christoffel``, M' - 2 C is skew itself, which passivity-based controllers need.
+        ``christoffel``, M' - 2 C is skew itself, which passivity-based controllers need. A base
+        that turns adds a skew matrix.
         """
         check_kind(motion, Motion)
+        bases = base_rows(base)
+        shape = common_shape(motion=motion.shape, base=bases.shape[:-1])
         with np.errstate(all='ignore'):
-            return check_finite('motion', lagrange.coriolis_matrix(
+            c = lagrange.coriolis_matrix(
                 self.parameters, motion.position, motion.rotation, motion.linear_velocity,
-                motion.angular_velocity, christoffel), len(motion.shape))
+                motion.angular_velocity, christoffel)
+            if base is not None:
+                c = c + lagrange.base_coriolis_matrix(
+                    self.parameters, motion.position, motion.rotation,
+                    bases[..., BASE_ANGULAR_VELOCITY])
+            return check_finite('motion', c, len(shape))
 
-    def gravity_vector(self, pose: Pose | Motion) -> Array:
-        """Return G (..., 6) [N, N m]: the wrench that holds platform and legs at rest."""
+    def gravity_vector(self, pose: Pose | Motion, base: BaseMotion | None = None) -> Array:
+        """
+        Return G (..., 6) [N, N m]: the wrench that holds platform and legs at rest.
+
+        At rest on the base: if that moves, inertial forces are in it as well.
+        """
         check_kind(pose, Pose, Motion)
+        bases = base_rows(base)
+        shape = common_shape(pose=pose.shape, base=bases.shape[:-1])
         with np.errstate(all='ignore'):
             return check_finite('pose', lagrange.gravity_vector(
-                self.parameters, pose.position, pose.rotation), len(pose.shape))
+                self.parameters, pose.position, pose.rotation) if base is None else
+                lagrange.base_gravity_vector(
+                    self.parameters, pose.position, pose.rotation, *(bases[..., part] for part in (
+                        GRAVITY, BASE_ACCELERATION, BASE_ANGULAR_VELOCITY,
+                        BASE_ANGULAR_ACCELERATION))), len(shape))
 
     def stiffness(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> Array:
         """

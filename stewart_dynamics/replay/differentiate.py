@@ -134,7 +134,7 @@ class Differentiator:
         """
         wrenches = np.broadcast_to(batch.wrenches, (len(batch.stamps), WRENCH))
         self._pending.append(Batch(
-            batch.stamps, batch.motions, wrenches, batch.restarts, batch.times))
+            batch.stamps, batch.motions, wrenches, batch.restarts, batch.times, batch.bases))
         self._held += len(batch.stamps)
         # not at every batch: joining the pending ones takes time
         return self._done() if self._held >= self._due else _joined([])
@@ -170,7 +170,7 @@ class Differentiator:
         ends = [*begins[1:], len(stamps)]
         done: list[Batch] = []
         for begin, end in zip(begins, ends, strict=True):
-            segment = _part(held, slice(begin, end))
+            segment = held.chosen(slice(begin, end))
             closed = ended or end < len(stamps)
             done += self._windows(segment, closed)
             if closed:
@@ -206,7 +206,7 @@ class Differentiator:
     def _keep(self, segment: Batch) -> None:
         """Keep the poses that the next window of an open segment needs."""
         begin = self._begin_of_reach(segment.stamps, self._given)
-        self._pending = [_part(segment, slice(begin, None))]
+        self._pending = [segment.chosen(slice(begin, None))]
         self._given -= begin
         self._held = len(segment.stamps) - begin
         self._due = self._held + self._window // 2
@@ -243,7 +243,7 @@ class Differentiator:
         omega = 2.0 * _vector_of_quotient(turn_rate, turn) / square
         alpha = (2.0 * _vector_of_quotient(turn_acceleration, turn) / square
                  - 2.0 * np.sum(turn * turn_rate, axis=-1, keepdims=True) / square * omega)
-        given = _part(segment, core)
+        given = segment.chosen(core)
         out = np.empty_like(given.motions)
         out[:, _POSE] = given.motions[:, _POSE]
         out[:, _VELOCITY], out[:, _ACCELERATION] = rates[:, :3], accelerations[:, :3]
@@ -283,9 +283,8 @@ class Differentiator:
         kept = jumps[followed]
         self._restart = bool(jumps[-1] > (kept[-1] if len(kept) else 0))
         if n:
-            given, motions = _part(given, followed), motions[followed]
-        return Batch(given.stamps, motions, given.wrenches, np.diff(kept, prepend=0) > 0,
-                     given.times)
+            given, motions = given.chosen(followed), motions[followed]
+        return given._replace(motions=motions, restarts=np.diff(kept, prepend=0) > 0)
 
 
 def _vector_of_quotient(a: Array, b: Array) -> Array:
@@ -299,9 +298,5 @@ def _joined(batches: list[Batch]) -> Batch:
     if not batches:
         none = np.empty(0, dtype=np.int64)
         return Batch(none, np.empty((0, MOTION)), np.empty((0, WRENCH)), none.astype(bool), none)
-    return Batch(*map(np.concatenate, zip(*batches, strict=True)))
-
-
-def _part(batch: Batch, part: slice | Flags) -> Batch:
-    return Batch(batch.stamps[part], batch.motions[part], batch.wrenches[part],
-                 batch.restarts[part], batch.times[part])
+    return Batch._make(None if parts[0] is None else np.concatenate(parts)
+                       for parts in zip(*batches, strict=True))

@@ -56,7 +56,8 @@ from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
 from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.home_pose import homes
-from stewart_dynamics.mechanics.rows import consecutive, FORCES, MOTION, RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import (
+    BASE, consecutive, FORCES, MOTION, NO_BASE, RESULT, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.mechanics.vectors import cross
 from stewart_dynamics.parameters import Parameters
@@ -71,9 +72,10 @@ _OUT_OF_RANGE = 3
 _MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
     MOTION, WRENCH, 6, 1, 1, 1)
 # The motion given is the one before, or the guess where there is none.
-(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _WRITTEN,
- _RESULT, _TILE) = consecutive(CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, _CODE.stop,
-                               RESULT, inverse_dynamics.TILE)
+(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _BASE_BEFORE,
+ _BASE, _WRITTEN, _RESULT, _TILE) = consecutive(
+    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, _CODE.stop, RESULT,
+    inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
 _GIVES = Struct(f'{_CODE.stop}d')
 
@@ -109,6 +111,8 @@ class Estimate(NamedTuple):
     """The external wrench, filtered; none of the first measurement [N, N m]."""
     differences: Six | None
     """Measured - model, not filtered (6) [N]; none of the first measurement."""
+    base: tuple[float, ...] = NO_BASE
+    """A row of the base's motion; of nan: it is still."""
     overloads: tuple[Overload, ...] = ()
 
     @property
@@ -198,7 +202,9 @@ def _one(numbers: Array) -> None:
         forces, result = numbers[_FORCES], numbers[_RESULT]
         for end in range(2):  # the mean of both ends
             at = motion if end else before
-            inverse_dynamics.solve_one(constants, at, numbers[_KNOWN], result, numbers[_TILE])
+            base = numbers[_BASE] if end else numbers[_BASE_BEFORE]
+            inverse_dynamics.solve_one(
+                constants, at, numbers[_KNOWN], base, result, numbers[_TILE])
             model_forces = result[FORCES]
             _add_external_wrench(constants, at, model_forces, forces, 0.5, wrench)
             for n in range(6):
@@ -238,7 +244,7 @@ class ExternalWrench:
             parameters[f'{EXTERNAL_WRENCH}.{limit}'] for limit in ('force_max', 'moment_max'))
 
     def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,
-                 target: Sequence[float] | None) -> Estimate:
+                 target: Sequence[float] | None, base: tuple[float, ...] = NO_BASE) -> Estimate:
         """
         Return the estimate.
 
@@ -253,6 +259,8 @@ class ExternalWrench:
             The load on ``~/wrench`` [N, N m].
         target : sequence of float, optional
             The last setpoint, as a row of motion.
+        base : 12 numbers, optional
+            A row of the base's motion; by default it is still.
 
         Raises
         ------
@@ -267,30 +275,33 @@ class ExternalWrench:
         interval = 0 if before is None else measurement.stamp - before.stamp
         if before is not None and 0 < interval <= self._longest_gap:
             seconds = interval * 1e-9
-            result = self._solve(given, before.wrench or NO_WRENCH, seconds, before.motion)
+            result = self._solve(
+                given, before.wrench or NO_WRENCH, seconds, before.motion, before.base, base)
         else:
             for guess in self._guesses(before, target):
-                result = self._solve(given, NO_WRENCH, 0.0, guess)
+                result = self._solve(given, NO_WRENCH, 0.0, guess, base, base)
                 if result[_CODE.start] == forward_kinematics.FOUND:
                     break
         if result[_CODE.start] != forward_kinematics.FOUND:
             raise _error(measurement, result)
         motion = result[_MOTION_AFTER]
         if not 0 < interval <= self._longest_gap:
-            return Estimate(measurement.stamp, motion, None, None)
+            return Estimate(measurement.stamp, motion, None, None, base)
         fx, fy, fz, tx, ty, tz = result[_AFTER]
         d0, d1, d2, d3, d4, d5 = result[_DIFFERENCES]
         estimate = Estimate(measurement.stamp, motion, (fx, fy, fz, tx, ty, tz),
-                            (d0, d1, d2, d3, d4, d5))
+                            (d0, d1, d2, d3, d4, d5), base)
         overloads = tuple(self._overloads(estimate))
         return estimate._replace(overloads=overloads) if overloads else estimate
 
     def _solve(self, given: tuple[float, ...], before: Six, interval: float,
-               motion: Sequence[float]) -> tuple[float, ...]:
+               motion: Sequence[float], base_before: tuple[float, ...],
+               base: tuple[float, ...]) -> tuple[float, ...]:
         # Computed here: compiled code has an expm1 of its own.
         gain = -math.expm1(-self._rate * interval)
         _GIVEN.pack_into(
-            self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion)
+            self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion,
+            *base_before, *base)
         self._bound()
         return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics on which setpoints and the known wrench come, and their types."""
+"""The topics on which setpoints, the base's motion and the known wrench come; their types."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ POSE = 'setpoint/pose'
 TWIST = 'setpoint/twist'
 ACCEL = 'setpoint/accel'
 COMBINED = 'setpoint/combined'
+BASE_POSE = 'base/pose'
+BASE_TWIST = 'base/twist'
+BASE_ACCEL = 'base/accel'
+BASE_IMU = 'base/imu'
 WRENCH = 'wrench'
 
 INPUT_TYPES = {
@@ -28,8 +32,15 @@ INPUT_TYPES = {
     TWIST: 'geometry_msgs/msg/TwistStamped',
     ACCEL: 'geometry_msgs/msg/AccelStamped',
     COMBINED: 'trajectory_msgs/msg/MultiDOFJointTrajectory',
+    BASE_POSE: 'geometry_msgs/msg/PoseStamped',
+    BASE_TWIST: 'geometry_msgs/msg/TwistStamped',
+    BASE_ACCEL: 'geometry_msgs/msg/AccelStamped',
+    BASE_IMU: 'sensor_msgs/msg/Imu',
     WRENCH: 'geometry_msgs/msg/WrenchStamped',
 }
 
 # Of each value of setpoint.source: the topics that are joined.
 SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}
+# The same of each value of base.source.
+BASE_SOURCES = {'fixed': (), 'pose': (BASE_POSE,), 'motion': (BASE_POSE, BASE_TWIST, BASE_ACCEL),
+                'imu': (BASE_IMU,)}

@@ -34,9 +34,10 @@ from stewart_dynamics.mechanics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.integration_step_size import substeps
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.plant_dynamics import (
-    advance, LARGEST_MOVE, LOADS, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
+    advance, LARGEST_MOVE, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
     RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
 from stewart_dynamics.mechanics.rotation import from_euler, to_quaternion
+from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
@@ -92,7 +93,7 @@ class Plant:
         """Steps in a period."""
         self._step = period / self.steps
         self._limits = Limits(parameters)
-        self._loads = np.zeros(LOADS)
+        self._loads = np.array(NO_WRENCH + NO_WRENCH + NO_BASE)
         numbers = np.zeros(STATE + RESULT)
         self._memory = numbers.data  # the same as bytes
         self._state, self._result = numbers[:STATE], numbers[STATE:]
@@ -123,7 +124,7 @@ class Plant:
 
         """
         if not self.fault:
-            self._loads[:] = commands + wrench
+            self._loads[:] = commands + wrench + NO_BASE
             self.state = self._run(self.steps)
         return self.state
 
@@ -131,7 +132,7 @@ class Plant:
         """Return the state at rest in the present pose: the brakes take all speed at once."""
         if not self.fault:
             self._state[STATE_TWIST] = 0.0
-            self._loads[:] = 0.0
+            self._loads[:] = NO_WRENCH + NO_WRENCH + NO_BASE
             self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         return self.state
 

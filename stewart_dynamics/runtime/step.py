@@ -33,8 +33,8 @@ from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, RATES, RESULT,
-    UNIT_LOAD_FORCES, WRENCH)
+    BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
+    RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import (
     advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
     UNSOLVABLE_CONDITION)
@@ -54,6 +54,8 @@ class Setpoint(NamedTuple):
     """Load on the platform at its origin, base axes [N, N m]."""
     restart: bool = False
     """Time has jumped back before it: earlier setpoints do not matter for it."""
+    base: tuple[float, ...] | None = None
+    """A row of the base's motion; one of nan: it is not known. None: the base is still."""
 
 
 class Output(NamedTuple):
@@ -63,9 +65,9 @@ class Output(NamedTuple):
     lengths: Six
     rates: Six
     demanded_forces: Six | None
-    """As the dynamics have them; none where J_inv cannot be solved."""
+    """As the dynamics have them; none where J_inv cannot be solved or the base is not known."""
     forces: Six | None
-    """As published: clipped to limits.force_max; none where suppressed or not solved."""
+    """As published: clipped to limits.force_max; none where suppressed or none are demanded."""
     unit_load_forces: Six
     determinant: float
     determinant_rate: float
@@ -88,10 +90,12 @@ class Batch(NamedTuple):
     """(N,): time has jumped back before it."""
     times: Stamps
     """When the message that completed each came (N,) [ns]."""
+    bases: Array | None = None
+    """Rows of the base's motion (N, 12); one of nan: it is not known. None: the base is still."""
 
     def chosen(self, which: Any) -> Batch:
         """Return some of them: a slice, or an index or a mask (N,)."""
-        return Batch._make(part[which] for part in self)
+        return Batch._make(None if part is None else part[which] for part in self)
 
 
 class Outputs(NamedTuple):
@@ -124,7 +128,7 @@ class Outputs(NamedTuple):
 
     @property
     def demanded_forces(self) -> Array:
-        """As the dynamics have them (N, 6) [N]; nan where J_inv cannot be solved."""
+        """As the dynamics have them (N, 6) [N]; nan where they are not known, as in Output."""
         return self.results[:, FORCES]
 
     @property
@@ -173,16 +177,16 @@ _THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
 
 # One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
 _RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING = consecutive(RESULT, 6, STATE, 1, 1)
-(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BEFORE, _RESTART, _IS_STAMP, _WRITTEN,
- _TILE) = consecutive(CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, STATE, 1, 1, _EXCEEDING.stop,
-                      inverse_dynamics.TILE)
+(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _RESTART, _IS_STAMP, _BASE_KNOWN,
+ _WRITTEN, _TILE) = consecutive(CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 1, 1, 1,
+                                _EXCEEDING.stop, inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
 _GIVES = Struct(f'{_EXCEEDING.stop}d')
 
 
 @inlined
-def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart: bool,
-           result: Array, forces: Array) -> tuple[bool, bool]:
+def _watch(settings: Array, limits: Array, is_stamp: bool, base_known: bool, state: Array,
+           restart: bool, result: Array, forces: Array) -> tuple[bool, bool]:
     """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
     finite = is_stamp
     for k in range(RESULT):
@@ -194,7 +198,7 @@ def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart
     condition = result[CONDITION]
     advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
-    solved = condition < UNSOLVABLE_CONDITION
+    solved = condition < UNSOLVABLE_CONDITION and base_known
     published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
     for leg in range(6):
         if not solved:
@@ -204,10 +208,11 @@ def _watch(settings: Array, limits: Array, is_stamp: bool, state: Array, restart
     return True, any_exceeded(limits, result)
 
 
-@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'b1[::1]', 'b1[::1]')
-def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, state: Array, results: Array,
-                forces: Array, states: Array, answered: Flags, exceeding: Flags) -> None:
+@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'b1[::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]',
+             'f8[:,::1]', 'b1[::1]', 'b1[::1]')
+def _watch_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: Flags,
+                state: Array, results: Array, forces: Array, states: Array, answered: Flags,
+                exceeding: Flags) -> None:
     """Go through results in their order and write what becomes of them, see Outputs."""
     limits = settings[_LIMITS]
     restart = False
@@ -216,7 +221,7 @@ def _watch_many(settings: Array, stamps: Stamps, restarts: Flags, state: Array, 
         restart = restart or restarts[n]
         is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
         answered[n], exceeding[n] = _watch(
-            settings, limits, is_stamp, state, restart, results[n], forces[n])
+            settings, limits, is_stamp, bases_known[n], state, restart, results[n], forces[n])
         restart = restart and not answered[n]
         for k in range(STATE):
             states[n, k] = state[k]
@@ -230,10 +235,12 @@ def _one(numbers: Array) -> None:
     for n in range(STATE):
         state[n] = numbers[_BEFORE.start + n]
     inverse_dynamics.solve_one(
-        numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], result, numbers[_TILE])
+        numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], numbers[_BASE], result,
+        numbers[_TILE])
     written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
-        settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0, state,
-        numbers[_RESTART.start] > 0.0, result, written[_FORCES])
+        settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0,
+        numbers[_BASE_KNOWN.start] > 0.0, state, numbers[_RESTART.start] > 0.0, result,
+        written[_FORCES])
 
 
 # The machine code that a batch needs.
@@ -280,10 +287,11 @@ class Step:
             The output's before this one; none for the first.
 
         """
-        stamp = setpoint.stamp
+        stamp, base = setpoint.stamp, setpoint.base
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
-            *(before or _FIRST).numbers, setpoint.restart, -STAMPS_END <= stamp < STAMPS_END)
+            *(base or NO_BASE), *(before or _FIRST).numbers, setpoint.restart,
+            -STAMPS_END <= stamp < STAMPS_END, base is None or base[0] == base[0])
         self._solve()
         written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
         if not written[_ANSWERED.start]:
@@ -302,13 +310,15 @@ class Step:
 
     def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
         """Return what setpoints give one after the other; see the call for one."""
-        results = self._platform.solve(setpoints.motions, setpoints.wrenches)
+        bases = setpoints.bases
+        results = self._platform.solve(setpoints.motions, setpoints.wrenches, bases)
         many = len(results)
+        known = np.ones(many, dtype=bool) if bases is None else ~np.isnan(bases[:, 0])
         state = np.array((before or _FIRST).numbers)
         forces, states = np.empty((many, 6)), np.empty((many, STATE))
         answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
-        _watch_many(self._settings, setpoints.stamps, setpoints.restarts, state, results, forces,
-                    states, answered, exceeding)
+        _watch_many(self._settings, setpoints.stamps, known, setpoints.restarts, state, results,
+                    forces, states, answered, exceeding)
         stamps = setpoints.stamps
         if not answered.all():
             stamps, results, forces = stamps[answered], results[answered], forces[answered]
