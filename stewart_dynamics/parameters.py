@@ -128,9 +128,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('base.imu.orientation', 'double',
               'quaternion x y z w that turns IMU axes into base axes', '', (0.0, 0.0, 0.0, 1.0),
               sizes=(4,)),
-    Parameter('base.imu.cutoff', 'double', 'cut-off frequency of the low-pass filter on the angular '
-              'acceleration, the derivative of the angular velocity', 'Hz', 20.0, minimum=0.0,
-              above=True),
+    Parameter('base.imu.cutoff', 'double', 'cut-off frequency of the low-pass filter on the '
+              'angular acceleration, the derivative of the angular velocity', 'Hz', 20.0,
+              minimum=0.0, above=True),
     Parameter('world_frame', 'string', 'frame of ~/base/pose, twist and accel', default='world'),
     Parameter('trajectory.effort', 'bool', 'publish forces with the points of ~/leg_trajectory; '
               'a joint_trajectory_controller without an effort command interface rejects points '
