@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The plant on a moving base: balances and closed forms in the world, where nothing is relative."""
+"""The plant on a moving base: balances and closed forms in the world, which does not move."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ from referees import (
     energies, printed_compiled_and_not, random_base_motion, relative, rng, rotation_about, size_of,
     smooth_motion)
 from simulated import FRICTIONLESS, MASSLESS, random_simulated, simulated, UNLIMITED
-from test_plant import motion_of, set_moving, ZERO
-
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.runtime.plant import Plant, State
+from test_plant import motion_of, set_moving, ZERO
 
 Array = NDArray[np.float64]
 MotionOf = Callable[[Any], Motion]
