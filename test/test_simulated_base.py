@@ -128,7 +128,7 @@ def test_periods_are_the_motion_at_their_begins_middles_and_ends() -> None:
     parameters = on(**SEA)
     base, at = GeneratedBase(parameters), GeneratedBaseMotion(parameters).at
     for index in (*range(1, 40), 5000, 4999, 20):
-        period = base.period(index)
+        period = base.period(index, 0)
         motion = at((index - 1.0 + np.array([0.0, 0.5, 1.0])) * 1e-3)
         np.testing.assert_allclose(
             period.rows, BaseMotion.from_motion(motion, parameters['gravity']).rows,
@@ -138,9 +138,9 @@ def test_periods_are_the_motion_at_their_begins_middles_and_ends() -> None:
                                    motion.rotation[2], atol=1e-14)
         np.testing.assert_allclose(period.twist + period.acceleration, motion.rows[2, 12:],
                                    rtol=1e-12, atol=1e-13)
-    rest = base.period(0)
+    rest = base.period(0, 0)
     assert not np.any(rest.twist + rest.acceleration)
-    assert np.array_equal(rest.rows[2], base.period(1).rows[0])
+    assert np.array_equal(rest.rows[2], base.period(1, 0).rows[0])
 
 
 # The IMU
@@ -236,5 +236,5 @@ def test_the_largest_numbers_that_are_accepted_stay_finite(kind: dict[str, Any])
                'base_motion__sea__response': [1e3] * 6, 'base_motion__sea__wave_height': 100.0,
                'base_motion__sea__peak_period': 0.1, 'base_motion__lever_arm': [1e6] * 3}
     base = GeneratedBase(on(**{**kind, **largest, 'base_motion__ramp': 1e-6}))
-    assert np.isfinite(base.period(100).rows).all()
+    assert np.isfinite(base.period(100, 0).rows).all()
     assert isinstance(GeneratedBaseMotion(on(**{**kind, **largest})).at(1.0), Motion)

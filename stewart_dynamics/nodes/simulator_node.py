@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from functools import partial
 import gc
 import math
@@ -45,7 +45,7 @@ from stewart_dynamics.nodes.simulator_messages import (
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.runtime.repeated_events import Series
-from stewart_dynamics.runtime.simulated_base import BasePeriod, GeneratedBase
+from stewart_dynamics.runtime.simulated_base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 from stewart_dynamics.runtime.wrench_input import WrenchInput
 
@@ -95,13 +95,16 @@ class SimulatorNode(Node):
         begun = time.monotonic()
         self._plant = SIGNALS.interruptible(partial(Plant, self._settings))
         self._state_messages = StateMessages(self._settings)
-        self._base = (None if self._settings['base_motion.source'] == 'fixed'
-                      else GeneratedBase(self._settings))
-        self._base_messages = BaseMessages(self._settings)
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
         self._rejections = Rejections(self._on_rejection)
         self._wrench_input = WrenchInput(self._settings, self._rejections)
+        source = self._settings['base_motion.source']
+        self._base: GeneratedBase | BaseOfTopics | None = (
+            None if source == 'fixed' else GeneratedBase(self._settings) if source != 'topics'
+            else BaseOfTopics(self._settings, self._rejections, self.get_logger().warning))
+        self._base_messages = BaseMessages(self._settings)
+        self._base_now: BasePeriod | None = None
         self._commands: Six | None = None
         self._stamp = _BEGIN
         self._index = 0
@@ -114,16 +117,21 @@ class SimulatorNode(Node):
         qos = QoSProfile(depth=_QUEUE)
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
                          for topic, kind in self._output_types().items()}
-        for topic, take in (('commands', self._on_commands),
-                            ('wrench', self._wrench_input.take)):
+        inputs: dict[str, Callable[[bytes], None]] = {
+            'commands': self._on_commands, 'wrench': self._wrench_input.take}
+        if isinstance(self._base, BaseOfTopics):
+            inputs.update({topic: partial(self._on_base, self._base, topic)
+                           for topic in BASE_TYPES})
+        for topic, take in inputs.items():
             self.create_subscription(
-                _TYPES[INPUT_TYPES[topic]], f'~/{topic}', take, qos, raw=True)
+                _TYPES[{**INPUT_TYPES, **BASE_TYPES}[topic]], f'~/{topic}', take, qos, raw=True)
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
             + f', {self._rate:g} periods per second of {self._plant.steps} steps each')
         if self._stepped:
             self._clock_output = self.create_publisher(Clock, '/clock', qos)
+            self._move_base()
             self._messages = self._messages_now()
             self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
         else:
@@ -137,7 +145,8 @@ class SimulatorNode(Node):
     def _output_types(self) -> dict[str, str]:
         if self._base is None:
             return OUTPUT_TYPES
-        return {**OUTPUT_TYPES, **BASE_TYPES, IMU: IMU_TYPE}
+        generated = {} if isinstance(self._base, BaseOfTopics) else BASE_TYPES
+        return {**OUTPUT_TYPES, **generated, IMU: IMU_TYPE}
 
     def _timer(self, seconds: float, callback: Any) -> Any:
         # ROS time stands still until it is advanced here, or jumps.
@@ -168,6 +177,9 @@ class SimulatorNode(Node):
             self._announcing.reset()
             self._advance()
 
+    def _on_base(self, base: BaseOfTopics, topic: str, data: bytes) -> None:
+        base.input.take(topic, data, lambda: self._stamp + self._time_of(self._index))
+
     def _on_time(self) -> None:
         """Take the periods that are due."""
         now = time.monotonic_ns()
@@ -189,12 +201,12 @@ class SimulatorNode(Node):
     def _advance(self) -> None:
         """Take one period, with the brakes on until there is a command, and when they stop."""
         self._index += 1
+        self._move_base()
         if self._commands is not None and self._index - self._commanded > self._patience:
             self._brake()
         if self._commands is not None and not self._plant.fault and not self._braked:
-            base = self._base_period()
             state = self._plant.advance(self._commands, self._wrench_input.wrench,
-                                        base and base.rows)
+                                        self._base_now and self._base_now.rows)
             if self._plant.fault:
                 self.get_logger().error(self._plant.fault)
             elif state.forces != self._commands:
@@ -209,18 +221,18 @@ class SimulatorNode(Node):
             self.get_logger().warning(
                 f'no command for {self._settings["command_timeout"]:g} s: brakes engaged')
 
-    def _base_period(self) -> BasePeriod | None:
-        """Return how the base moves in the present period; None: it is fixed."""
-        if self._base is None:
-            return None
-        return self._base.period(0 if self._commands is None else self._index - self._begun)
+    def _move_base(self) -> None:
+        """Move the base, if it moves, on to the end of the present period."""
+        if self._base is not None:
+            moved = 0 if self._commands is None else self._index - self._begun
+            self._base_now = self._base.period(moved, self._stamp + self._time_of(self._index))
 
     def _messages_now(self) -> list[tuple[str, bytes]]:
         stamp = self._stamp + self._time_of(self._index)
-        base = self._base_period()
         # The base first: who answers a state with a command has its motion, too.
-        return [*(self._base_messages.write(stamp, self._index, base) if base else ()),
-                *self._state_messages.write(stamp, self._plant.measured())]
+        return [*(() if self._base_now is None else self._base_messages.write(
+            stamp, self._index, self._base_now)),
+            *self._state_messages.write(stamp, self._plant.measured())]
 
     def _announce(self) -> None:
         """Publish again what is not answered: all messages until the first command."""
