@@ -50,7 +50,7 @@ CLEAR = output_of()
 
 
 def begun() -> DynamicsDiagnostics:
-    return DynamicsDiagnostics(PARAMETERS, TOPICS, BEGIN)
+    return DynamicsDiagnostics(PARAMETERS, TOPICS, (), BEGIN)
 
 
 def answered(diagnostics: DynamicsDiagnostics, now: float, output: Output = CLEAR,
@@ -135,7 +135,7 @@ def test_topics_that_all_arrive_but_are_not_joined_are_stale() -> None:
 
 def test_the_timeout_is_that_of_the_parameters() -> None:
     diagnostics = DynamicsDiagnostics(
-        PARAMETERS.replaced({'setpoint.timeout': 5.0}), TOPICS, BEGIN)
+        PARAMETERS.replaced({'setpoint.timeout': 5.0}), TOPICS, (), BEGIN)
     answered(diagnostics, BEGIN)
     assert status(diagnostics, 'setpoints', BEGIN + 4.9).level == OK
     assert status(diagnostics, 'setpoints', BEGIN + 5.1).level == STALE

@@ -68,7 +68,7 @@ def test_there_is_none_before_a_measurement_has_come() -> None:
 
 
 def test_it_is_the_last_status() -> None:
-    diagnostics = DynamicsDiagnostics(HEXAPOD, ('setpoint/pose',), 0.0)
+    diagnostics = DynamicsDiagnostics(HEXAPOD, ('setpoint/pose',), (), 0.0)
     names = ['setpoints', 'singularity', 'limits', 'timing']
     assert [each.name for each in diagnostics.report.make(0.0)[0]] == names
     assert not diagnostics.report.level_changed(0.0)

@@ -26,8 +26,10 @@ from referees import (
 
 from stewart_dynamics import Motion, MotionError, Parameters, StewartPlatform
 from stewart_dynamics.mechanics import forward_dynamics
+from stewart_dynamics.mechanics.rows import NO_BASE
 
 STATES = 20
+STILL = np.array([NO_BASE])
 
 
 def accelerations(motion: Motion) -> Any:
@@ -144,7 +146,8 @@ def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit() -> None:
     forces = rng().uniform(-1000.0, 1000.0, (20_000, 6))
     rows = motion.rows.copy()
     forward_dynamics.solve(
-        platform.constants, rows, forces, np.zeros((1, 6)), np.empty(forward_dynamics.WORK))
+        platform.constants, rows, forces, np.zeros((1, 6)), STILL,
+        np.empty(forward_dynamics.WORK))
     assert np.array_equal(platform.forward_dynamics(motion, forces).rows, rows)
 
 
@@ -165,11 +168,13 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     p = random_parameters(rng())
     rows, forces = random_motion(p, rng(), 10).rows, np.arange(60.0).reshape(10, 6)
     hexapod, wrench = StewartPlatform(p).constants, random_wrench(p, rng(), 10)
+    base = random_base_motion(p, rng(), 10).rows
+    base[::3] = np.nan
     given = {'hexapod': hexapod, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench,
-             'work': np.empty(forward_dynamics.WORK)}
+             'base': base, 'work': np.empty(forward_dynamics.WORK)}
     plain = uncompiled(
         'from stewart_dynamics.mechanics.forward_dynamics import solve\n'
         "solve(given['hexapod'], given['rows'], given['forces'], given['wrench'],\n"
-        "      given['work'])\n", given)
-    forward_dynamics.solve(hexapod, rows, forces, wrench, np.empty(forward_dynamics.WORK))
+        "      given['base'], given['work'])\n", given)
+    forward_dynamics.solve(hexapod, rows, forces, wrench, base, np.empty(forward_dynamics.WORK))
     assert np.array_equal(plain['rows'], rows)

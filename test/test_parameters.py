@@ -477,7 +477,7 @@ def check_any(file: Path) -> None:
         for name, value in (parameters or {}).items():
             known = PARAMETERS[name]
             if isinstance(value, np.ndarray):
-                assert value.size in (3, 6, 18)
+                assert value.size in (3, 4, 6, 18)
             if known.kind == 'double' and value is not None:
                 assert np.all(np.isfinite(value))
                 assert np.all(value >= known.minimum)

@@ -422,9 +422,10 @@ def solved_rows(trajectory: Trajectory, monkeypatch: pytest.MonkeyPatch) -> tupl
     rows_solved: list[int] = []
     solve = StewartPlatform.solve
 
-    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None) -> Array:
+    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None,
+                bases: Array | None = None) -> Array:
         rows_solved.append(len(rows))
-        return solve(platform, rows, wrenches)
+        return solve(platform, rows, wrenches, bases)
 
     with monkeypatch.context() as patch:
         patch.setattr(StewartPlatform, 'solve', counted)

@@ -30,7 +30,7 @@ REJECTED = Outcome('rejected: x', 'why', values=(('points', '3'),))
 
 
 def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
-    diagnostics = DynamicsDiagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN)
+    diagnostics = DynamicsDiagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], (), BEGIN)
     report, planned = diagnostics.report, diagnostics.planned_trajectory
     assert [each.name for each in report.make(BEGIN)[0]][-1] == 'timing'
     planned.done(ACCEPTED, 0.25)
@@ -53,7 +53,7 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
 
 def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:
     planned = DynamicsDiagnostics(
-        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN).planned_trajectory
+        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], (), BEGIN).planned_trajectory
     planned.done(ACCEPTED, 0.1)
     assert planned.log_lines(BEGIN) == []
     for _ in range(2):

@@ -38,11 +38,12 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.runtime.batch_joining import WAITING
 from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
+from stewart_dynamics.runtime.recorded_messages import Messages
 from stewart_dynamics.runtime.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
     WRONG_FRAME)
 from stewart_dynamics.runtime.samples import SampleReader
-from stewart_dynamics.runtime.setpoint_joining import Messages, Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Setpoint
 from stewart_dynamics.runtime.wrench_input import WrenchInput
 
@@ -132,8 +133,8 @@ def test_messages_of_rclpy_are_joined() -> None:
     message.header.frame_id = 'base'
     feed = Feed(source='pose')
     setpoint = feed(POSE, serialize_message(message))
-    assert setpoint == (SECOND, (0.0,) * 3 + (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                        + (0.0,) * 12, NO_WRENCH, False)
+    assert setpoint == Setpoint(SECOND, (0.0,) * 3 + (
+        1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) + (0.0,) * 12, NO_WRENCH)
 
 
 def test_stamps_a_nanosecond_apart_are_not_joined() -> None:

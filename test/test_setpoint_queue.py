@@ -39,8 +39,8 @@ class Fed:
         self.rounds = 0
         self.gathers = True
         self.queue = SetpointQueue(
-            STEP, self._publish, lambda *why: self.rejected.append(why), self._take,
-            self._answered)
+            STEP, self._publish, self._on_base, lambda *why: self.rejected.append(why),
+            self._take, self._answered)
 
     def _publish(self, setpoint: Setpoint, output: Output, came: float) -> None:
         assert output == STEP(setpoint, None)._replace(  # type: ignore[union-attr]
@@ -48,6 +48,9 @@ class Fed:
         self.published.append((setpoint.stamp, came))
         if setpoint.restart:
             self.restarts.append(setpoint.stamp)
+
+    def _on_base(self, setpoint: Setpoint) -> Setpoint:
+        return setpoint
 
     def _take(self) -> None:
         held, self.held = self.held, []

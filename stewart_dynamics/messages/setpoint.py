@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Setpoints and wrenches: messages with a header and some numbers.
+Setpoints, wrenches and IMUs: messages with a header and some numbers.
 
-PoseStamped, TwistStamped, AccelStamped and WrenchStamped of geometry_msgs, and a
+PoseStamped, TwistStamped, AccelStamped and WrenchStamped of geometry_msgs, sensor_msgs/Imu, and a
 trajectory_msgs/MultiDOFJointTrajectory of one point.
 """
 
@@ -30,6 +30,7 @@ from stewart_dynamics.messages.cdr import (
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.trajectory import points_of
 
+_IMU = {0: Struct('>37d'), 1: Struct('<37d')}
 _DURATION = {0: Struct('>iI'), 1: Struct('<iI')}
 
 
@@ -46,6 +47,16 @@ def twist(data: bytes) -> Stamped:
 def wrench(data: bytes) -> Stamped:
     """Read a geometry_msgs/WrenchStamped: force and torque x y z."""
     return stamped(data, SIX)
+
+
+def imu(data: bytes) -> Stamped:
+    """
+    Read a sensor_msgs/Imu: 37 numbers.
+
+    They are the orientation x y z w, the angular velocity and the linear acceleration x y z, each
+    with the nine numbers of its covariance behind it.
+    """
+    return stamped(data, _IMU)
 
 
 def combined(data: bytes) -> Stamped:
@@ -71,7 +82,7 @@ def _combined_numbers(data: bytes, gaps: list[slice] | None = None) -> list[int]
     """Return where transform, velocity and acceleration begin; note what only aligns."""
     gaps = [] if gaps is None else gaps
     count = COUNT[data[1]]
-    points, at = points_of(data, gaps)
+    _, points, at = points_of(data, gaps)
     if points != 1:
         raise MalformedError(f'{points} points: a setpoint has one')
     found = []
@@ -93,7 +104,8 @@ def layout_of(reader: Callable[[bytes], Stamped], message: bytes) -> Layout:
         return Layout(message, list(numbers), gaps=gaps)
     end = 16 + COUNT[message[1]].unpack_from(message, 12)[0]
     at = aligned8(end)
-    return Layout(message, [(at, 7 if reader is pose else 6)], gaps=[slice(end, at)])
+    many = 7 if reader is pose else 37 if reader is imu else 6
+    return Layout(message, [(at, many)], gaps=[slice(end, at)])
 
 
 class StampedWriter:

@@ -30,16 +30,25 @@ from stewart_dynamics.messages.cdr import (
     COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, ORDERS, put_count, put_text,
     READ_ERRORS, sequence, text, TIME_AND_LENGTH)
 
-# A point of a MultiDOFJointTrajectory of one joint, and one of a JointTrajectory of six without
-# accelerations. All begin at a multiple of eight bytes but the first, which may begin four bytes
-# behind one: then only its first count stands there, all else where it would in the others.
+# A point of a MultiDOFJointTrajectory of one joint or two, and one of a JointTrajectory of six
+# without accelerations. All begin at a multiple of eight bytes but the first, which may begin
+# four bytes behind one: then only its first count stands there, all else where it would in the
+# others.
 _PARTS = ('transforms', 'velocities', 'accelerations')
-_PLATFORM_POINT = {order: np.dtype({
+
+
+def _counts(joints: int) -> tuple[int, int, int]:
+    """Return where in a point of some joints the counts of its parts stand."""
+    return 0, 8 + 56 * joints, 16 + 104 * joints
+
+
+_PLATFORM_POINT = {(order, joints): np.dtype({
     'names': [*_PARTS, 'pose', 'twist', 'accel', 'sec', 'nanosec'],
-    'formats': [f'{sign}{kind}' for kind in (
-        'u4', 'u4', 'u4', '7f8', '6f8', '6f8', 'i4', 'u4')],
-    'offsets': [0, 64, 120, 8, 72, 128, 176, 180], 'itemsize': 184})
-    for order, sign in ORDERS.items()}
+    'formats': [*[f'{sign}u4'] * 3, *((f'{sign}f8', (joints, many)) for many in (7, 6, 6)),
+                f'{sign}i4', f'{sign}u4'],
+    'offsets': [*_counts(joints), *(at + 8 for at in _counts(joints)), 24 + 152 * joints,
+                28 + 152 * joints], 'itemsize': 32 + 152 * joints})
+    for order, sign in ORDERS.items() for joints in (1, 2)}
 _LEG_POINT = {effort: np.dtype({
     'names': ['positions', 'velocities', 'accelerations', 'efforts', 'position', 'velocity',
               'effort', 'sec', 'nanosec'],
@@ -48,33 +57,36 @@ _LEG_POINT = {effort: np.dtype({
     for effort, end in ((True, 168), (False, 120))}
 
 
-def points_of(data: bytes, gaps: list[slice]) -> tuple[int, int]:
+def points_of(data: bytes, gaps: list[slice], most_joints: int = 1,
+              ) -> tuple[list[bytes], int, int]:
     """
-    Return how many points a MultiDOFJointTrajectory of one joint has, and where they begin.
+    Return joint_names and number of points of a MultiDOFJointTrajectory, and where they begin.
 
-    Bytes before them that only align are added to the gaps.
+    Bytes before the points that only align are added to the gaps.
     """
     count = COUNT[data[1]]
     size = count.unpack_from(data, 12)[0]
-    names, at = sequence(data, 16 + size, count, gaps)
-    if names > 1:
-        raise MalformedError(f'{names} joint_names: must be at most one')
-    for _ in range(names):
+    joints, at = sequence(data, 16 + size, count, gaps)
+    if joints > most_joints:
+        raise MalformedError(f'{joints} joint_names: must be at most {most_joints}')
+    names = []
+    for _ in range(joints):
         length, at = sequence(data, at, count, gaps)
+        names.append(text(data, at, length))
         at += length
-    return sequence(data, at, count, gaps)
+    return names, *sequence(data, at, count, gaps)
 
 
 class PlatformTrajectory:
     """
-    Reads a trajectory_msgs/MultiDOFJointTrajectory of one joint and any number of points.
+    Reads a trajectory_msgs/MultiDOFJointTrajectory of one or two joints and any number of points.
 
     Parameters
     ----------
     data : bytes
         The message.
 
-    Raises MalformedError where it has no header, or more than one joint.
+    Raises MalformedError where it has no header, or more than two joints.
 
     """
 
@@ -82,27 +94,29 @@ class PlatformTrajectory:
         try:
             order = data[1]
             sec, nanosec, size = TIME_AND_LENGTH[order].unpack_from(data, 4)
-            self.size, self._first = points_of(data, [])
+            self.names, self.size, self._first = points_of(data, [], 2)
         except READ_ERRORS as exc:
             raise MalformedError(f'{len(data)} bytes: {exc}') from exc
         self.stamp = nanoseconds(data, sec, nanosec)
         self.frame = text(data, 16, size)
         self._data = data
         self._begin = (self._first - 4 & ~7) + 4
-        kind = _PLATFORM_POINT[order]
+        self.joints = max(len(self.names), 1)
+        self._kind = kind = _PLATFORM_POINT[order, self.joints]
         whole = max(0, (len(data) - self._begin) // kind.itemsize)
         self._records: NDArray[np.void] = np.frombuffer(
             data, kind, min(whole, self.size), self._begin) if whole else np.empty(0, kind)
 
     def points(self, first: int, end: int) -> NDArray[np.void]:
         """
-        Return points by their index: fields pose (7), twist (6), accel (6), sec and nanosec.
+        Return points by their index.
 
-        Those before them must have been read. Raises MalformedError where one has not one
-        transform, velocity and acceleration: what follows it cannot be found.
+        Their fields are pose (joints, 7), twist and accel (joints, 6), sec and nanosec. Those
+        before them must have been read. Raises MalformedError where one has not one transform,
+        velocity and acceleration for each joint: what follows it cannot be found.
         """
         records = self._records[first:end]
-        other = np.logical_or.reduce([records[part] != 1 for part in _PARTS])
+        other = np.logical_or.reduce([records[part] != self.joints for part in _PARTS])
         other[:first == 0] = True  # its first count may stand elsewhere
         for n in np.flatnonzero(other).tolist():
             self._check_counts(first + n)
@@ -113,14 +127,14 @@ class PlatformTrajectory:
         return records
 
     def _check_counts(self, n: int) -> None:
-        kind = _PLATFORM_POINT[self._data[1]]
-        begin = self._begin + n * kind.itemsize
-        for part, at in zip(_PARTS, (begin if n else self._first, begin + 64, begin + 120),
-                            strict=True):
+        begin = self._begin + n * self._kind.itemsize
+        for part, offset in zip(_PARTS, _counts(self.joints), strict=True):
+            at = begin + offset if n or offset else self._first
             if at + 4 <= len(self._data):
                 number, = COUNT[self._data[1]].unpack_from(self._data, at)
-                if number != 1:
-                    raise MalformedError(f'points[{n}]: {number} {part}: each point has one')
+                if number != self.joints:
+                    has = 'one' if self.joints == 1 else 'one for each joint'
+                    raise MalformedError(f'points[{n}]: {number} {part}: each point has {has}')
 
 
 class LegTrajectory:

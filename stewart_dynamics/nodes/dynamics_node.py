@@ -135,10 +135,10 @@ class DynamicsNode(LifecycleNode):
         self._measured_legs = MeasuredLegs(
             parameters, models.external_wrench, self._on_rejection, self._on_notice)
         self._diagnostics = DynamicsDiagnostics(
-            parameters, self._setpoints.topics, time.monotonic())
+            parameters, self._setpoints.topics, self._setpoints.base.topics, time.monotonic())
         self._queue = SetpointQueue(
-            models.step, self._publish, self._reject_joined, self._take_waiting,
-            self._on_answered)
+            models.step, self._publish, self._setpoints.on_base, self._reject_joined,
+            self._take_waiting, self._on_answered)
         self._markers = MarkersPublisher(parameters, self._topics.publishers.get(MARKERS))
         self._handled, self._rested = -math.inf, False
         self._active = True
@@ -176,7 +176,7 @@ class DynamicsNode(LifecycleNode):
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
         self._messages = OutputMessages(self._settings)
-        self._topics.make(self._settings, self._on_setpoint, {
+        self._topics.make(self._settings, self._on_setpoint, self._on_base, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
@@ -216,7 +216,10 @@ class DynamicsNode(LifecycleNode):
         return now
 
     def _take_waiting(self) -> None:
-        take_waiting_messages(self.executor, self._topics.setpoints, self._on_setpoint, QUEUE)
+        executor, topics = self.executor, self._topics
+        if topics.base:
+            take_waiting_messages(executor, topics.base, self._on_base, QUEUE)
+        take_waiting_messages(executor, topics.setpoints, self._on_setpoint, QUEUE)
 
     def _answer(self) -> None:
         if self._active:
@@ -227,7 +230,10 @@ class DynamicsNode(LifecycleNode):
         for topic, message in self._messages.of_output(output):
             publishers[topic].publish(message)
         self._markers.answered(setpoint, output)
-        if self._diagnostics.answered(output, came, time.monotonic()):
+        now = time.monotonic()
+        if setpoint.base is not None:
+            self._diagnostics.base.answered(setpoint, now)
+        if self._diagnostics.answered(output, came, now):
             self._report()
 
     def _on_answered(self) -> bool:
@@ -239,7 +245,14 @@ class DynamicsNode(LifecycleNode):
         executor.create_task(self._answer)
         return True
 
-    # -- wrench, measured legs, planned trajectories ----------------------------------------
+    # -- base, wrench, measured legs, planned trajectories ----------------------------------
+
+    def _on_base(self, topic: str, data: bytes) -> None:
+        if self._active:
+            now = time.monotonic()
+            self._diagnostics.base.heard(topic, now)
+            if self._setpoints.base.take(topic, data, self._ros_time):
+                self._diagnostics.base.sampled(self._setpoints.base, now)
 
     def _on_wrench(self, data: bytes) -> None:
         if self._active:
@@ -255,7 +268,8 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         diagnostics, target = self._diagnostics.external_wrench, self._queue.target
         diagnostics.heard(now)
-        estimate = self._measured_legs.take(data, self._setpoints.wrench, target)
+        estimate = self._measured_legs.take(
+            data, self._setpoints.wrench, target, self._setpoints.base)
         if estimate is None:
             return
         if estimate.wrench is not None:
@@ -272,8 +286,9 @@ class DynamicsNode(LifecycleNode):
             self._on_outcome(
                 planned.rejected(planned.QUEUE_FULL, f'{LENGTH} are in work or wait'), now)
             return
-        # Parameters and load are those of now, whatever changes meanwhile.
-        self._planned.add(planned.answer(self._settings, self._setpoints.wrench, data), now)
+        # Parameters, load and gravity are those of now, whatever changes meanwhile.
+        self._planned.add(planned.answer(
+            self._settings, self._setpoints.wrench, data, self._setpoints.base.gravity), now)
 
     def _on_outcome(self, outcome: planned.Outcome, came: float) -> None:
         if outcome.answer:

@@ -36,10 +36,12 @@ class SetpointQueue:
         Computes the answers. It may be replaced at any time: ``step``.
     publish : callable
         Publishes an answer: setpoint, output, when the setpoint came [s].
+    on_base : callable
+        Returns a setpoint with the base's motion, as far as it is known.
     reject : callable
         Called with reason and details of a setpoint that is not answered.
     take_waiting : callable
-        Adds the setpoints that wait in the middleware.
+        Adds the setpoints that wait in the middleware, with all that belongs to them.
     answered : callable
         Called once all that waited is answered. Returns whether it will call ``answer`` again,
         behind the messages that have come meanwhile; until then setpoints are gathered.
@@ -47,12 +49,14 @@ class SetpointQueue:
     """
 
     def __init__(self, step: Step, publish: Callable[[Setpoint, Output, float], None],
+                 on_base: Callable[[Setpoint], Setpoint],
                  reject: Callable[[str, str], None], take_waiting: Callable[[], None],
                  answered: Callable[[], bool]) -> None:
         self.step = step
         self.target: tuple[float, ...] | None = None
         """The motion of the last setpoint that was answered."""
         self._publish = publish
+        self._on_base = on_base
         self._reject = reject
         self._take_waiting = take_waiting
         self._answered = answered
@@ -86,6 +90,7 @@ class SetpointQueue:
         self._busy = self._answered()
 
     def _answer_one(self, setpoint: Setpoint, came: float) -> None:
+        setpoint = self._on_base(setpoint)
         if self._restarting:
             setpoint = setpoint._replace(restart=True)
         output = self.step(setpoint, None if self._last is None else self._last.singularity)

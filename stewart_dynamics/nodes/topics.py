@@ -27,13 +27,13 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
-from stewart_dynamics.runtime.input_topics import INPUT_TYPES, SOURCES
+from stewart_dynamics.runtime.input_topics import BASE_SOURCES, INPUT_TYPES, SOURCES
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
@@ -53,6 +53,7 @@ _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/WrenchStamped': WrenchStamped,
     'trajectory_msgs/msg/MultiDOFJointTrajectory': MultiDOFJointTrajectory,
     'sensor_msgs/msg/JointState': JointState,
+    'sensor_msgs/msg/Imu': Imu,
     'std_msgs/msg/Float64MultiArray': Float64MultiArray,
     'std_msgs/msg/Float64': Float64,
     'std_msgs/msg/Bool': Bool,
@@ -74,19 +75,21 @@ class Topics:
     ----------
     publishers : dict of str to Publisher
         By topic, without the node's name.
-    setpoints : dict of str to Subscription
-        Those of the setpoint topics; raw ones.
+    setpoints, base : dict of str to Subscription
+        Those of the setpoint topics and of the topics of the base; raw ones.
 
     """
 
     def __init__(self, node: LifecycleNode) -> None:
         self.publishers: dict[str, Publisher] = {}
         self.setpoints: dict[str, Any] = {}
+        self.base: dict[str, Any] = {}
         self._node = node
         self._destroy: list[Callable[[], Any]] = []
         self._names: dict[str, str] = {}
 
     def make(self, parameters: Parameters, on_setpoint: Callable[[str, bytes], None],
+             on_base: Callable[[str, bytes], None],
              others: Mapping[str, Callable[[bytes], None]]) -> None:
         """
         Make all of them.
@@ -94,9 +97,9 @@ class Topics:
         Parameters
         ----------
         parameters : Parameters
-            Which setpoint topics, and whether there are markers.
-        on_setpoint : callable
-            Gets topic and bytes of a message on a setpoint topic.
+            Which setpoint topics, which of the base, and whether there are markers.
+        on_setpoint, on_base : callable
+            Gets topic and bytes of a message on a setpoint topic, or on one of the base.
         others : mapping of topic to callable
             What gets the bytes of a message on the other topics.
 
@@ -111,18 +114,22 @@ class Topics:
         self._publish(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), '/diagnostics')
         if parameters['visualization_rate']:
             self._publish(MARKERS, MarkerArray, QoSProfile(depth=1))
-        self.setpoints = {
-            topic: self._subscribe(_TYPES[_INPUT_TYPES[topic]], topic, partial(on_setpoint, topic))
-            for topic in SOURCES[parameters['setpoint.source']]}
-        inputs = {**self.setpoints, **{
+        # The executor takes messages in the order of the subscriptions: a setpoint needs those of
+        # the base that have come before it.
+        self.base, self.setpoints = ({
+            topic: self._subscribe(_TYPES[_INPUT_TYPES[topic]], topic, partial(take, topic))
+            for topic in topics} for topics, take in (
+                (BASE_SOURCES[parameters['base.source']], on_base),
+                (SOURCES[parameters['setpoint.source']], on_setpoint)))
+        inputs = {**self.base, **self.setpoints, **{
             topic: self._subscribe(
                 _TYPES[_INPUT_TYPES[topic]], topic, callback, _QUEUES.get(topic, QUEUE))
             for topic, callback in others.items()}}
         self._names = {topic: subscription.topic_name for topic, subscription in inputs.items()}
 
     def writers(self) -> dict[str, int]:
-        """Return how many publishers each setpoint topic has."""
-        return {topic: self.writers_of(topic) for topic in self.setpoints}
+        """Return how many publishers each topic of setpoints and base has."""
+        return {topic: self.writers_of(topic) for topic in (*self.setpoints, *self.base)}
 
     def writers_of(self, topic: str) -> int:
         """Return how many publishers an input topic has."""
@@ -130,7 +137,7 @@ class Topics:
 
     def destroy(self) -> None:
         """Destroy all of them."""
-        self.publishers, self.setpoints, self._names = {}, {}, {}
+        self.publishers, self.setpoints, self.base, self._names = {}, {}, {}, {}
         while self._destroy:
             self._destroy.pop()()
 

@@ -52,8 +52,9 @@ from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import base_wrench, input_topics as inputs, step
 from stewart_dynamics.runtime.base_wrench import BaseWrench
 from stewart_dynamics.runtime.output_messages import OutputMessages
+from stewart_dynamics.runtime.recorded_messages import Messages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
-from stewart_dynamics.runtime.setpoint_joining import Messages, Setpoints
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Batch, Step
 
 _SECOND = 1_000_000_000

@@ -26,7 +26,7 @@ from stewart_dynamics.replay.bag_files import files_of, unpack
 from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.replay.mcap_recording import McapRecording
 from stewart_dynamics.replay.message_blocks import of_good_length, Source
-from stewart_dynamics.runtime.setpoint_joining import Messages
+from stewart_dynamics.runtime.recorded_messages import Messages
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'

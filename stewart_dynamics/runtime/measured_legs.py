@@ -25,11 +25,14 @@ from collections.abc import Callable
 
 from stewart_dynamics.arrays import Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
+from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.base_input import BaseInput
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
-from stewart_dynamics.runtime.rejections import MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE
+from stewart_dynamics.runtime.rejections import (
+    BASE_NOT_KNOWN, MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
 
 # Under the node's name.
 MEASURED_LEGS = 'measured_legs'
@@ -72,7 +75,8 @@ class MeasuredLegs:
         self._noticed = noticed
         self._last: Estimate | None = None
 
-    def take(self, data: bytes, known: Six, target: tuple[float, ...] | None) -> Estimate | None:
+    def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
+             base: BaseInput | None = None) -> Estimate | None:
         """
         Return the estimate from a message, or None where it is rejected.
 
@@ -82,13 +86,19 @@ class MeasuredLegs:
             A sensor_msgs/JointState as it came, CDR.
         known, target
             See ``ExternalWrench``.
+        base : BaseInput, optional
+            The motion of the base; none: it is still.
 
         """
         measurement = self._sound(data)
         if measurement is None or not self._in_time(measurement.stamp):
             return None
+        row = (base.at(measurement.stamp) if base else None) or NO_BASE
+        if base and base.topics and row[0] != row[0]:
+            self._reject(BASE_NOT_KNOWN, f'stamp {measurement.stamp} ns')
+            return None
         try:
-            self._last = self.step(measurement, self._last, known, target)
+            self._last = self.step(measurement, self._last, known, target, row)
         except StewartError as exc:
             self._reject(_OF_ERROR[type(exc)], str(exc))
             return None

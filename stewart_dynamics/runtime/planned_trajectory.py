@@ -35,6 +35,7 @@ from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
+from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.cubics import Cubics
 from stewart_dynamics.mechanics.interpolation import Interpolation
 from stewart_dynamics.mechanics.motion import Motion
@@ -74,7 +75,8 @@ _Samples = tuple[Integers, Array]
 
 
 def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion: Motion,
-                             wrench: ArrayLike | None = None) -> PlannedTrajectory:
+                             wrench: ArrayLike | None = None, base: BaseMotion | None = None,
+                             ) -> PlannedTrajectory:
     """
     Check a planned trajectory against limits and singularities, and compute what the legs do.
 
@@ -95,6 +97,9 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     wrench : (6,), optional
         Force [N] and moment [N m] that act on the platform at its origin all the time, base axes;
         None by default.
+    base : BaseMotion of shape () or (N,), optional
+        How the base moves: all the time alike, or at the points, and between two of them along
+        the straight line; by default it is still.
 
     Returns
     -------
@@ -127,13 +132,20 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     load = optional_array('wrench', wrench, (WRENCH,))
     if load.shape != (WRENCH,):
         raise MotionError(f'wrench: shape {load.shape}: must be ({WRENCH},)')
-    *_, result = check_in_pieces(platform, stamps, motion.rows, load, _LARGE_PIECE)
+    if base is not None:
+        if not isinstance(base, BaseMotion):
+            raise wrong_type('base', base, 'a BaseMotion')
+        if base.shape not in ((), motion.shape):
+            raise MotionError(f'base: shape {base.shape}: must be () or {motion.shape}')
+    *_, result = check_in_pieces(platform, stamps, motion.rows, load,
+                                 None if base is None else base.rows, _LARGE_PIECE)
     assert result is not None  # the last one
     return result
 
 
 def check_in_pieces(platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
-                    piece: int = PIECE) -> Iterator[PlannedTrajectory | None]:
+                    bases: Array | None = None, piece: int = PIECE,
+                    ) -> Iterator[PlannedTrajectory | None]:
     """
     Yield None after each piece of the work, and the result at the end.
 
@@ -147,11 +159,13 @@ def check_in_pieces(platform: StewartPlatform, times: Stamps, rows: Array, wrenc
         Rows of motion, finite, their rotations checked.
     wrench : (6,)
         External wrench at the platform's origin, base axes [N, N m].
+    bases : (BASE,) or (N, BASE), optional
+        Rows of the base's motion; none: it is still.
     piece : int
         At most so many intervals are worked on between two yields.
 
     """
-    work = _Work(platform, times, rows, wrench, piece)
+    work = _Work(platform, times, rows, wrench, bases, piece)
     try:
         yield from work.check()
     except _RejectedError as exc:
@@ -177,10 +191,11 @@ class _Work:
     """The work on one trajectory; see ``check_in_pieces``."""
 
     def __init__(self, platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
-                 piece: int) -> None:
+                 bases: Array | None, piece: int) -> None:
         self._platform, self._times, self._motions = platform, times, rows
         self._parameters = platform.parameters
         self._wrench = wrench[None]
+        self._bases = bases
         self._piece = piece
         self._legs = np.empty((len(times), 18))
         self._checks = Checks(self._parameters)
@@ -199,7 +214,7 @@ class _Work:
         """Check from one point to another, both included."""
         block = slice(first, end + 1)
         motions, times = self._motions[block], _seconds(self._times[block])
-        results = self._platform.solve(motions, self._wrench)
+        results = self._solve(motions, np.arange(first, end + 1), 0.0)
         for here, there in ((_LENGTHS, LENGTHS), (_RATES, RATES), (_FORCES, FORCES)):
             self._legs[block, here] = results[:, there]
         durations = _seconds(np.diff(self._times[block]))
@@ -223,12 +238,25 @@ class _Work:
             self._check_legs_path(
                 at, after, legs.selected(which), fraction, durations[which], rows)
             for n in self._checks.check(
-                    at, after, self._platform.solve(rows, self._wrench), joined, joined):
+                    at, after, self._solve(rows, first + which, fraction), joined, joined):
                 if step[n] > _CLOSEST:
                     self._count(_PARTS)
                     closer.append(
                         (np.full(_PARTS + 1, which[n]), fraction[n] + step[n] * _IN_PARTS))
         yield
+
+    def _solve(self, rows: Array, which: Integers, fraction: Array | float) -> Array:
+        """Return the results of rows of motion, so far between the points ``which`` and next."""
+        bases = self._bases
+        if bases is not None:
+            if bases.ndim == 1:
+                bases = bases[None]
+            elif np.ndim(fraction):
+                bases = bases[which] + np.reshape(fraction, (-1, 1)) * (
+                    bases[which + 1] - bases[which])
+            else:
+                bases = bases[which]
+        return self._platform.solve(rows, self._wrench, bases)
 
     def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
                          durations: Array, rows: Array) -> None:

@@ -22,13 +22,18 @@ setpoints are answered between them.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from numpy.typing import NDArray
+
 from stewart_dynamics.arrays import Array, Six, Stamps
+from stewart_dynamics.mechanics.base_motion import row_of_motion
 from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.mechanics.rows import consecutive, MOTION, POSITION, ROTATION
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LINEAR_ACCELERATION, MOTION,
+    POSITION, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
@@ -37,7 +42,7 @@ from stewart_dynamics.runtime.planned_trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE)
 from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
 from stewart_dynamics.runtime.rejections import (
-    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
+    BASE_NOT_KNOWN, frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 from stewart_dynamics.runtime.samples import unit_quaternions
 
 INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
@@ -80,7 +85,8 @@ def rejected(reason: str, details: str) -> Outcome:
     return Outcome(f'rejected: {reason}: {details}', reason)
 
 
-def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome | None]:
+def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None = None,
+           ) -> Iterator[Outcome | None]:
     """
     Yield None after each piece of the work, and the outcome at the end.
 
@@ -91,12 +97,19 @@ def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome
     wrench : (6,)
         External wrench at the platform's origin, base axes [N, N m].
     data : bytes
-        A trajectory_msgs/MultiDOFJointTrajectory as received.
+        A trajectory_msgs/MultiDOFJointTrajectory as received. Its second joint, if it has one,
+        is the base, which moves in the world as its points say.
+    base : (BASE,), optional
+        A row of the base's motion for a trajectory without the base, one of nan: it is not
+        known; none: it is still.
 
     """
     try:
         message = _checked_header(data, parameters['base_frame'])
-        times, rows = yield from _read(message)
+        times, rows, given = yield from _read(message, parameters)
+        if given is None and base is not None and np.isnan(base).any():
+            raise _RejectedError(
+                BASE_NOT_KNOWN, 'give it with the points, or publish the topics of the base')
     except MalformedError as exc:
         yield rejected(MALFORMED, str(exc))
         return
@@ -104,7 +117,8 @@ def answer(parameters: Parameters, wrench: Six, data: bytes) -> Iterator[Outcome
         yield exc.outcome
         return
     result = None
-    for result in check_in_pieces(StewartPlatform(parameters), times, rows, np.array(wrench)):
+    for result in check_in_pieces(StewartPlatform(parameters), times, rows, np.array(wrench),
+                                  base if given is None else given):
         if result is None:
             yield None
     assert result is not None  # the last one
@@ -121,12 +135,23 @@ def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
         raise _RejectedError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
     if not 1 <= message.size <= MOST_POINTS:
         raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
+    if message.joints == 2 and message.names[1] != base_frame.encode():
+        name = message.names[1][:60].decode(errors='replace')
+        raise MalformedError(
+            f'joint_names[1]: {name!r}: the second joint is the base, {base_frame!r}')
     return message
 
 
-def _read(message: PlatformTrajectory) -> Generator[None, None, tuple[Stamps, Array]]:
-    """Return times (N,) [ns] and rows of motion (N, MOTION) of a trajectory; reject bad points."""
+def _read(message: PlatformTrajectory, parameters: Parameters,
+          ) -> Generator[None, None, tuple[Stamps, Array, Array | None]]:
+    """
+    Return times (N,) [ns], rows of motion (N, MOTION), and of the base (N, BASE) if given.
+
+    Bad points are rejected.
+    """
     times, rows = np.empty(message.size, dtype=np.int64), np.empty((message.size, MOTION))
+    bases = np.empty((message.size, BASE)) if message.joints == 2 else None
+    gravity = parameters['gravity'].tolist()
     for first in range(0, message.size, _READ):
         end = min(first + _READ, message.size)
         points = message.points(first, end)
@@ -141,10 +166,19 @@ def _read(message: PlatformTrajectory) -> Generator[None, None, tuple[Stamps, Ar
             n = first + stuck
             raise _RejectedError(NOT_INCREASING, f'points[{n}]: {times[n] * 1e-9:.9g} s, ' + (
                 f'after {times[n - 1] * 1e-9:.9g} s' if n else 'must be at least 0'))
-        rows[first:end] = _rows(
-            first, np.column_stack([points['pose'], points['twist'], points['accel']]))
+        rows[first:end] = _rows(first, _numbers(points, 0))
+        if bases is not None:
+            r: Any = _rows(first, _numbers(points, 1)).T
+            bases[first:end] = np.stack(np.broadcast_arrays(*row_of_motion(
+                r[ROTATION], r[LINEAR_ACCELERATION], r[ANGULAR_VELOCITY],
+                r[ANGULAR_ACCELERATION], gravity)), axis=-1)
         yield
-    return times, rows
+    return times, rows, bases
+
+
+def _numbers(points: NDArray[np.void], joint: int) -> Array:
+    """Return pose, twist and acceleration of a joint at points (N, 19)."""
+    return np.column_stack([points[part][:, joint] for part in ('pose', 'twist', 'accel')])
 
 
 def _rows(first: int, numbers: Array) -> Array:

@@ -23,11 +23,13 @@ from typing import NamedTuple
 from stewart_dynamics.mechanics.rotation import QUATERNION_TOLERANCE
 from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
 
-__all__ = ['DROPPED', 'frame_details', 'length_details', 'MALFORMED', 'NOT_EXCLUSIVE',
-           'NOT_FINITE', 'NOT_JOINED', 'NOT_UNIT', 'OUT_OF_RANGE', 'Rejection', 'Rejections',
-           'TOO_OLD', 'TWICE', 'WRONG_FRAME']
+__all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'length_details', 'MALFORMED',
+           'NOT_EXCLUSIVE', 'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT',
+           'OUT_OF_RANGE', 'Rejection', 'Rejections', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
 
+BASE_NOT_KNOWN = "the base's motion is not known"
 NOT_UNIT = 'quaternion not of unit length'
+NOT_MEASURED = 'not measured'
 WRONG_FRAME = 'wrong frame_id'
 TOO_OLD = 'older than the last used'
 TWICE = 'same stamp twice'
@@ -73,9 +75,10 @@ class Rejections:
         self._rejected(rejection, details)
 
 
-def frame_details(frame: bytes, base_frame: bytes) -> str:
+def frame_details(frame: bytes, wanted: bytes) -> str:
     """Return the details of a WRONG_FRAME."""
-    return f'{frame[:60].decode(errors="replace")!r}, must be {base_frame.decode()!r} or empty'
+    given, must = (each[:60].decode(errors='replace') for each in (frame, wanted))
+    return f'{given!r}, must be {must!r} or empty'
 
 
 def length_details(length: float) -> str:

@@ -29,13 +29,21 @@ from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
 from stewart_dynamics.mechanics.rotation import from_quaternion, is_unit, quaternion_length
 from stewart_dynamics.messages.cdr import finite, MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
-from stewart_dynamics.messages.setpoint import combined, layout_of, pose, twist, wrench
-from stewart_dynamics.runtime.input_topics import ACCEL, COMBINED, POSE, TWIST, WRENCH
+from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
+from stewart_dynamics.runtime.input_topics import (
+    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST, COMBINED, POSE, TWIST, WRENCH)
 from stewart_dynamics.runtime.rejections import (
-    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, Rejections, WRONG_FRAME)
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, Rejections,
+    WRONG_FRAME)
 
 _READERS: dict[str, Callable[[bytes], Stamped]] = {
-    POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench}
+    POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench,
+    BASE_POSE: pose, BASE_TWIST: twist, BASE_ACCEL: twist, BASE_IMU: imu}
+
+# Of the values of an IMU: angular velocity, specific force, and the first entries of their
+# covariances, which are -1 where a quantity is not measured. Its orientation is not used.
+_OF_IMU = (13, 14, 15, 25, 26, 27)
+_COVARIANCES = {16: 'angular_velocity_covariance', 28: 'linear_acceleration_covariance'}
 
 
 class SampleReader:
@@ -48,18 +56,18 @@ class SampleReader:
     ----------
     topic : str
         One of ``input_topics``.
-    base_frame : str
-        The frame that messages must have, or none.
+    frame : str or None
+        The frame that messages must have, or none; None: that of the first message.
     rejections : Rejections
         Counts what is rejected.
 
     """
 
-    def __init__(self, topic: str, base_frame: str, rejections: Rejections) -> None:
+    def __init__(self, topic: str, frame: str | None, rejections: Rejections) -> None:
         self._topic = topic
         self._reader = _READERS[topic]
-        self._has_pose = topic in (POSE, COMBINED)
-        self._base_frame = base_frame.encode()
+        self._has_pose = topic in (POSE, COMBINED, BASE_POSE)
+        self._frame = None if frame is None else frame.encode()
         self._rejections = rejections
         self._layout: Layout | None = None
 
@@ -72,13 +80,21 @@ class SampleReader:
             except MalformedError as exc:
                 self._rejections.reject(self._topic, MALFORMED, str(exc))
                 return None
-            if frame not in (b'', self._base_frame):
+            if self._frame is None:
+                self._frame = frame
+            if frame not in (b'', self._frame):
                 self._rejections.reject(
-                    self._topic, WRONG_FRAME, frame_details(frame, self._base_frame))
+                    self._topic, WRONG_FRAME, frame_details(frame, self._frame))
                 return None
             self._layout = self._layout or layout_of(self._reader, data)
         else:
             stamp, values = read
+        if self._topic == BASE_IMU:
+            for at, name in _COVARIANCES.items():
+                if values[at] == -1.0:
+                    self._rejections.reject(self._topic, NOT_MEASURED, f'{name}[0] is -1')
+                    return None
+            values = tuple([values[at] for at in _OF_IMU])
         if not finite(values):
             self._rejections.reject(self._topic, NOT_FINITE, str(values))
             return None
@@ -112,6 +128,10 @@ class SampleReader:
         if self._layout is None or np.any(sizes != self._layout.size):
             return None
         alike, stamps, values = self._layout.read(data, starts)
+        if self._topic == BASE_IMU:
+            if (values[:, list(_COVARIANCES)] == -1.0).any():
+                return None
+            values = np.ascontiguousarray(values[:, _OF_IMU])
         if not alike.all() or not np.isfinite(values).all():
             return None
         if not self._has_pose:
@@ -132,7 +152,9 @@ class SampleReader:
             frame = self._reader(data).frame
         except MalformedError:
             return
-        if frame in (b'', self._base_frame):
+        if self._frame is None:
+            self._frame = frame
+        if frame in (b'', self._frame):
             self._layout = layout_of(self._reader, data)
 
 

@@ -76,6 +76,11 @@ class Output(NamedTuple):
     warning_changed: bool
     exceedances: tuple[Exceedance, ...]
 
+    @property
+    def solvable(self) -> bool:
+        """Return whether J_inv can be solved."""
+        return self.condition < UNSOLVABLE_CONDITION
+
 
 class Batch(NamedTuple):
     """Setpoints one after the other, N of them."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.diagnostics.base import BaseDiagnostics
 from stewart_dynamics.runtime.diagnostics.external_wrench import ExternalWrenchDiagnostics
 from stewart_dynamics.runtime.diagnostics.limits import LimitsDiagnostics
 from stewart_dynamics.runtime.diagnostics.periodic_report import Report, TICK
@@ -39,23 +40,26 @@ class DynamicsDiagnostics:
     ----------
     parameters : Parameters
         Names, timeouts and thresholds.
-    topics : sequence of str
-        The setpoint topics that are joined.
+    topics, base_topics : sequence of str
+        The setpoint topics that are joined, and those of the base.
     now : float
         The time of the activation.
 
     """
 
-    def __init__(self, parameters: Parameters, topics: Sequence[str], now: float) -> None:
+    def __init__(self, parameters: Parameters, topics: Sequence[str],
+                 base_topics: Sequence[str], now: float) -> None:
+        self._base_topics = base_topics
         self._answers = Answers(parameters['setpoint.timeout'], now)
         self.setpoints = SetpointDiagnostics(parameters, topics, self._answers, now)
         self.singularity = SingularityDiagnostics(parameters, self._answers, now)
         self.limits = LimitsDiagnostics(parameters, self._answers)
+        self.base = BaseDiagnostics(parameters, base_topics)
         self.timing = TimingDiagnostics(self._answers, now)
         self.planned_trajectory = PlannedTrajectoryDiagnostics()
         self.external_wrench = ExternalWrenchDiagnostics(parameters)
         self.report = Report([
-            self.setpoints, self.singularity, self.limits, self.timing,
+            self.setpoints, self.singularity, self.limits, self.base, self.timing,
             self.planned_trajectory, self.external_wrench], now)
 
     def answered(self, output: Output, came: float, now: float) -> bool:
@@ -78,6 +82,8 @@ class DynamicsDiagnostics:
         """Note a rejection of whatever topic."""
         if rejection.topic == MEASURED_LEGS:
             self.external_wrench.rejected(rejection, details, now)
+        elif rejection.topic in self._base_topics:
+            self.base.rejected(rejection, details, now)
         else:
             self.setpoints.rejected(rejection, details, now)
             self.timing.rejected(rejection, details, now)

@@ -28,11 +28,12 @@ _NAME = 'singularity'
 
 def singularity_state(output: Output, parameters: Parameters) -> Level:
     """Return the level of one output, and its cause with the output's own numbers."""
-    if output.demanded_forces is None:
+    if not output.solvable:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
     state = output.singularity
     if state.stopped:
-        suppressed = '' if output.forces is not None else ': forces suppressed'
+        suppresses = parameters['singularity.action'] == 'suppress_forces'
+        suppressed = ': forces suppressed' if suppresses else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: '
                      + _condition(output, parameters, 'stop_condition'))
     if not state.warning:
@@ -100,7 +101,7 @@ class SingularityDiagnostics:
         crossing = Level(ERROR, _crossing(before, output))
         self._crossings.append(crossing.message)
         self._crossing.see(crossing, now)
-        stopped = output.singularity.stopped or output.demanded_forces is None
+        stopped = output.singularity.stopped or not output.solvable
         self._state.see(state if stopped else FINE, now)
         return now - self._crossing_logged_at >= PERIOD
 
