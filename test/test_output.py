@@ -35,6 +35,7 @@ from referees import ROOT
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 from stewart_dynamics import Parameters
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
@@ -64,10 +65,17 @@ def times_of(number: int, first: int = 0) -> NDArray[np.int64]:
     return RECORDED + 1000 * np.arange(first, first + number, dtype=np.int64)
 
 
+def base_wrenches_of(outputs: Outputs) -> Array:
+    """Return base wrenches, some of them not known."""
+    wrenches = 1e-9 * outputs.stamps[:, None] * np.arange(1.0, 7.0)
+    wrenches[outputs.stamps // 1_000_000 % 7 == 0] = np.nan
+    return wrenches
+
+
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:
     bag = OutputBag(folder, NODE, OutputMessages(PARAMETERS))
     for times, outputs in blocks:
-        bag.write(times, outputs)
+        bag.write(times, outputs, base_wrenches_of(outputs))
     bag.close()
     return folder
 
@@ -103,6 +111,12 @@ def check_message(topic: str, message: Any, outputs: Outputs, n: int) -> None:
         assert np.array_equal(message.data, outputs.forces[n])
     elif topic == 'jacobian_determinant':
         assert message.data == outputs.determinants[n]
+    elif topic == 'base_wrench':
+        stamp, force, torque = message.header.stamp, message.wrench.force, message.wrench.torque
+        assert stamp.sec * 1_000_000_000 + stamp.nanosec == outputs.stamps[n]
+        assert message.header.frame_id == PARAMETERS['base_frame']
+        assert np.array_equal((force.x, force.y, force.z, torque.x, torque.y, torque.z),
+                              base_wrenches_of(outputs)[n])
     else:
         assert message.data == outputs.warnings[n]
         assert outputs.changed[n]
@@ -112,7 +126,8 @@ def expected_of(outputs: Outputs) -> dict[str, int]:
     forces = int(np.isfinite(outputs.forces[:, 0]).sum())
     many = len(outputs.stamps)
     return {'leg_states': many, 'leg_lengths': many, 'leg_forces': forces,
-            'jacobian_determinant': many, 'singularity_warning': int(outputs.changed.sum())}
+            'jacobian_determinant': many, 'singularity_warning': int(outputs.changed.sum()),
+            'base_wrench': int(np.isfinite(base_wrenches_of(outputs)[:, 0]).sum())}
 
 
 def test_mcap_reads_the_numbers(turned: tuple[Path, Outputs]) -> None:

@@ -26,6 +26,7 @@ import numpy as np
 import pytest
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.runtime.base_wrench import BASE_WRENCH
 from stewart_dynamics.runtime.external_wrench import Estimate
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Batch, Setpoint, Step
@@ -62,7 +63,8 @@ def test_messages_carry_the_output() -> None:
     for setpoint, wrench in rows(parameters, 10):
         output = answered(step, setpoint, wrench)
         messages = list(written.of_output(output))
-        assert [topic for topic, _ in messages] == list(OUTPUT_TYPES)
+        assert [topic for topic, _ in messages] == [
+            topic for topic in OUTPUT_TYPES if topic != BASE_WRENCH]
         of = decoded(messages)
         state = of['leg_states']
         assert state.header.stamp.sec * 10 ** 9 + state.header.stamp.nanosec == setpoint.stamp
@@ -143,6 +145,24 @@ def test_an_external_wrench_is_written_in_the_base_frame() -> None:
     assert read.header.stamp.sec * 10 ** 9 + read.header.stamp.nanosec == STAMP
     force, torque = read.wrench.force, read.wrench.torque
     assert (force.x, force.y, force.z, torque.x, torque.y, torque.z) == wrench
+
+
+@pytest.mark.parametrize('frame', ['base', 'sol', 'é', ''])
+def test_base_wrenches_are_written_alike_one_by_one_and_together(frame: str) -> None:
+    written = OutputMessages(PARAMETERS.replaced({'base_frame': frame} if frame else {}))
+    stamps = STAMP + 10 ** 9 * np.arange(4)
+    wrenches = np.arange(24.0).reshape(4, 6) - 11.5
+    wrenches[2] = np.nan
+    topic, which, many = written.of_base_wrenches(stamps, wrenches)
+    assert OUTPUT_TYPES[topic] == 'geometry_msgs/msg/WrenchStamped'
+    assert which.tolist() == [0, 1, 3]
+    one = [written.of_base_wrench(int(stamps[n]), tuple(wrenches[n].tolist())) for n in which]
+    assert [each.tobytes() for each in many] == one
+    read = STORE.deserialize_cdr(one[1], OUTPUT_TYPES[topic])
+    assert read.header.frame_id == frame or not frame
+    assert read.header.stamp.sec * 10 ** 9 + read.header.stamp.nanosec == stamps[1]
+    force, torque = read.wrench.force, read.wrench.torque
+    assert [force.x, force.y, force.z, torque.x, torque.y, torque.z] == wrenches[1].tolist()
 
 
 def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:

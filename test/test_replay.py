@@ -174,6 +174,11 @@ def three(vector: Any) -> list[float]:
     return [vector.x, vector.y, vector.z]
 
 
+def six_of(message: Any) -> list[float]:
+    """Return the numbers of a WrenchStamped."""
+    return [*three(message.wrench.force), *three(message.wrench.torque)]
+
+
 def library_motion(name: str) -> Motion:
     """Return a bag's motion, read and put together without the package's joining."""
     parts = [(three(p.position), [p.orientation.x, p.orientation.y, p.orientation.z,
@@ -204,6 +209,7 @@ def test_every_setpoint_is_answered_as_the_library_does(
         name: str, replayed: dict[str, Outputs]) -> None:
     given, outputs = setpoints_of(name), replayed[name]
     result = PLATFORM.inverse_dynamics(library_motion(name))
+    base_wrenches = PLATFORM.base_wrench(library_motion(name))
     assert len(given) == len(outputs.rows) == 1001
     of = {topic: outputs.messages[f'{NODE}/{topic}'] for topic in OUTPUT_TYPES}
     assert all(len(of[topic]) == 1001 for topic in of if topic != 'singularity_warning')
@@ -214,7 +220,8 @@ def test_every_setpoint_is_answered_as_the_library_does(
         state = of['leg_states'][n][1]
         assert nanoseconds(state) == stamp
         assert {of[topic][n][0] for topic in (
-            'leg_states', 'leg_lengths', 'leg_forces', 'jacobian_determinant')} == {when}
+            'leg_states', 'leg_lengths', 'leg_forces', 'jacobian_determinant',
+            'base_wrench')} == {when}
         # the library's numbers, to the bit
         assert tuple(state.name) == PARAMETERS['joints']
         assert np.array_equal(
@@ -224,6 +231,10 @@ def test_every_setpoint_is_answered_as_the_library_does(
         assert np.array_equal(of['leg_lengths'][n][1].data, result.lengths[n])
         assert np.array_equal(of['leg_forces'][n][1].data, clipped[n])
         assert of['jacobian_determinant'][n][1].data == result.determinant[n]
+        load = of['base_wrench'][n][1]
+        assert nanoseconds(load) == stamp
+        assert load.header.frame_id == PARAMETERS['base_frame']
+        assert six_of(load) == base_wrenches[n].tolist()
 
 
 @pytest.mark.parametrize('name', BAGS)
@@ -286,6 +297,9 @@ def test_rosbags_reads_what_mcap_reads(name: str, replayed: dict[str, Outputs]) 
                 assert nanoseconds(ours) == nanoseconds(theirs)
                 for field in ('position', 'velocity', 'effort'):
                     assert np.array_equal(getattr(ours, field), getattr(theirs, field))
+            elif hasattr(ours, 'wrench'):
+                assert nanoseconds(ours) == nanoseconds(theirs)
+                assert six_of(ours) == six_of(theirs)
             else:
                 assert np.array_equal(ours.data, theirs.data)
 
@@ -1087,7 +1101,7 @@ def test_summary_and_report_are_written(tmp_path: Path) -> None:
         assert abs(found['force_peak_n']) == np.max(np.abs(forces))
         lengths = [float(row[f'{leg}_length_m']) for row in rows]
         assert (found['length_min_m'], found['length_max_m']) == (min(lengths), max(lengths))
-    assert set(summary['force_breakdown']['leg_1']) == set(SOURCES)
+    assert set(summary['force_breakdown']['leg_1']) == {*SOURCES} - {'base motion'}
     assert summary['parameters']['platform.mass'] == 150.0
 
 

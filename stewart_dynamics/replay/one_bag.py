@@ -49,8 +49,8 @@ from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.results_folder import check_free, whole_folder, write_json
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.runtime import input_topics as inputs
-from stewart_dynamics.runtime import step
+from stewart_dynamics.runtime import base_wrench, input_topics as inputs, step
+from stewart_dynamics.runtime.base_wrench import BaseWrench
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.recorded_messages import Messages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
@@ -63,7 +63,8 @@ _STAMP = re.compile(r'stamp (\d+) ns')
 Progress = Callable[[int, int], None]
 
 # The machine code that every replay needs.
-FUNCTIONS = *step.FUNCTIONS, *message_blocks.FUNCTIONS, mcap_scan.scan
+FUNCTIONS = (
+    *step.FUNCTIONS, *base_wrench.FUNCTIONS, *message_blocks.FUNCTIONS, mcap_scan.scan)
 
 
 class Replayed(NamedTuple):
@@ -161,6 +162,7 @@ class _Run:
         self._first_time: int | None = None
         self._setpoints = Setpoints(parameters, self._rejected, self._notice)
         self._step = Step(parameters)
+        self._base_wrench = BaseWrench(parameters)
         self._state: Singularity | None = None
         self._restarting = False
         self._stamp: int | None = None
@@ -287,7 +289,8 @@ class _Run:
         self._state = outputs.singularity()
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
-        self._bag.write(setpoints.times, outputs)
+        base_wrenches = self._base_wrench.many(setpoints)
+        self._bag.write(setpoints.times, outputs, base_wrenches)
         seconds = self._seconds(setpoints.stamps)
         self._table.write(seconds, setpoints.motions, outputs)
         breakdown = None

@@ -29,7 +29,7 @@ from mcap.records import (
     Channel, ChunkIndex, DataEnd, Footer, Header, McapRecord, Schema, Statistics)
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
-from stewart_dynamics.arrays import Bytes, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
@@ -83,11 +83,25 @@ class OutputBag:
         self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
         self._file.write(self._declarations())
 
-    def write(self, times: Stamps, outputs: Outputs) -> None:
-        """Write a chunk: the outputs of each setpoint, with these recording times (N,) [ns]."""
+    def write(self, times: Stamps, outputs: Outputs, base_wrenches: Array) -> None:
+        """
+        Write a chunk: what each setpoint gives.
+
+        Parameters
+        ----------
+        times : (N,)
+            When they are recorded [ns].
+        outputs : Outputs
+            N of them.
+        base_wrenches : (N, 6)
+            Their base wrenches [N, N m]; nan: there is none.
+
+        """
         if not len(times):
             return
-        groups = [group for group in self._messages.of_outputs(outputs) if len(group[1])]
+        groups = [group for group in (
+            *self._messages.of_outputs(outputs),
+            self._messages.of_base_wrenches(outputs.stamps, base_wrenches)) if len(group[1])]
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
         for n, (_, which, messages) in enumerate(groups):
             sizes[which, n] = _HEAD + messages.dtype.itemsize

@@ -37,9 +37,9 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay import report_plots as channels
+from stewart_dynamics.replay.force_sources import sources_of
 from stewart_dynamics.replay.html_pages import page
 from stewart_dynamics.replay.plot_curves import Curves, Frames
 from stewart_dynamics.replay.report_plots import COLORS, measured_plots, motion_plots
@@ -88,7 +88,7 @@ class Report:
             At least one.
         outputs : Outputs
             Of these setpoints.
-        breakdown : (N, 6, 6)
+        breakdown : (N, 7, 6)
             The demanded forces by source: sample, source, leg [N].
 
         """
@@ -155,8 +155,9 @@ class Report:
             name=Path(summary['bag']).name or summary['bag'], plotly=script,
             plotly_file=None if plotly is None else quote(Path(
                 os.path.relpath(plotly, path.parent)).as_posix()),
-            data=self._data(summary), sources=SOURCES, verdicts=verdicts(summary),
-            exceeded=exceeded_limits(summary['limits']), margins=smallest_margins(summary),
+            data=self._data(summary), sources=sources_of(self._parameters),
+            verdicts=verdicts(summary), exceeded=exceeded_limits(summary['limits']),
+            margins=smallest_margins(summary),
             rejected=sum(each['count'] for each in summary['rejected']),
             rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), units=units(),

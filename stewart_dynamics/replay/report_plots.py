@@ -25,11 +25,13 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.force_sources import sources_of
 
 # Okabe and Ito's palette for the color-blind, without yellow, which is not visible on white.
 COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
 _AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 _BLACK = '#222222'
+_SOURCE_COLORS = dict(zip(SOURCES, (*COLORS, _BLACK), strict=True))
 
 # The channels of a sample.
 POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
@@ -128,8 +130,8 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
         *(of_rates if velocities_known else ()),
         Plot('force_breakdown', '', 'Leg force by source', 'N', {
             leg: [Curve('sum', '#a3abb6', FORCES.start + n, width=4.5),
-                  *(Curve(source, color, BREAKDOWN.start + 6 * k + n) for k, (source, color) in
-                    enumerate(zip(SOURCES, COLORS, strict=True)))]
+                  *(Curve(source, _SOURCE_COLORS[source], BREAKDOWN.start + 6 * k + n)
+                    for k, source in enumerate(sources_of(p)))]
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
 
 

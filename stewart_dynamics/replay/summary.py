@@ -28,12 +28,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.limits import (
     FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
+from stewart_dynamics.replay.force_sources import sources_of
 from stewart_dynamics.runtime.step import Batch, Outputs
 
 # Values of a leg that are not known from poses alone.
@@ -101,9 +101,10 @@ class Summary:
         self._unit_load_force = Extreme(6, np.positive)
         self._crossings = Crossings()
         self._warnings = Warnings()
+        self._sources = sources_of(parameters)
         # one source at a time: numpy is far slower along many columns at once
-        self._source_peaks = [Extreme(6, np.abs) for _ in SOURCES]
-        self._source_squares = Integral(6 * len(SOURCES))
+        self._source_peaks = [Extreme(6, np.abs) for _ in self._sources]
+        self._source_squares = Integral(6 * len(self._sources))
         self._has_breakdown = False
 
     def add(self, seconds: Array, setpoints: Batch, outputs: Outputs,
@@ -120,7 +121,7 @@ class Summary:
             The answered setpoints.
         outputs : Outputs
             Their outputs.
-        breakdown : (N, 6, 6), optional
+        breakdown : (N, 7, 6), optional
             The demanded forces by source: sample, source, leg [N].
 
         """
@@ -176,7 +177,8 @@ class Summary:
             for n, peaks in enumerate(self._source_peaks):
                 peaks.add(seconds, breakdown[:, n])
             with np.errstate(over='ignore', invalid='ignore'):
-                self._source_squares.add(steps, breakdown.reshape(len(seconds), -1) ** 2)
+                self._source_squares.add(steps, breakdown[:, :len(self._sources)].reshape(
+                    len(seconds), -1) ** 2)
 
     def _steps(self, seconds: Array, setpoints: Batch) -> Array:
         """Return the time from each setpoint's predecessor to it, zero in a gap [s]."""
@@ -284,7 +286,7 @@ class Summary:
         unknown: dict[str, float | None] = {'peak_n': None, 'rms_n': None}
         return {name: {source: unknown if self._quasi_static and source not in _AT_REST else {
             'peak_n': _number(self._source_peaks[n].values[leg]), 'rms_n': _number(rms[n, leg])}
-            for n, source in enumerate(SOURCES)}
+            for n, source in enumerate(self._sources)}
             for leg, name in enumerate(self._legs)}
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The messages to publish or write for what the step and the external wrench give."""
+"""The messages to publish or write for what step, external wrench and base wrench give."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ from operator import sub
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import NO_WRENCH, Stamps
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six, Stamps
 from stewart_dynamics.messages.joint_state import JointStateWriter
-from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.messages.setpoint import layout_of, StampedWriter, wrench
 from stewart_dynamics.messages.standard import (
     boolean, FLOAT64, float64, FLOAT64_ARRAY, float64_array)
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.base_wrench import BASE_WRENCH
 from stewart_dynamics.runtime.external_wrench import Estimate
 from stewart_dynamics.runtime.step import Output, Outputs
 
@@ -38,7 +39,10 @@ OUTPUT_TYPES = {
     'leg_forces': 'std_msgs/msg/Float64MultiArray',
     'jacobian_determinant': 'std_msgs/msg/Float64',
     'singularity_warning': 'std_msgs/msg/Bool',
+    BASE_WRENCH: 'geometry_msgs/msg/WrenchStamped',
 }
+# Messages of a topic: which of the outputs have one, and their messages.
+Written = tuple[str, Stamps, NDArray[np.void]]
 
 
 class OutputMessages:
@@ -58,9 +62,10 @@ class OutputMessages:
         self._with_effort, self._without_effort = (
             self._joint_state.layout(effort) for effort in (True, False))
         self._wrench = StampedWriter(parameters['base_frame'], 6)
+        self._wrenches = layout_of(wrench, self._wrench.write(0, NO_WRENCH))
 
     def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
-        """Yield topics (keys of OUTPUT_TYPES) and messages to publish for an output."""
+        """Yield topics (keys of OUTPUT_TYPES) and messages for an output; see of_base_wrench."""
         yield 'leg_states', self._joint_state.write(
             output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
             output.forces)
@@ -71,7 +76,7 @@ class OutputMessages:
         if output.warning_changed:
             yield 'singularity_warning', boolean(output.singularity.warning)
 
-    def of_outputs(self, outputs: Outputs) -> list[tuple[str, Stamps, NDArray[np.void]]]:
+    def of_outputs(self, outputs: Outputs) -> list[Written]:
         """
         Return the same messages as ``of_output``, of many outputs.
 
@@ -107,3 +112,12 @@ class OutputMessages:
     def of_estimate(self, estimate: Estimate) -> bytes:
         """Return the geometry_msgs/WrenchStamped of an estimate that has a wrench."""
         return self._wrench.write(estimate.stamp, estimate.wrench or NO_WRENCH)
+
+    def of_base_wrench(self, stamp: int, base_wrench: Six) -> bytes:
+        """Return the geometry_msgs/WrenchStamped of a setpoint's base wrench."""
+        return self._wrench.write(stamp, base_wrench)
+
+    def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> Written:
+        """Return the same of setpoints (N,) [ns] and rows (N, 6); a row of nan has no message."""
+        known = np.flatnonzero(~np.isnan(base_wrenches[:, 0]))
+        return BASE_WRENCH, known, self._wrenches.write(stamps[known], base_wrenches[known])
