@@ -673,6 +673,7 @@ def test_on_a_base_of_topics_it_moves_as_the_library(begin: Start) -> None:
     for n in range(-1, many + 1):
         base.publish(FIRST + n * PERIOD, at(0.5 + n * PERIOD * 1e-9))
     base.until_heard()
+    simulator.until(lambda: imus, 'the IMU is there')
     plant, messages = Plant(parameters), StateMessages(parameters)
     for n in range(1, many + 1):
         stamp = simulator.step(holding())
