@@ -101,8 +101,11 @@ class MotionCompensation(Node):
         self.came = {}
         self.check()
         self.heard_at = time.monotonic()
-        if not self.stopped:
-            self.publish(pose, twist.twist, accel.accel)
+        if self.stopped:
+            return self.get_logger().warning(
+                'base motion is back, but setpoints have stopped: restart this node',
+                throttle_duration_sec=1.0)
+        self.publish(pose, twist.twist, accel.accel)
 
     def publish(self, at: PoseStamped, twist: object, accel: object) -> None:
         p, q = at.pose.position, at.pose.orientation
@@ -134,8 +137,7 @@ class MotionCompensation(Node):
             return
         self.stopped = True
         self.get_logger().error(
-            f'no base motion for {self.timeout} s: setpoints stop; restart this node when the '
-            'platform may move again')
+            f'no base motion for {self.timeout} s: setpoints stop, until a restart')
 
 
 def numbers(three: Vector3) -> list:
