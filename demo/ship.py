@@ -73,6 +73,7 @@ PROGRAMS: dict[str, list[str | Path]] = {
 RUNS = {'PD only': None, 'PD + forces, fixed base': 'fixed', 'PD + forces, IMU': 'imu',
         'PD + forces, base motion': 'motion'}
 COLORS = ('#d55e00', '#e69f00', '#009e73', '#0072b2')
+AXIS_COLORS = ('#0072b2', '#009e73', '#d55e00')
 
 
 class Run(NamedTuple):
@@ -194,26 +195,31 @@ def draw(path: Path, ship: Ship, runs: Sequence[Run]) -> None:
     figure, (above, below) = pyplot.subplots(
         2, 1, figsize=(9, 6), sharex=True, height_ratios=(2, 3), layout='constrained')
     seconds = ship.times * 1e-9
-    for name, series, color in zip(
-            'xyz', 1e3 * (ship.base.position - ship.base.position[0]).T,
-            ('#0072b2', '#009e73', '#d55e00'), strict=True):
-        above.plot(seconds, series, color=color, linewidth=1.2, label=f'deck, {name}')
-    tilt = np.degrees(np.arccos(np.clip(ship.base.rotation[:, 2, 2], -1.0, 1.0)))
-    angle = above.twinx()
-    angle.plot(seconds, tilt, color='0.45', linewidth=1.0, linestyle='--', label='tilt')
-    angle.set_ylabel('tilt of the deck  [°]')
-    angle.spines['right'].set_visible(True)
-    angle.grid(False)
-    angle.set_ylim(bottom=0.0)
+    moved = 1e3 * (ship.base.position - ship.base.position[0])
+    r = ship.base.rotation
+    roll, pitch = np.arctan2(r[:, 2, 1], r[:, 2, 2]), -np.arcsin(r[:, 2, 0])
+    for name, series, color in zip(('surge', 'sway', 'heave'), moved.T, AXIS_COLORS, strict=True):
+        above.plot(seconds, series, color=color, linewidth=1.2, label=name)
+    turned = above.twinx()
+    for name, series, color in zip(('roll', 'pitch'), np.degrees([roll, pitch]), AXIS_COLORS,
+                                   strict=False):
+        turned.plot(seconds, series, color=color, linewidth=1.0, linestyle='--', label=name)
+    # Both zeros at one height.
+    for axes in (above, turned):
+        most = 1.1 * max(np.abs(line.get_ydata()).max() for line in axes.get_lines())
+        axes.set_ylim(-most, most)
+    turned.set_ylabel('roll, pitch  [°]')
+    turned.spines['right'].set_visible(True)
+    turned.grid(False)
     above.set_ylabel('motion of the deck  [mm]')
-    lines = [*above.get_lines(), *angle.get_lines()]
-    above.legend(lines, [str(line.get_label()) for line in lines], frameon=False, ncols=4,
-                 loc='upper left')
+    lines = [*above.get_lines(), *turned.get_lines()]
+    above.legend(lines, [str(line.get_label()) for line in lines], frameon=False, ncols=5,
+                 loc='lower center', bbox_to_anchor=(0.5, 1.0))
     for run, color in zip(runs, COLORS, strict=True):
         below.plot(seconds, run.errors.position, color=color, linewidth=1.2, label=run.name)
-    below.set(xlabel='time  [s]', yscale='log', xlim=(0.0, seconds[-1]),
+    below.set(xlabel='time  [s]', yscale='log', xlim=(0.0, seconds[-1]), ylim=(1e-2, 1e4),
               ylabel='error of the platform in the world  [µm]')
-    below.legend(frameon=False, ncols=2, loc='lower right')
+    below.legend(frameon=False, ncols=2, loc='upper left')
     figure.savefig(path, dpi=110, metadata={'Software': None})
 
 
