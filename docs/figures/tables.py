@@ -157,7 +157,6 @@ def pages() -> dict[Path, dict[str, str]]:
     return {
         ROOT / 'README.md': {
             'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
-            'errors on a ship': ship(on_a_ship),
             'accuracy and speed': accuracy_and_speed()},
         ROOT / 'docs' / 'parameters.md': {
             'parameters of stewart_dynamics': parameters_of(Parameters),
