@@ -217,9 +217,9 @@ def draw(path: Path, ship: Ship, runs: Sequence[Run]) -> None:
                  loc='lower center', bbox_to_anchor=(0.5, 1.0))
     for run, color in zip(runs, COLORS, strict=True):
         below.plot(seconds, run.errors.position, color=color, linewidth=1.2, label=run.name)
-    below.set(xlabel='time  [s]', yscale='log', xlim=(0.0, seconds[-1]), ylim=(1e-2, 1e4),
+    below.set(xlabel='time  [s]', yscale='log', xlim=(0.0, seconds[-1]), ylim=(1e-2, 3e3),
               ylabel='error of the platform in the world  [µm]')
-    below.legend(frameon=False, ncols=2, loc='upper left')
+    below.legend(frameon=False, ncols=4, loc='lower center', bbox_to_anchor=(0.5, 1.0))
     figure.savefig(path, dpi=110, metadata={'Software': None})
 
 

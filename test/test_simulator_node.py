@@ -647,7 +647,7 @@ class Base:
 
     def publish(self, stamp: int, motion: Motion, frame: str = 'world') -> None:
         """Publish a motion of the base frame in the world at a time [ns]."""
-        for (topic, writer), numbers in zip(self._writers.items(), (
+        for writer, numbers in zip(self._writers.values(), (
                 [*motion.position, *motion.quaternion], motion.rows[12:18], motion.rows[18:]),
                 strict=True):
             writer.publish(StampedWriter(frame, len(numbers)).write(stamp, numbers))
@@ -685,7 +685,7 @@ def test_on_a_base_of_topics_it_moves_as_the_library(begin: Start) -> None:
         np.testing.assert_allclose(
             numbers_of(simulator.last('accel')),
             numbers_of(deserialize_message(state['accel'], AccelStamped)), rtol=1e-9, atol=1e-9)
-        simulator.until(lambda: stamp_of(imus[-1]) == stamp, 'the IMU, too')
+        simulator.until(lambda stamp=stamp: stamp_of(imus[-1]) == stamp, 'the IMU, too')
         spin = deserialize_message(imus[-1], Imu).angular_velocity
         np.testing.assert_allclose([spin.x, spin.y, spin.z], ends[1, 6:9], atol=1e-12)
     assert simulator.said('WARN', 'the base follows its topics')
