@@ -51,6 +51,17 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
     assert report.make(BEGIN)[0][-1].level == WARN
 
 
+def test_outcomes_that_took_long_are_logged() -> None:
+    planned = DynamicsDiagnostics(
+        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN).planned_trajectory
+    for outcome, seconds in ((ACCEPTED, 1.9), (ACCEPTED, 2.14), (ACCEPTED, 3.0), (REJECTED, 4.0)):
+        planned.done(outcome, seconds)
+    assert planned.log_lines(BEGIN) == [
+        LogLine(OK, 'planned trajectory: accepted: 2 points (took 2.1 s)'),
+        LogLine(OK, 'planned trajectory: accepted: 2 points (took 3.0 s)'),
+        LogLine(ERROR, 'planned trajectory rejected: x (took 4.0 s)', 'why')]
+
+
 def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:
     planned = DynamicsDiagnostics(
         Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN).planned_trajectory
