@@ -56,6 +56,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.replay.bag_task import kept, Task
 from stewart_dynamics.replay.bags import folders_of_results
+from stewart_dynamics.replay.local_processes import _uninterrupted
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import (
@@ -532,6 +533,22 @@ def test_an_interrupt_leaves_no_partial_results(
     # finished results are complete
     for folder in (path.parent for path in output.rglob('summary.json')):
         check_whole(folder, huge / folder.relative_to(output))
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_until_processes_are_started(number: signal.Signals) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, interrupted)
+    started = False
+    try:
+        with pytest.raises(KeyboardInterrupt), _uninterrupted():
+            signal.raise_signal(number)
+            started = True
+    finally:
+        signal.signal(number, before)
+    assert started
 
 
 @pytest.mark.slow

@@ -144,10 +144,14 @@ class _Pool:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Block Ctrl-C in processes that are started: this process stops them."""
+    """
+    Block signals while processes are started, and Ctrl-C in these: this process stops them.
+
+    A process that is started while an exception comes would be unknown to its pool.
+    """
     # Starting the resource tracker later would lift the block.
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
@@ -164,6 +168,7 @@ _progress: Connection | None = None
 def _set_up(progress: Connection, until: Connection) -> None:
     global _progress
     _progress = progress
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # by which a pool ends it
     threading.Thread(target=_watch, args=(until,), daemon=True).start()
 
 
