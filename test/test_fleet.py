@@ -393,6 +393,8 @@ def test_an_interrupted_run_continues(bags: Path, tmp_path: Path, jobs: int) -> 
     for bag, folder in (pairs[0], pairs[-1]):
         replay(bag, PARAMETERS, folder, PLAIN._replace(run='interrupted'))
     (pairs[1][1] / 'bag').mkdir(parents=True)  # not complete: without summary.json
+    for _, folder in (pairs[0], pairs[2]):  # of a run that was killed
+        folder.with_name(f'.{folder.name}.{32 * "0"}.partial.12345678').mkdir(parents=True)
 
     def times() -> dict[Path, int]:
         return {folder: folder.stat().st_mtime_ns for _, folder in pairs if folder.exists()}
@@ -400,6 +402,7 @@ def test_an_interrupted_run_continues(bags: Path, tmp_path: Path, jobs: int) -> 
     before = times()
     fleet = replay_fleet(pairs, PARAMETERS, output, PLAIN, jobs)
     assert [each.kept for each in fleet.ended] == [True, *[False] * 9, True]
+    assert hidden(output) == []
     assert fleet.text().splitlines() == [
         '11 bags: 9 done, 1 limit or warning, 1 failed; 2 kept from an earlier run, their '
         'inputs have not changed', fleet.ended[1].error]

@@ -909,6 +909,10 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
     assert not (tmp_path / 'out' / 'long').exists()
     # its partial results do not prevent another replay
     assert run(ROOT / 'bags' / 'clear', tmp_path / 'out') == DONE
+    # and are removed by that of the same bag
+    assert len(list((tmp_path / 'out').glob('.long.*'))) == 1
+    assert run(long_bag, tmp_path / 'out') == DONE
+    assert not list((tmp_path / 'out').glob('.*'))
 
 
 @pytest.mark.parametrize('sent', [signal.SIGINT, signal.SIGTERM])

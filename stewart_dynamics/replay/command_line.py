@@ -178,7 +178,9 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
 
     from stewart_dynamics.replay.bags import bytes_of
     from stewart_dynamics.replay.one_bag import replay
+    from stewart_dynamics.replay.results_folder import remove_abandoned
 
+    remove_abandoned([folder])
     with tqdm(total=bytes_of(bag), unit='B', unit_scale=True, disable=None, leave=False,
               dynamic_ncols=True) as bar:
         done = 0
