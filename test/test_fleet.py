@@ -41,6 +41,7 @@ import struct
 import subprocess
 import sys
 import termios
+from threading import Event, Thread
 import time
 from typing import Any
 
@@ -544,12 +545,17 @@ def test_a_signal_waits_until_processes_are_started(number: signal.Signals) -> N
         raise KeyboardInterrupt
 
     before = signal.signal(number, interrupted)
-    started = False
+    started, over = False, Event()
+    # It blocks no signal, as the threads of libraries.
+    other = Thread(target=over.wait)
+    other.start()
     try:
         with pytest.raises(KeyboardInterrupt), _uninterrupted():
-            signal.raise_signal(number)
+            signal.pthread_kill(other.ident, number)
+            time.sleep(0.01)
             started = True
     finally:
+        over.set()
         signal.signal(number, before)
     assert started
 

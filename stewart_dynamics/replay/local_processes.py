@@ -145,17 +145,27 @@ class _Pool:
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
     """
-    Block signals while processes are started, and Ctrl-C in these: this process stops them.
+    Hold signals while processes are started, and block Ctrl-C in these: this process stops them.
 
-    A process that is started while an exception comes would be unknown to its pool.
+    A process that is being started while an exception comes would be unknown to its pool.
     """
+    held: list[int] = []
+    handlers = {}
+    if threading.current_thread() is threading.main_thread():
+        # Other threads, as those of OpenBLAS, receive signals that this one blocks.
+        handlers = {each: signal.signal(each, lambda number, _: held.append(number))
+                    for each in (signal.SIGINT, signal.SIGTERM)}
     # Starting the resource tracker later would lift the block.
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for each, handler in handlers.items():
+            signal.signal(each, handler)
+        for number in held[:1]:
+            signal.raise_signal(number)
 
 
 # In the processes
@@ -168,7 +178,6 @@ _progress: Connection | None = None
 def _set_up(progress: Connection, until: Connection) -> None:
     global _progress
     _progress = progress
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # by which a pool ends it
     threading.Thread(target=_watch, args=(until,), daemon=True).start()
 
 
