@@ -21,6 +21,7 @@ from referees import ROOT
 from stewart_dynamics import Parameters
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.runtime.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
@@ -52,8 +53,7 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
 
 
 def test_outcomes_that_took_long_are_logged() -> None:
-    planned = DynamicsDiagnostics(
-        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], BEGIN).planned_trajectory
+    planned = PlannedTrajectoryDiagnostics()
     for outcome, seconds in ((ACCEPTED, 1.9), (ACCEPTED, 2.14), (ACCEPTED, 3.0), (REJECTED, 4.0)):
         planned.done(outcome, seconds)
     assert planned.log_lines(BEGIN) == [

@@ -106,8 +106,9 @@ class _Pool:
         progress, of_workers = _CONTEXT.Pipe(duplex=False)
         # When this end is closed, also by the death of this process, the others stop.
         until, kept_open = _CONTEXT.Pipe(duplex=False)
-        pool = ProcessPoolExecutor(
-            self._jobs, _CONTEXT, initializer=_set_up, initargs=(of_workers, until))
+        with _uninterrupted():  # a semaphore would remain that nobody removes
+            pool = ProcessPoolExecutor(
+                self._jobs, _CONTEXT, initializer=_set_up, initargs=(of_workers, until))
         pending: dict[Future[Ended], int] = {}
         try:
             with _uninterrupted():
