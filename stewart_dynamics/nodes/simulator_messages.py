@@ -96,10 +96,12 @@ class BaseMessages:
 
     def write(self, stamp: int, index: int, period: BasePeriod) -> Iterator[tuple[str, bytes]]:
         """Yield topics and messages for the end of a period: its time [ns] and its number."""
+        # The IMU first: who answers the motion of the base with a setpoint may be faster than what is
+        # published behind it, and the node then has no reading of the setpoint's time.
+        if index % self._imu_periods == 0:
+            readings = self._imu.read(period.rows[-1])
+            yield IMU, self._imu_writer.write(stamp, readings[:3], readings[3:])
         if period.pose:
             yield 'base/pose', self._pose.write(stamp, period.pose)
             yield 'base/twist', self._six.write(stamp, period.twist)
             yield 'base/accel', self._six.write(stamp, period.acceleration)
-        if index % self._imu_periods == 0:
-            readings = self._imu.read(period.rows[-1])
-            yield IMU, self._imu_writer.write(stamp, readings[:3], readings[3:])
