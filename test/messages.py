@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -27,6 +28,7 @@ POSE = 'geometry_msgs/msg/PoseStamped'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 ACCEL = 'geometry_msgs/msg/AccelStamped'
 WRENCH = 'geometry_msgs/msg/WrenchStamped'
+IMU = 'sensor_msgs/msg/Imu'
 COMBINED = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 
 HOME = (0.0, 0.0, 1.1)
@@ -74,6 +76,18 @@ def wrench(stamp: int, values: Sequence[float] = REST, frame: str = 'base') -> b
     """Return a WrenchStamped."""
     return _bytes(_new(
         WRENCH, _header(stamp, frame), _vectors('geometry_msgs/msg/Wrench', values)))
+
+
+def imu(stamp: int, spin: Sequence[float] = REST[:3],
+        force: Sequence[float] = (0.0, 0.0, 9.80665), frame: str = 'imu',
+        orientation: Sequence[float] = (0.0,) * 4, little_endian: bool = True,
+        covariances: Sequence[float] = (-1.0, 0.0, 0.0)) -> bytes:
+    """Return an Imu without orientation; covariances: their first entries."""
+    unknown, of_spin, of_force = (np.array([first] + [0.0] * 8) for first in covariances)
+    return _bytes(_new(
+        IMU, _header(stamp, frame), _new('geometry_msgs/msg/Quaternion', *orientation), unknown,
+        _new('geometry_msgs/msg/Vector3', *spin), of_spin,
+        _new('geometry_msgs/msg/Vector3', *force), of_force), little_endian)
 
 
 def combined(

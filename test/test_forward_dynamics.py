@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    each_relative, friction, PinocchioReferee, random_motion, random_parameters, random_wrench,
-    rng, uncompiled)
+    each_relative, friction, PinocchioReferee, random_base_motion, random_motion,
+    random_parameters, random_wrench, rng, uncompiled)
 
 from stewart_dynamics import Motion, MotionError, Parameters, StewartPlatform
 from stewart_dynamics.mechanics import forward_dynamics

@@ -194,8 +194,8 @@ def test_a_combined_message_is_a_setpoint() -> None:
     assert feed.setpoints.topics == (COMBINED,)
     setpoint = feed(COMBINED, messages.combined(
         SECOND, (0.1, 0.2, 1.3), UPRIGHT, (1, 2, 3, 4, 5, 6), (7, 8, 9, 10, 11, 12)))
-    assert setpoint == (SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)),
-                        NO_WRENCH, False)
+    assert setpoint == Setpoint(
+        SECOND, (0.1, 0.2, 1.3, 1, 0, 0, 0, 1, 0, 0, 0, 1, *range(1, 13)), NO_WRENCH)
     assert feed.sample(COMBINED, SECOND) is None
     assert feed.counts == {(COMBINED, TWICE): 1}
 
@@ -204,8 +204,8 @@ def test_a_pose_alone_stands_still() -> None:
     feed = Feed(source='pose')
     assert feed.setpoints.topics == (POSE,)
     setpoint = feed.sample(POSE, SECOND, 0.25)
-    assert setpoint == (SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12,
-                        NO_WRENCH, False)
+    assert setpoint == Setpoint(
+        SECOND, (0.25, 0.0, 1.1, 1, 0, 0, 0, 1, 0, 0, 0, 1) + (0.0,) * 12, NO_WRENCH)
 
 
 # Rejecting

@@ -47,6 +47,9 @@ _KEPT = 1000
 
 _Row = tuple[float, ...]
 
+_NOTHING = Joined(
+    np.empty(0, dtype=np.int64), np.empty((0, 0)), np.empty(0, dtype=np.int64), {}, {})
+
 
 class BaseInput:
     """
@@ -137,7 +140,7 @@ class BaseInput:
 
     def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
         """Join messages, see ``SampleJoining.join_many``."""
-        return self._joining.join_many(messages, places)
+        return self._joining.join_many(messages, places) if self.topics else _NOTHING
 
     def accept(self, joined: Joined, places: Mapping[str, Integers], stamps: Stamps,
                completed: Integers) -> Array | None:

@@ -32,8 +32,8 @@ def singularity_state(output: Output, parameters: Parameters) -> Level:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
     state = output.singularity
     if state.stopped:
-        suppresses = parameters['singularity.action'] == 'suppress_forces'
-        suppressed = ': forces suppressed' if suppresses else ''
+        is_suppressed = output.forces is None and output.demanded_forces is not None
+        suppressed = ': forces suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: '
                      + _condition(output, parameters, 'stop_condition'))
     if not state.warning:

@@ -1,0 +1,493 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The base's motion from its topics: which sample a setpoint gets, and all that may be wrong."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+import math
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import messages
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from referees import rng, rotation_about, symmetric_parameters
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import Imu
+
+from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.setpoint import imu, layout_of
+from stewart_dynamics.runtime.base_input import BaseInput
+from stewart_dynamics.runtime.input_topics import (
+    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
+from stewart_dynamics.runtime.recorded_messages import Messages
+from stewart_dynamics.runtime.rejections import (
+    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, Rejection, Rejections, TOO_OLD,
+    TWICE, WRONG_FRAME)
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
+from stewart_dynamics.runtime.step import Setpoint
+
+MS = 1_000_000
+SECOND = 1000 * MS
+NOW = 1_700_000_000 * SECOND
+SOURCES = ('pose', 'motion', 'imu')
+PARAMETERS = symmetric_parameters().replaced({
+    'setpoint.source': 'pose', 'base.timeout': 0.1, 'gravity': [0.3, -0.2, -9.7],
+    'base.imu.position': [0.4, -0.3, 0.2], 'base.imu.orientation': [0.5, 0.5, 0.5, 0.5]})
+TURN = rotation_about([0.0, 0.0, 1.0], 0.3) @ rotation_about([1.0, 0.0, 0.0], 0.2)
+QUATERNION = Rotation.from_matrix(TURN).as_quat()
+
+
+class Feed:
+    """Setpoints on a base; what is said is recorded."""
+
+    def __init__(self, source: str, **given: object) -> None:
+        self.said: list[tuple[Rejection, str]] = []
+        self.notices: list[str] = []
+        self.setpoints = Setpoints(
+            PARAMETERS.replaced({'base.source': source, **{
+                name.replace('__', '.'): value for name, value in given.items()}}),
+            lambda rejection, details: self.said.append((rejection, details)),
+            self.notices.append)
+
+    def __call__(self, topic: str, data: bytes, now: int = NOW) -> Setpoint | None:
+        """Take one message as the node does."""
+        if topic in self.setpoints.base.topics:
+            self.setpoints.base.take(topic, data, lambda: now)
+            return None
+        if topic == WRENCH:
+            self.setpoints.take_wrench(data)
+            return None
+        setpoint = self.setpoints.take(topic, data, lambda: now)
+        return None if setpoint is None else self.setpoints.on_base(setpoint)
+
+    def sample(self, stamp: int, mark: float = 0.0) -> None:
+        """Take good messages of all topics of the base, a mark in their numbers."""
+        for topic, data in sample(self.setpoints.base.topics, stamp, mark):
+            self(topic, data)
+
+    def row(self, stamp: int) -> Any:
+        """Return the row of the base at a setpoint."""
+        setpoint = self(POSE, messages.pose(stamp))
+        assert setpoint is not None
+        return setpoint.base
+
+    @property
+    def reasons(self) -> Counter[tuple[str, str]]:
+        """Return what is rejected."""
+        return Counter({tuple(rejection): n
+                        for rejection, n in self.setpoints.counts.items()})  # type: ignore
+
+
+def sample(topics: Sequence[str], stamp: int, mark: float = 0.0) -> list[tuple[str, bytes]]:
+    """Return good messages of the base's topics at a stamp."""
+    of: dict[str, Callable[[], bytes]] = {
+        BASE_POSE: lambda: messages.pose(stamp, (9.0, mark, 9.0), QUATERNION, 'world'),
+        BASE_TWIST: lambda: messages.twist(stamp, (9.0, 9.0, 9.0, mark, 0.2, 0.3), 'world'),
+        BASE_ACCEL: lambda: messages.accel(stamp, (mark, 1.0, 2.0, 3.0, 4.0, mark), 'world'),
+        BASE_IMU: lambda: messages.imu(stamp, (mark, 0.2, 0.3), (mark, 1.0, 9.0))}
+    return [(topic, of[topic]()) for topic in topics]
+
+
+def known(row: Any) -> bool:
+    """Return whether the base's motion is known."""
+    return not any(map(math.isnan, row))
+
+
+# The numbers
+
+def test_a_fixed_base_has_no_topics_and_no_row() -> None:
+    feed = Feed('fixed')
+    assert feed.setpoints.base.topics == ()
+    assert feed.row(SECOND) is None
+
+
+def test_a_pose_gives_the_bits_of_the_library() -> None:
+    feed = Feed('pose')
+    feed.sample(SECOND)
+    turn = Pose.from_quaternion(np.zeros(3), QUATERNION)
+    assert feed.row(SECOND) == tuple(
+        BaseMotion.from_pose(turn, PARAMETERS['gravity']).rows.tolist())
+
+
+def test_a_motion_gives_the_bits_of_the_library() -> None:
+    feed = Feed('motion')
+    feed.sample(SECOND, 0.5)
+    motion = Motion.from_quaternion(
+        np.zeros(3), QUATERNION, [9.0] * 3, [0.5, 0.2, 0.3], [0.5, 1.0, 2.0], [3.0, 4.0, 0.5])
+    assert feed.row(SECOND) == tuple(
+        BaseMotion.from_motion(motion, PARAMETERS['gravity']).rows.tolist())
+
+
+def test_an_imu_gives_the_bits_of_the_library() -> None:
+    feed = Feed('imu')
+    mounting = Pose.from_quaternion(
+        PARAMETERS['base.imu.position'], PARAMETERS['base.imu.orientation'])
+    feed.sample(SECOND, 0.5)
+    truth = BaseMotion.from_imu([0.5, 1.0, 9.0], [0.5, 0.2, 0.3], np.zeros(3),
+                                mounting.position, mounting.rotation)
+    assert feed.row(SECOND) == tuple(truth.rows.tolist())
+    feed.sample(SECOND + 5 * MS, 0.7)
+    gain = -math.expm1(-2.0 * math.pi * PARAMETERS['base.imu.cutoff'] * 0.005)
+    truth = BaseMotion.from_imu([0.7, 1.0, 9.0], [0.7, 0.2, 0.3],
+                                [gain * ((0.7 - 0.5) / 0.005), 0.0, 0.0],
+                                mounting.position, mounting.rotation)
+    assert np.allclose(feed.row(SECOND + 5 * MS), truth.rows, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize('little_endian', [True, False])
+def test_messages_of_rclpy_are_read(little_endian: bool) -> None:
+    message = Imu()
+    message.header.frame_id = 'imu_link'
+    message.header.stamp.sec = 1
+    message.angular_velocity.x, message.linear_acceleration.z = 0.25, 9.5
+    message.orientation_covariance[0] = -1.0
+    message.linear_acceleration_covariance[4] = 7.0
+    data = bytes(serialize_message(message))
+    stamp, frame, values = imu(data)
+    assert (stamp, frame, len(values)) == (SECOND, b'imu_link', 37)
+    assert (values[13], values[27], values[4], values[32]) == (0.25, 9.5, -1.0, 7.0)
+    other = messages.imu(
+        SECOND, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), 'a', little_endian=little_endian)
+    assert layout_of(imu, other).read_one(other) == (SECOND, imu(other).values)
+    for size in range(len(other)):
+        with pytest.raises(MalformedError):
+            imu(other[:size])
+
+
+# Which sample
+
+def oracle(samples: Sequence[tuple[int, Any]], stamp: int, timeout: int = SECOND // 10) -> Any:
+    """Return the row at a stamp, as docs/moving_base.md says it."""
+    usable = [n for n, (at, _) in enumerate(samples)
+              if at <= stamp or (n and at - stamp <= at - samples[n - 1][0])]
+    if not usable or stamp - samples[usable[-1]][0] > timeout:
+        return np.full(12, np.nan)
+    n = usable[-1]
+    at, row = samples[n]
+    if not n:
+        return row
+    before, row_before = samples[n - 1]
+    part = min((stamp - at) / (at - before), 1.0)
+    return np.asarray(row) + (np.asarray(row) - row_before) * part
+
+
+@settings(max_examples=200)
+@given(st.lists(st.integers(1, 60), min_size=0, max_size=8),
+       st.lists(st.integers(-50, 400), min_size=1, max_size=6))
+def test_of_the_samples_that_have_come_the_newest_usable_one_is_taken(
+        steps: Sequence[int], stamps: Sequence[int]) -> None:
+    feed, samples, at = Feed('motion', setpoint__timeout=1e-9), [], SECOND
+    for n, step in enumerate(steps):
+        at += step * MS
+        feed.sample(at, 0.1 * n * n)
+        last = feed.setpoints.base.last
+        assert last is not None
+        samples.append(last)
+    for n, stamp in enumerate(stamps):
+        truth = oracle(samples, SECOND + stamp * MS)
+        row = feed.setpoints.base.at(SECOND + stamp * MS)
+        assert np.allclose(row, truth, rtol=1e-12, atol=1e-12, equal_nan=True), n
+
+
+@pytest.mark.parametrize('source', SOURCES)
+def test_between_two_samples_and_one_period_behind_them_rows_follow_a_line(source: str) -> None:
+    feed = Feed(source)
+    feed.sample(SECOND, 0.1)
+    first = feed.row(SECOND + MS)
+    feed.sample(SECOND + 10 * MS, 0.3)
+    last = feed.setpoints.base.last
+    assert last is not None
+    for after, part in ((2, -0.8), (10, 0.0), (15, 0.5), (20, 1.0), (40, 1.0), (110, 1.0)):
+        truth = np.array(last[1]) + (np.array(last[1]) - first) * part
+        assert np.allclose(feed.row(SECOND + after * MS), truth, rtol=1e-12, atol=1e-12)
+    assert not known(feed.row(SECOND + 111 * MS))  # 101 ms old
+    assert not known(feed.setpoints.base.at(SECOND - 1))
+
+
+def test_samples_that_setpoints_have_waited_for_are_kept() -> None:
+    feed = Feed('motion')
+    for n in range(2000):
+        feed.sample(SECOND + n * MS, n)
+    for n in (1000, 1500, 1999):
+        assert feed.row(SECOND + n * MS)[5] == pytest.approx(feed.setpoints.base.at(
+            SECOND + n * MS)[5])
+        assert known(feed.setpoints.base.at(SECOND + n * MS))
+    assert not known(feed.setpoints.base.at(SECOND + 999 * MS))
+
+
+# What may be wrong
+
+BAD: Sequence[tuple[str, Callable[[int], bytes], str]] = (
+    (BASE_POSE, lambda t: messages.pose(t, (math.nan, 0.0, 0.0), frame='world'), NOT_FINITE),
+    (BASE_POSE, lambda t: messages.pose(t, quaternion=(0.0, 0.0, 0.0, 1.01), frame='world'),
+     NOT_UNIT),
+    (BASE_POSE, lambda t: messages.pose(t, frame='base'), WRONG_FRAME),
+    (BASE_TWIST, lambda t: messages.twist(t, (math.inf,) * 6, 'world'), NOT_FINITE),
+    (BASE_TWIST, lambda t: messages.twist(t, frame='base'), WRONG_FRAME),
+    (BASE_ACCEL, lambda t: messages.accel(t, frame='world')[:-1], MALFORMED),
+    (BASE_IMU, lambda t: messages.imu(t, (math.nan, 0.0, 0.0)), NOT_FINITE),
+    (BASE_IMU, lambda t: messages.imu(t, force=(math.inf, 0.0, 0.0)), NOT_FINITE),
+    (BASE_IMU, lambda t: messages.imu(t, frame='other'), WRONG_FRAME),
+    (BASE_IMU, lambda t: messages.imu(t, covariances=(0.0, -1.0, 0.0)), NOT_MEASURED),
+    (BASE_IMU, lambda t: messages.imu(t, covariances=(0.0, 0.0, -1.0)), NOT_MEASURED),
+    (BASE_IMU, lambda t: b'', MALFORMED))
+
+
+@pytest.mark.parametrize(('topic', 'bad', 'reason'), BAD)
+def test_what_is_wrong_is_rejected_and_the_last_sample_holds(
+        topic: str, bad: Callable[[int], bytes], reason: str) -> None:
+    feed = Feed('imu' if topic == BASE_IMU else 'motion')
+    feed.sample(SECOND)
+    before = feed.row(SECOND)
+    feed(topic, bad(SECOND + MS))
+    assert feed.reasons == {(topic, reason): 1}
+    assert feed.row(SECOND + 2 * MS) == before
+    feed.sample(SECOND + 3 * MS)
+    assert known(feed.row(SECOND + 3 * MS))
+
+
+def test_an_imu_without_orientation_is_used_whatever_stands_there() -> None:
+    feed = Feed('imu')
+    feed(BASE_IMU, messages.imu(SECOND, orientation=(math.nan,) * 4))
+    assert known(feed.row(SECOND))
+    assert not feed.said
+
+
+def test_stamps_twice_or_back_are_rejected_and_a_jump_is_a_restart() -> None:
+    for source in SOURCES:
+        feed = Feed(source)
+        first = feed.setpoints.base.topics[0]
+        for stamp in (SECOND, SECOND + 10 * MS):
+            feed.sample(stamp)
+        feed.sample(SECOND + 10 * MS)
+        feed.sample(SECOND + 5 * MS)
+        assert feed.reasons[first, TWICE] == 1
+        assert feed.reasons[first, TOO_OLD] == 1
+        feed.sample(SECOND // 2, 0.5)
+        assert feed.notices == ['base: stamps jumped back by 0.51 s: followed as a restart']
+        assert known(feed.row(SECOND // 2))
+        assert not known(feed.setpoints.base.at(SECOND + 10 * MS))
+
+
+def test_after_a_restart_of_setpoints_what_lies_ahead_is_not_used() -> None:
+    feed = Feed('pose')
+    feed.sample(SECOND)
+    feed.sample(2 * SECOND)
+    feed.row(2 * SECOND)
+    assert not known(feed.row(SECOND // 2))
+    assert not known(feed.row(SECOND))  # that of the time before the restart
+    feed.sample(SECOND)
+    assert known(feed.row(SECOND + MS))
+
+
+def test_samples_without_stamps_have_the_clock() -> None:
+    feed = Feed('motion')
+    for n in range(3):
+        for topic, data in sample(BASE_SOURCES['motion'], 0):
+            feed(topic, data, NOW + n * MS)
+    assert len(feed.notices) == 1
+    assert feed.notices[0].startswith('base: base/pose: header stamps are zero')
+    assert feed.setpoints.base.last is not None
+    assert feed.setpoints.base.last[0] == NOW + 2 * MS
+    for topic, data in sample(BASE_SOURCES['motion'], 0):  # the clock goes back
+        feed(topic, data, NOW - SECOND)
+    assert known(feed.setpoints.base.at(NOW - SECOND))
+
+
+def test_a_topic_that_is_missing_leaves_nothing_and_is_counted() -> None:
+    feed = Feed('motion')
+    for n in range(3):
+        feed(BASE_POSE, sample((BASE_POSE,), SECOND + n * MS)[0][1])
+    assert feed.row(SECOND)[0] != feed.row(SECOND + MS)[0]  # nan
+    feed.setpoints.end('the bag ends')
+    assert feed.reasons[BASE_POSE, NOT_JOINED] == 3
+
+
+# Many at once
+
+def together(given: Sequence[tuple[str, bytes]]) -> Messages:
+    """Return messages as a bag has them."""
+    topics = (POSE, WRENCH, BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
+    sizes = np.array([len(data) for _, data in given], dtype=np.int64)
+    return Messages(
+        topics, np.array([topics.index(topic) for topic, _ in given], dtype=np.int64),
+        NOW + 1000 * np.arange(len(given)),
+        np.frombuffer(b'?' + b''.join(data for _, data in given), dtype=np.uint8),
+        1 + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64), sizes)
+
+
+FATES = ['good'] * 20 + ['lost', 'late', 'nan', 'twice', 'zero', 'back', 'frame']
+
+
+def recorded(source: str, fates: Sequence[str], period: int) -> list[tuple[str, bytes]]:
+    """Return setpoints every millisecond, and base samples, each with a fate of its own."""
+    random = rng()
+    found: list[tuple[str, bytes]] = []
+    stamp = SECOND
+    for n, fate in enumerate(fates):
+        stamp += 4 * MS
+        if fate == 'back':
+            stamp -= 500 * MS
+        of_base = sample(BASE_SOURCES[source], stamp, random.normal())
+        if fate == 'lost':
+            of_base = of_base[1:]
+        elif fate == 'nan':
+            of_base[0] = of_base[0][0], of_base[0][1][:-8] + b'\xff' * 8
+        elif fate == 'twice':
+            of_base = of_base * 2
+        elif fate == 'zero':
+            of_base = sample(BASE_SOURCES[source], 0, random.normal())
+        elif fate == 'frame':
+            of_base = [(topic, data.replace(b'world', b'earth').replace(b'imu', b'abc'))
+                       for topic, data in of_base]
+        setpoints = [(POSE, messages.pose(stamp + k * MS, random.normal(size=3)))
+                     for k in range(4)]
+        if n % period == 0:
+            at = len(setpoints) if fate == 'late' else int(random.integers(4))
+            setpoints[at:at] = of_base
+        found += setpoints
+    return found
+
+
+@settings(max_examples=60)
+@given(st.sampled_from(SOURCES), st.lists(st.sampled_from(FATES), max_size=60),
+       st.integers(1, 40), st.lists(st.integers(0, 300), max_size=4))
+def test_many_are_what_they_are_one_by_one(
+        source: str, fates: Sequence[str], period: int, cuts: Sequence[int]) -> None:
+    given = recorded(source, fates, period)
+    one, many = Feed(source), Feed(source)
+    expected = [setpoint for n, (topic, data) in enumerate(given)
+                if (setpoint := one(topic, data, NOW + 1000 * n)) is not None]
+    found = []
+    edges = [0, *sorted(cut for cut in cuts if cut < len(given)), len(given)]
+    whole = together(given)
+    for first, end in zip(edges[:-1], edges[1:], strict=True):
+        batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
+        assert batch.bases is not None
+        assert batch.bases.shape == (len(batch.stamps), 12)
+        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart, tuple(base))
+                  for stamp, motion, wrench, restart, base in zip(*(
+                      part.tolist() for part in (*batch[:4], batch.bases)), strict=True)]
+    assert list(map(repr, found)) == list(map(repr, expected))
+    assert many.notices == one.notices
+    for feed in (one, many):
+        feed.setpoints.end('the bag ends')
+    assert many.reasons == one.reasons
+
+
+def test_ordinary_messages_are_not_taken_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    for source in SOURCES:
+        given = recorded(source, ['good'] * 50, 2)
+        feed = Feed(source)
+        with monkeypatch.context() as patch:
+            patch.delattr(BaseInput, 'take')
+            patch.delattr(Setpoints, 'take')
+            bases = [feed.setpoints.take_many(together(part)).bases
+                     for part in (given[:103], given[103:])]
+        assert all(map(np.any, map(np.isfinite, bases)))
+        assert not feed.said
+
+
+# The IMU's angular acceleration: what docs/moving_base.md states
+
+def filtered(spins: Any, rate: float, cutoff: float) -> Any:
+    """Return the angular accelerations about x that an IMU's angular velocities give."""
+    feed = Feed('imu', base__imu__cutoff=cutoff, base__imu__orientation=[0.0, 0.0, 0.0, 1.0])
+    found = []
+    for n, spin in enumerate(spins):
+        feed(BASE_IMU, messages.imu(SECOND + round(n * SECOND / rate), (spin, 0.0, 0.0)))
+        last = feed.setpoints.base.last
+        assert last is not None
+        found.append(last[1][9])
+    return np.array(found)
+
+
+@pytest.mark.parametrize(('rate', 'cutoff'), [(200.0, 20.0), (100.0, 20.0), (1000.0, 5.0)])
+def test_the_delay_of_the_angular_acceleration_is_as_stated(rate: float, cutoff: float) -> None:
+    dt = 1.0 / rate
+    gain = -math.expm1(-2.0 * math.pi * cutoff * dt)
+    times = np.arange(2000) * dt
+    found = filtered(0.5 * 3.0 * times ** 2, rate, cutoff)  # its derivative is 3 t
+    delay = times[-1] - found[-1] / 3.0
+    assert delay == pytest.approx(dt * (1.0 / gain - 0.5), rel=1e-6)
+
+
+@pytest.mark.parametrize(('rate', 'cutoff'), [(200.0, 20.0), (1000.0, 5.0)])
+def test_the_noise_of_the_angular_acceleration_is_as_stated(rate: float, cutoff: float) -> None:
+    dt = 1.0 / rate
+    gain = -math.expm1(-2.0 * math.pi * cutoff * dt)
+    found = filtered(1e-3 * rng().normal(size=20_000), rate, cutoff)[200:]
+    assert np.std(found) == pytest.approx(
+        1e-3 * gain / dt * math.sqrt(2.0 / (2.0 - gain)), rel=0.05)
+
+
+def test_forces_by_an_imu_are_within_what_its_filter_misses() -> None:
+    """A base that rolls and heaves: the truth is known, only the angular acceleration is late."""
+    platform = StewartPlatform(PARAMETERS)
+    mounting = Pose.from_quaternion(
+        PARAMETERS['base.imu.position'], PARAMETERS['base.imu.orientation'])
+    feed, worst, largest = Feed('imu'), 0.0, 0.0
+    gain = -math.expm1(-2.0 * math.pi * PARAMETERS['base.imu.cutoff'] * 0.005)
+    delay = 0.005 * (1.0 / gain - 0.5)
+    pose = Pose([0.0, 0.0, 1.1], np.eye(3))
+    omega, angle = 2.0 * math.pi * 0.5, 0.2
+    for n in range(1000):
+        t = 0.005 * n
+        at = Motion.from_euler(
+            [0.0, 0.0, 0.4 * math.sin(omega * t)], [angle * math.sin(omega * t), 0.0, 0.0],
+            [0.0, 0.0, 0.4 * omega * math.cos(omega * t)],
+            [angle * omega * math.cos(omega * t), 0.0, 0.0],
+            [0.0, 0.0, -0.4 * omega ** 2 * math.sin(omega * t)],
+            [-angle * omega ** 2 * math.sin(omega * t), 0.0, 0.0])
+        base = BaseMotion.from_motion(at, PARAMETERS['gravity'])
+        w, dw, arm = base.angular_velocity, base.angular_acceleration, mounting.position
+        force = (base.linear_acceleration - base.gravity + np.cross(dw, arm)
+                 + np.cross(w, np.cross(w, arm)))
+        feed(BASE_IMU, messages.imu(SECOND + 5 * MS * n, mounting.rotation.T @ w,
+                                    mounting.rotation.T @ force))
+        if n < 100:
+            continue
+        row = feed.setpoints.base.at(SECOND + 5 * MS * n)
+        assert row is not None
+        motion = Motion.from_pose(pose)
+        truth = platform.inverse_dynamics(motion, base=base).forces
+        found = platform.inverse_dynamics(motion, base=BaseMotion.of_rows(np.array(row))).forces
+        # What the delay of the angular acceleration makes of it, to first order.
+        jerk = delay * angle * omega ** 3
+        late = platform.inverse_dynamics(motion, base=BaseMotion(
+            base.gravity, base.linear_acceleration, w, dw + [jerk, 0.0, 0.0])).forces
+        bound = np.abs(late - truth).max()
+        # the lever arm's share of the specific force as well
+        bound += np.abs(platform.inverse_dynamics(motion, base=BaseMotion(
+            base.gravity + np.cross([jerk, 0.0, 0.0], arm), base.linear_acceleration, w, dw,
+        )).forces - truth).max()
+        assert np.abs(found - truth).max() < 1.05 * bound
+        worst = max(worst, np.abs(found - truth).max())
+        largest = max(largest, np.abs(truth - platform.inverse_dynamics(motion).forces).max())
+    assert worst < 0.05 * largest
+
+
+def test_the_rejections_are_counted_where_they_are_asked_for() -> None:
+    counts = Rejections(lambda rejection, details: None)
+    base = BaseInput(PARAMETERS.replaced({'base.source': 'imu'}), counts, lambda text: None)
+    assert not base.take(BASE_IMU, b'', lambda: NOW)
+    assert base.take(BASE_IMU, messages.imu(SECOND), lambda: NOW)
+    assert counts.counts == {Rejection(BASE_IMU, MALFORMED): 1}

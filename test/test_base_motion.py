@@ -1,0 +1,403 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Forces on a base that moves: against Pinocchio, the Lagrange reference, and identities."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    derivative, each_relative, energies, friction, PinocchioReferee, random_base_motion,
+    random_direction, random_motion, random_parameters, random_wrench, relative, rng,
+    rotation_about, size_of, smooth_motion, STANDARD_GRAVITY, uncompiled)
+
+from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
+from stewart_dynamics.mechanics import base_wrench
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.tile import LANES
+
+MACHINES = 8
+STATES = 10
+
+Case = tuple[StewartPlatform, Motion, Any, BaseMotion]
+
+
+def case(seed: int, many: int = STATES) -> Case:
+    """Return a machine in motions under wrenches on a base that moves."""
+    random = rng(seed)
+    p = random_parameters(random)
+    return (StewartPlatform(p), random_motion(p, random, many), random_wrench(p, random, many),
+            random_base_motion(p, random, many))
+
+
+def lagrange_forces(platform: StewartPlatform, motion: Motion, wrench: Any, base: BaseMotion,
+                    ) -> Any:
+    """Return the leg forces by M, C and G."""
+    twist, acceleration = motion.rows[:, 12:18, None], motion.rows[:, 18:24, None]
+    load = (platform.mass_matrix(motion) @ acceleration
+            + platform.coriolis_matrix(motion, base=base) @ twist
+            + platform.gravity_vector(motion, base)[..., None] - np.asarray(wrench)[..., None])
+    transposed = np.swapaxes(platform.inverse_jacobian(motion), -1, -2)
+    rates = (platform.inverse_jacobian(motion) @ twist)[..., 0]
+    return np.linalg.solve(transposed, load)[..., 0] + friction(platform.parameters, rates)
+
+
+@pytest.mark.parametrize('seed', range(MACHINES))
+def test_forces_and_base_wrench_are_those_of_pinocchio(seed: int) -> None:
+    platform, motion, wrench, base = case(seed)
+    referee = PinocchioReferee(platform.parameters, rng(seed))
+    truth = [referee.forces_and_base_wrench(motion[n], wrench[n], base[n]) for n in range(STATES)]
+    forces = platform.inverse_dynamics(motion, wrench, base).forces
+    assert each_relative(forces, [each for each, _ in truth]) < 1e-12
+    found = platform.base_wrench(motion, wrench, base)
+    assert each_relative(found, [each for _, each in truth]) < 1e-12
+
+
+@pytest.mark.parametrize('seed', range(MACHINES))
+def test_forces_are_those_of_the_lagrange_equations(seed: int) -> None:
+    platform, motion, wrench, base = case(seed)
+    truth = lagrange_forces(platform, motion, wrench, base)
+    assert relative(platform.inverse_dynamics(motion, wrench, base).forces, truth) < 1e-13
+
+
+def test_forward_dynamics_of_inverse_dynamics_is_the_motion() -> None:
+    platform, motion, wrench, base = case(1, 50)
+    forces = platform.inverse_dynamics(motion, wrench, base).forces
+    assert relative(platform.forward_dynamics(motion, forces, wrench, base).rows,
+                    motion.rows) < 1e-11
+    one = platform.forward_dynamics(motion[7], forces[7], wrench[7], base[7])
+    assert np.array_equal(one.rows, platform.forward_dynamics(
+        motion, forces, wrench, base).rows[7])
+
+
+def test_a_base_at_rest_gives_the_same_bits() -> None:
+    platform, motion, wrench, _ = case(2, 2 * LANES + 5)
+    gravity = platform.parameters['gravity']
+    still = BaseMotion(gravity)
+    for base in (still, BaseMotion(np.tile(gravity, (len(motion), 1)))):
+        assert platform.inverse_dynamics(motion, wrench, base) == platform.inverse_dynamics(
+            motion, wrench)
+        assert np.array_equal(platform.base_wrench(motion, wrench, base),
+                              platform.base_wrench(motion, wrench))
+    assert platform.inverse_dynamics(motion[0], base=still) == platform.inverse_dynamics(motion[0])
+    forces = np.ones(6)
+    assert platform.forward_dynamics(motion, forces, base=still) == platform.forward_dynamics(
+        motion, forces)
+
+
+def test_one_sample_has_the_bits_of_many() -> None:
+    platform, motion, wrench, base = case(3, 2 * LANES + 5)
+    many = platform.inverse_dynamics(motion, wrench, base)
+    wrenches = platform.base_wrench(motion, wrench, base)
+    for n in (0, LANES - 1, LANES, 2 * LANES + 4):
+        one = platform.inverse_dynamics(motion[n], wrench[n], base[n])
+        assert np.array_equal(one.rows, many.rows[n])
+        assert np.array_equal(platform.base_wrench(motion[n], wrench[n], base[n]), wrenches[n])
+    for_all = platform.inverse_dynamics(motion, wrench, base[4])
+    assert np.array_equal(
+        for_all.rows[9], platform.inverse_dynamics(motion[9], wrench[9], base[4]).rows)
+
+
+def test_rows_of_nan_among_others_add_nothing() -> None:
+    platform, motion, wrench, base = case(4, 3 * LANES)
+    rows = base.rows.copy()
+    rows[::3] = np.nan
+    rows[LANES:2 * LANES] = np.nan
+    still = np.isnan(rows[:, 0])
+    found = platform.solve(motion.rows, wrench, rows)
+    assert np.array_equal(found[still], platform.solve(motion.rows, wrench)[still])
+    assert np.array_equal(found[~still], platform.solve(motion.rows, wrench, base.rows)[~still])
+
+
+def test_a_base_in_free_fall_makes_static_forces_zero() -> None:
+    platform, motion, _, _ = case(5)
+    gravity = platform.parameters['gravity']
+    still = Motion.from_pose(motion.pose)
+    forces = platform.inverse_dynamics(still, base=BaseMotion(gravity, gravity)).forces
+    weight = np.abs(platform.inverse_dynamics(still).forces).max()
+    assert np.abs(forces).max() < 1e-13 * weight
+    found = platform.base_wrench(still, base=BaseMotion(gravity, gravity))
+    assert np.abs(found).max() < 1e-12 * weight
+
+
+def test_turning_the_base_is_turning_gravity() -> None:
+    platform, motion, wrench, _ = case(6)
+    turn = rotation_about(random_direction(rng()), 0.7)
+    gravity = platform.parameters['gravity']
+    base = BaseMotion.from_pose(Pose(np.zeros(3), turn), gravity)
+    turned = StewartPlatform(platform.parameters.replaced({'gravity': turn.T @ gravity}))
+    assert relative(platform.inverse_dynamics(motion, wrench, base).forces,
+                    turned.inverse_dynamics(motion, wrench).forces) < 1e-13
+    assert relative(platform.base_wrench(motion, wrench, base),
+                    turned.base_wrench(motion, wrench)) < 1e-13
+
+
+def test_a_platform_that_stands_still_in_the_world_weighs_what_it_weighs() -> None:
+    """The base moves beneath it: with massless legs the leg forces hold its weight alone."""
+    random = rng(7)
+    p = random_parameters(random, actuators=False)
+    p = p.replaced({f'legs.{part}.{what}': 0.0 for part in ('cylinder', 'piston')
+                    for what in ('mass', 'inertia')} | {'gravity': [0.0, 0.0, -STANDARD_GRAVITY]})
+    platform = StewartPlatform(p)
+    place, turn = np.array([0.3, -0.2, 2.0]), rotation_about(random_direction(random), 0.2)
+    for _ in range(STATES):
+        world = Motion(0.1 * random.normal(size=3), rotation_about(random_direction(random), 0.2),
+                       *random.normal(size=(4, 3)))
+        r, w, dw = world.rotation, world.angular_velocity, world.angular_acceleration
+        out = place - world.position
+        v = -world.linear_velocity - np.cross(w, out)
+        a = (-world.linear_acceleration - np.cross(dw, out) + np.cross(w, np.cross(w, out))
+             + 2.0 * np.cross(w, world.linear_velocity))
+        motion = Motion(r.T @ out, r.T @ turn, r.T @ v, -r.T @ w, r.T @ a, -r.T @ dw)
+        found = platform.inverse_dynamics(motion, base=BaseMotion.from_motion(world)).forces
+        load = np.concatenate([
+            r.T @ [0.0, 0.0, STANDARD_GRAVITY * p['platform.mass']], np.zeros(3)])
+        arm = motion.rotation @ p['platform.center_of_mass']
+        load[3:] = np.cross(arm, load[:3])
+        truth = np.linalg.solve(platform.inverse_jacobian(motion).T, load)
+        assert relative(found, truth) < 1e-12
+
+
+def test_the_sources_sum_to_the_force() -> None:
+    platform, motion, wrench, base = case(8)
+    by = platform.force_breakdown(motion, wrench, base)
+    assert relative(by.total, platform.inverse_dynamics(motion, wrench, base).forces) < 1e-12
+    assert np.abs(by.base_motion).max() > 1.0
+    assert SOURCES[-1] == 'base motion'
+    # Gravity of the base is no part of its motion, and what does not depend on it is the same.
+    tilted = platform.force_breakdown(motion, wrench, BaseMotion(base.gravity))
+    assert np.array_equal(tilted.gravity, by.gravity)
+    assert np.abs(tilted.base_motion).max() < 1e-12 * np.abs(by.gravity).max()
+    still = platform.force_breakdown(motion, wrench)
+    assert not still.base_motion.any()
+    for name in ('platform_inertia', 'leg_inertia', 'velocity', 'friction', 'wrench'):
+        assert np.array_equal(getattr(still, name), getattr(by, name))
+
+
+def test_the_coriolis_matrix_on_a_turning_base_keeps_its_identities() -> None:
+    platform, motion, _, base = case(9)
+    twist = motion.rows[:, 12:18, None]
+    for christoffel in (False, True):
+        still = platform.coriolis_matrix(motion, christoffel)
+        added = platform.coriolis_matrix(motion, christoffel, base) - still
+        assert relative(added, -np.swapaxes(added, -1, -2)) < 1e-12
+        assert np.abs(np.swapaxes(twist, -1, -2) @ added @ twist).max() < 1e-9 * np.abs(
+            added @ twist).max()
+    assert np.array_equal(platform.mass_matrix(motion), platform.mass_matrix(motion.pose))
+
+
+def inertial(base: Motion, motion: Motion) -> Motion:
+    """Return a platform's motion in the world on a base whose motion in the world is given."""
+    r, w = base.rotation, base.angular_velocity
+
+    def turned(vector: Any) -> Any:
+        return (r @ vector[..., None])[..., 0]
+
+    out = turned(motion.position)
+    return Motion(
+        base.position + out, r @ motion.rotation,
+        base.linear_velocity + np.cross(w, out) + turned(motion.linear_velocity),
+        w + turned(motion.angular_velocity))
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_power_of_legs_and_base_is_the_rate_of_energy(seed: int) -> None:
+    """Kinetic and potential energy in the world, from speeds of all parts in the world."""
+    random = rng(seed)
+    p = random_parameters(random).replaced({
+        'actuator.reflected_mass': 0.0, 'actuator.viscous_friction': 0.0,
+        'actuator.coulomb_friction': 0.0})
+    platform, gravity = StewartPlatform(p), p['gravity']
+    of_base, of_platform = smooth_motion(p, random), smooth_motion(p, random)
+
+    def energy(time: float) -> float:
+        base, motion = of_base(time), of_platform(time)
+        kinetic = potential = 0.0
+        world = inertial(base, motion)
+        xx, xy, xz, yy, yz, zz = p['platform.inertia']
+        r = world.rotation
+        arm = r @ p['platform.center_of_mass']
+        speed = world.linear_velocity + np.cross(world.angular_velocity, arm)
+        spin = r.T @ world.angular_velocity
+        kinetic += 0.5 * p['platform.mass'] * speed @ speed + 0.5 * spin @ np.array(
+            [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ spin
+        potential -= p['platform.mass'] * (world.position + arm) @ gravity
+        for i in range(6):
+            foot = base.rotation @ p['geometry.base_joints'][i]
+            foot_speed = base.linear_velocity + np.cross(base.angular_velocity, foot)
+            foot = base.position + foot
+            a = r @ p['geometry.platform_joints'][i]
+            leg = world.position + a - foot
+            leg_speed = (world.linear_velocity + np.cross(world.angular_velocity, a)
+                         - foot_speed)
+            length = np.linalg.norm(leg)
+            s = leg / length
+            rate = s @ leg_speed
+            s_rate = (leg_speed - rate * s) / length
+            s1, s2 = (p[f'legs.{part}.center_of_mass'][i] for part in ('cylinder', 'piston'))
+            m1, m2 = (p[f'legs.{part}.mass'][i] for part in ('cylinder', 'piston'))
+            inertia = p['legs.cylinder.inertia'][i] + p['legs.piston.inertia'][i]
+            v1 = foot_speed + s1 * s_rate
+            v2 = foot_speed + rate * s + (length - s2) * s_rate
+            kinetic += 0.5 * (m1 * v1 @ v1 + m2 * v2 @ v2 + inertia * s_rate @ s_rate)
+            potential -= (m1 * (foot + s1 * s) + m2 * (foot + (length - s2) * s)) @ gravity
+        return float(kinetic + potential)
+
+    base, motion = of_base(0.0), of_platform(0.0)
+    moving = BaseMotion.from_motion(base, gravity)
+    result = platform.inverse_dynamics(motion, base=moving)
+    on_base = platform.base_wrench(motion, base=moving)
+    r = base.rotation
+    # What the base does to the hexapod, with its velocity in the world.
+    by_base = -(on_base[:3] @ (r.T @ base.linear_velocity)
+                + on_base[3:] @ (r.T @ base.angular_velocity))
+    power = result.forces @ result.rates + by_base
+    assert power == pytest.approx(float(derivative(energy, 1e-3)), rel=1e-8)
+
+
+def test_the_base_wrench_of_a_hexapod_at_rest_is_its_weight() -> None:
+    platform, motion, _, _ = case(10)
+    p = platform.parameters
+    still = Motion.from_pose(motion.pose)
+    mass = p['platform.mass'] + np.sum(p['legs.cylinder.mass'] + p['legs.piston.mass'])
+    found = platform.base_wrench(still)
+    assert np.allclose(found[:, :3], mass * p['gravity'], rtol=1e-13, atol=0.0)
+    # Its moment is the derivative of the potential energy where all turns about the base's origin.
+    axis, step = random_direction(rng()), 1e-3
+
+    def potential(angle: float) -> Any:
+        turn = rotation_about(axis, angle)
+        return energies(p.replaced({'gravity': turn.T @ p['gravity']}), still)[1]
+
+    assert np.allclose(found[:, 3:] @ axis, -derivative(potential, step), rtol=1e-9)
+
+
+def test_the_base_wrench_needs_no_leg_force() -> None:
+    """In a singular pose, and whatever the friction is."""
+    p = random_parameters(rng(11))
+    without = p.replaced({'actuator.reflected_mass': 0.0, 'actuator.viscous_friction': 0.0,
+                          'actuator.coulomb_friction': 0.0})
+    motion = random_motion(p, rng(), 3)
+    assert np.array_equal(StewartPlatform(p).base_wrench(motion),
+                          StewartPlatform(without).base_wrench(motion))
+
+
+def test_an_external_wrench_goes_through_to_the_base() -> None:
+    platform, motion, wrench, base = case(12)
+    gained = platform.base_wrench(motion, wrench, base) - platform.base_wrench(motion, None, base)
+    truth = wrench.copy()
+    truth[:, 3:] += np.cross(motion.position, wrench[:, :3])
+    assert relative(gained, truth) < 1e-11
+
+
+# BaseMotion
+
+def test_an_imu_anywhere_on_the_base_gives_its_motion() -> None:
+    random = rng(13)
+    p = random_parameters(random)
+    platform, size = StewartPlatform(p), size_of(p)
+    motion, base = random_motion(p, random, STATES), random_base_motion(p, random, STATES)
+    arm, mounting = random.normal(size=3) * size, rotation_about(random_direction(random), 2.0)
+    at_imu = (base.linear_acceleration + np.cross(base.angular_acceleration, arm)
+              + np.cross(base.angular_velocity, np.cross(base.angular_velocity, arm)))
+    found = BaseMotion.from_imu(
+        (at_imu - base.gravity) @ mounting, base.angular_velocity @ mounting,
+        base.angular_acceleration @ mounting, arm, mounting)
+    assert relative(found.gravity, base.gravity - base.linear_acceleration) < 1e-12
+    assert relative(platform.inverse_dynamics(motion, base=found).forces,
+                    platform.inverse_dynamics(motion, base=base).forces) < 1e-12
+    assert relative(platform.base_wrench(motion, base=found),
+                    platform.base_wrench(motion, base=base)) < 1e-12
+
+
+def test_a_motion_in_the_world_is_turned_into_base_axes() -> None:
+    turn = rotation_about(random_direction(rng()), 1.0)
+    world = Motion(np.ones(3), turn, [9.0, 9.0, 9.0], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0],
+                   [7.0, 8.0, 9.0])
+    base = BaseMotion.from_motion(world)
+    assert np.allclose(base.gravity, turn.T @ [0.0, 0.0, -STANDARD_GRAVITY], rtol=1e-14)
+    assert np.allclose(base.angular_velocity, turn.T @ [1.0, 2.0, 3.0], rtol=1e-14)
+    assert np.allclose(base.linear_acceleration, turn.T @ [4.0, 5.0, 6.0], rtol=1e-14)
+    assert np.allclose(base.angular_acceleration, turn.T @ [7.0, 8.0, 9.0], rtol=1e-14)
+    assert np.array_equal(BaseMotion.from_pose(world).gravity, base.gravity)
+    assert not BaseMotion.from_pose(world).rows[3:].any()
+
+
+def test_samples_of_any_shape() -> None:
+    platform, motion, wrench, base = case(14, 6)
+    truth = platform.inverse_dynamics(motion, wrench, base)
+    shaped = Motion(*(part.reshape(2, 3, *part.shape[1:]) for part in (
+        motion.position, motion.rotation, motion.linear_velocity, motion.angular_velocity,
+        motion.linear_acceleration, motion.angular_acceleration)))
+    found = platform.inverse_dynamics(
+        shaped, wrench.reshape(2, 3, 6), BaseMotion.of_rows(base.rows.reshape(2, 3, 12)))
+    assert np.array_equal(found.rows.reshape(6, -1), truth.rows)
+    assert platform.inverse_dynamics(motion[0], base=base).rows.shape == (6, 27)
+    assert platform.base_wrench(motion[0], base=base).shape == (6, 6)
+    assert platform.gravity_vector(motion[0], base).shape == (6, 6)
+    assert platform.coriolis_matrix(motion[0], base=base).shape == (6, 6, 6)
+    assert len(base) == 6
+    assert base[2:4].shape == (2,)
+    assert f'{base}' == '<BaseMotion of shape (6,)>'
+    assert f'{BaseMotion([0.0, 0.0, -9.8])}' == (
+        '<BaseMotion: gravity [0, 0, -9.8] m/s^2, acceleration [0, 0, 0] m/s^2, turning '
+        '[0, 0, 0] rad/s, [0, 0, 0] rad/s^2>')
+
+
+@pytest.mark.parametrize(('make', 'text'), [
+    (lambda: BaseMotion([0.0, 0.0]), 'gravity: shape (2,): must end in (3,)'),
+    (lambda: BaseMotion([0.0, 0.0, np.nan]), 'gravity[2]: nan: must be finite'),
+    (lambda: BaseMotion(np.zeros((2, 3)), np.zeros((3, 3))), 'do not fit each other'),
+    (lambda: BaseMotion.from_pose(np.eye(3)), 'must be a Pose or a Motion'),  # type: ignore
+    (lambda: BaseMotion.from_motion(Pose(np.zeros(3), np.eye(3))),  # type: ignore
+     'must be a Motion'),
+    (lambda: BaseMotion.from_imu(np.zeros(3), np.zeros((2, 3)), np.zeros((4, 3))),
+     'do not fit each other'),
+    (lambda: BaseMotion.from_imu(np.zeros(3), np.zeros(3), rotation=np.zeros((3, 3))),
+     'is not a rotation')])
+def test_wrong_arguments_are_rejected(make: Any, text: str) -> None:
+    with pytest.raises(MotionError) as error:
+        make()
+    assert text in str(error.value)
+
+
+@pytest.mark.parametrize('call', ['inverse_dynamics', 'base_wrench', 'force_breakdown'])
+def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
+    platform, motion, wrench, base = case(15, 3)
+    for wrong, text in ((np.zeros(12), 'must be a BaseMotion'), (base[:2], 'base (2,)')):
+        for some in (motion, motion[0]):
+            if some.shape or text.startswith('must'):
+                with pytest.raises(MotionError) as error:
+                    getattr(platform, call)(some, None, wrong)
+                assert text in str(error.value)
+    with pytest.raises(MotionError) as error:
+        getattr(platform, call)(motion, None, BaseMotion([0.0, 0.0, 0.0], [1e308] * 3,
+                                                         [1e200, 0.0, 0.0]))
+    assert 'overflow' in str(error.value)
+
+
+def test_uncompiled_base_wrenches_are_the_compiled_ones_bit_for_bit() -> None:
+    platform, motion, wrench, base = case(16)
+    given = {'hexapod': platform.constants, 'rows': motion.rows, 'wrench': wrench,
+             'base': base.rows, 'found': np.empty((STATES, 6))}
+    plain = uncompiled(
+        'from stewart_dynamics.mechanics.base_wrench import base_wrenches\n'
+        "base_wrenches(*(given[name] for name in ('hexapod', 'rows', 'wrench', 'base', "
+        "'found')))\n", given)
+    base_wrench.base_wrenches(
+        platform.constants, motion.rows, wrench, base.rows, given['found'])
+    assert np.array_equal(plain['found'], given['found'])
