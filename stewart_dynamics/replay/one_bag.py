@@ -112,7 +112,7 @@ def replay(
         parameters = parameters.replaced({'setpoint.source': source})
     with closing(Recording(bag)) as recording:
         topics = find_topics(recording, parameters, options)
-        notices = notices_of(recording, topics, options)
+        notices = notices_of(recording, topics, parameters, options)
         with whole_folder(folder, options) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
             run.notices += [*likely_mistakes(parameters), *notices]

@@ -152,10 +152,10 @@ def base_wrench_plots() -> list[Plot]:
     """Return the plots of the base wrench over time."""
     return [
         Plot('base_force', '', 'Force on the base', 'N',
-             _of_axes(_first(BASE_WRENCH), 'F x', 'F y', 'F z'),
+             _all_or_one(_of_axes(_first(BASE_WRENCH), 'F x', 'F y', 'F z')),
              'of the whole hexapod, base axes', spikes=True, section=BASE_SECTION),
         Plot('base_moment', '', 'Moment on the base', 'N m',
-             _of_axes(_last(BASE_WRENCH), 'M x', 'M y', 'M z'),
+             _all_or_one(_of_axes(_last(BASE_WRENCH), 'M x', 'M y', 'M z')),
              "about the base's origin, base axes", spikes=True, section=BASE_SECTION)]
 
 
@@ -216,6 +216,12 @@ def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:
 def _of_axes(channels: slice, *names: str) -> dict[str, list[Curve]]:
     return {'': [Curve(name, color, channels.start + n) for n, (name, color) in
                  enumerate(zip(names, _AXIS_COLORS, strict=True))]}
+
+
+def _all_or_one(variants: Mapping[str, list[Curve]]) -> dict[str, list[Curve]]:
+    """Return all curves as one variant, and each as one: the weight hides the others."""
+    curves = variants['']
+    return {'all': curves, **{curve.name: [curve] for curve in curves}}
 
 
 def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:

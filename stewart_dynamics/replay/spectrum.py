@@ -19,14 +19,14 @@ By Welch's method (The use of fast Fourier transform for the estimation of power
 Trans. Audio Electroacoust. 15, 1967, doi:10.1109/TAU.1967.1161901): segments that overlap by half,
 the mean of each removed, Hann windows, the mean of their power spectra.
 
-The length of a bag is not known before its end. So segments of all lengths, powers of two, are
-begun with; a length is given up when there are enough segments of twice that length. The result is
-of the longest segments of which there are enough, and fine enough for long bags and short ones.
+The length of a bag is not known before its end, and a short one needs short segments. So the first
+samples are kept: as many as make ENOUGH of the longest segments. At their end, or at the end of
+the bag, the segments get the greatest length, a power of two, of which there are enough.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,10 +38,9 @@ from stewart_dynamics.replay.block_statistics import FIRST, longest_step
 SHORTEST, LONGEST = 2 ** 6, 2 ** 15
 # So many segments make a spectrum; of the shortest ones, one will do.
 ENOUGH = 4
+_KEPT = (ENOUGH + 1) * LONGEST // 2
 # A step in time that differs by less than this part from a multiple of the usual one is even.
 _EVEN = 0.01
-# At most so many values are transformed at once: they fit into the processor's cache.
-_TOGETHER = 2 ** 17
 # Intervals on the logarithmic axis of which the lowest and the highest line are drawn.
 INTERVALS = 600
 
@@ -59,40 +58,6 @@ class Density(NamedTuple):
     """Length of a segment [s]."""
     uneven: float
     """Part of the steps in time that were not even: values were interpolated linearly."""
-
-
-@dataclass
-class _Length:
-    """Segments of one length."""
-
-    samples: int
-    sums: Array
-    """Of the power spectra (C, samples / 2 + 1)."""
-    segments: int = 0
-    begin: int = 0
-    """Where the next segment begins in the samples that are kept."""
-    window: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = np.arange(self.samples)
-        self.window = 0.5 - 0.5 * np.cos(2.0 * np.pi * n / self.samples)
-
-    def add(self, samples: Array) -> None:
-        """Add all segments that are in samples (C, N)."""
-        many = (samples.shape[1] - self.begin - self.samples) // (self.samples // 2) + 1
-        if many < 1:
-            return
-        step = self.samples // 2
-        at_once = max(_TOGETHER // (self.samples * len(samples)), 1)
-        parts = np.lib.stride_tricks.sliding_window_view(
-            samples[:, self.begin:], self.samples, axis=1)[:, ::step]
-        for first in range(0, many, at_once):
-            part = parts[:, first:min(first + at_once, many)]
-            spectra = np.fft.rfft(
-                (part - part.mean(axis=2, keepdims=True)) * self.window, axis=2)
-            self.sums += np.sum(spectra.real ** 2 + spectra.imag ** 2, axis=1)
-        self.segments += many
-        self.begin += many * step
 
 
 class Spectrum:
@@ -122,10 +87,12 @@ class Spectrum:
         # of the last sample: its place among the even samples, and its values; None: it does not
         # go on from there
         self._last: tuple[float, Array] | None = None
-        self._samples: Array = np.empty((channels, 0))
-        self._lengths = [
-            _Length(2 ** n, np.zeros((channels, 2 ** (n - 1) + 1)))
-            for n in range(SHORTEST.bit_length() - 1, LONGEST.bit_length())]
+        # even samples without a gap between them: those before, while they are kept, and the last
+        self._runs: list[Array] = []
+        self._run: Array = np.empty((channels, 0))
+        self._length = 0  # not yet known
+        self._segments = 0
+        self._powers: Array = np.empty((channels, 0))
         self._steps = self._uneven = 0
 
     def add(self, seconds: Array, values: Array) -> None:
@@ -153,17 +120,21 @@ class Spectrum:
     def density(self) -> Density | None:
         """Return the spectra so far; None if there are too few samples."""
         self._release()
-        found = [each for each in self._lengths if each.segments >= ENOUGH]
-        found = found[-1:] or [each for each in self._lengths[:1] if each.segments]
-        if not found:
+        runs = [*self._runs, self._run]
+        length = self._length or _length_for([each.shape[1] for each in runs])
+        if not length:
             return None
-        length = found[0]
-        rate = 1.0 / self._usual
-        powers = length.sums / (length.segments * rate * np.sum(length.window ** 2))
-        powers[:, 1:-1] *= 2.0  # of the frequencies below zero
-        return Density(
-            np.fft.rfftfreq(length.samples, self._usual)[1:], np.sqrt(powers[:, 1:]),
-            length.segments, length.samples * self._usual, self._uneven / max(self._steps, 1))
+        powers, segments = self._powers, self._segments
+        if not self._length:
+            powers = np.sum([_powers(each, length) for each in runs], axis=0)
+            segments = sum(_segments(each.shape[1], length) for each in runs)
+        # of both signs of the frequency, except at the Nyquist rate
+        scale = 2.0 * self._usual / (segments * float(np.sum(_window(length) ** 2)))
+        density: Array = scale * powers[:, 1:]
+        density[:, -1] *= 0.5
+        frequencies = np.arange(1, length // 2 + 1) / (length * self._usual)
+        return Density(frequencies, np.sqrt(density), segments, length * self._usual,
+                       self._uneven / max(self._steps, 1))
 
     def _release(self) -> None:
         held, self._held = self._held, []
@@ -179,16 +150,16 @@ class Spectrum:
             self._add(seconds, values)
 
     def _add(self, seconds: Array, values: Array) -> None:
-        finite = np.isfinite(values).all(axis=0)
+        finite: Flags = np.all(np.isfinite(values), axis=0)
         steps = np.diff(seconds, prepend=seconds[0] if self._time is None else self._time)
-        gaps = (steps <= 0.0) | (steps > self._gap)
+        gaps: Flags = (steps <= 0.0) | (steps > self._gap)
         places = steps / self._usual
         multiples = np.maximum(np.round(places), 1.0)
         even = np.abs(places - multiples) <= _EVEN
         places = np.where(even, multiples, places)
         self._steps += int(np.count_nonzero(~gaps))
         self._uneven += int(np.count_nonzero(~even & ~gaps))
-        begins = gaps | ~finite
+        begins: Flags = gaps | ~finite
         begins[1:] |= ~finite[:-1]
         at = [0, *np.flatnonzero(begins).tolist(), len(seconds)]
         for begin, end in zip(at[:-1], at[1:], strict=True):
@@ -201,10 +172,10 @@ class Spectrum:
         self._time = float(seconds[-1])
 
     def _end_run(self) -> None:
+        if not self._length and self._run.shape[1] >= SHORTEST:
+            self._runs.append(self._run)
+        self._run = np.empty((self._channels, 0))
         self._last = None
-        self._samples = np.empty((self._channels, 0))
-        for length in self._lengths:
-            length.begin = 0
 
     def _add_run(self, steps: Array, values: Array) -> None:
         """Add samples that go on from the last one, or begin a run if there is none."""
@@ -226,16 +197,53 @@ class Spectrum:
         self._take(even)
 
     def _take(self, even: Array) -> None:
-        self._samples = np.concatenate((self._samples, even), axis=1)
-        for length in self._lengths:
-            length.add(self._samples)
-        enough = [n for n, length in enumerate(self._lengths) if length.segments >= ENOUGH]
-        if enough:
-            del self._lengths[:enough[-1]]
-        used = min(min(length.begin for length in self._lengths), self._samples.shape[1])
-        self._samples = self._samples[:, used:]
-        for length in self._lengths:
-            length.begin -= used
+        self._run = np.concatenate((self._run, even), axis=1)
+        runs = [*self._runs, self._run]
+        if not self._length:
+            ends = np.cumsum([each.shape[1] for each in runs])
+            if ends[-1] < _KEPT:
+                return
+            # by no more samples than these: it must not depend on the blocks
+            self._length = _length_for(np.diff(np.minimum(ends, _KEPT), prepend=0).tolist())
+            self._powers = np.zeros((self._channels, self._length // 2 + 1))
+            self._runs = []
+        for run in runs:
+            self._powers += _powers(run, self._length)
+            self._segments += _segments(run.shape[1], self._length)
+        used = _segments(self._run.shape[1], self._length) * (self._length // 2)
+        self._run = self._run[:, used:].copy()
+
+
+def _segments(samples: int, length: int) -> int:
+    """Return how many segments of a length are in samples."""
+    return max((samples - length) // (length // 2) + 1, 0)
+
+
+def _length_for(runs: Sequence[int]) -> int:
+    """Return the length of segments for runs of so many samples; 0: there are too few."""
+    length = LONGEST
+    while length > SHORTEST and sum(_segments(run, length) for run in runs) < ENOUGH:
+        length //= 2
+    return length if sum(_segments(run, length) for run in runs) else 0
+
+
+def _window(length: int) -> Array:
+    window: Array = 0.5 - 0.5 * np.cos(2.0 * np.pi / length * np.arange(length))
+    return window
+
+
+def _powers(samples: Array, length: int) -> Array:
+    """Return the sums of the squares of the spectra of all segments (C, length / 2 + 1)."""
+    powers = np.zeros((len(samples), length // 2 + 1))
+    many = _segments(samples.shape[1], length)
+    window = _window(length) if many else np.empty(0)
+    # One after the other: they fit into the processor's cache.
+    for n in range(many):
+        begin = n * (length // 2)
+        for channel, power in zip(samples[:, begin:begin + length], powers, strict=True):
+            spectrum = np.fft.rfft((channel - channel.mean()) * window)
+            power += spectrum.real ** 2 + spectrum.imag ** 2
+    return powers
 
 
 def drawn(frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:

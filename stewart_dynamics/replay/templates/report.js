@@ -164,7 +164,7 @@ class TimePlot {
     this.readout = element('aside', {className: 'readout'});
     this.tools = element('div', {className: 'tools'});
     if (spec.variants.length > 1) {
-      const choice = element('select', {ariaLabel: 'leg'},
+      const choice = element('select', {ariaLabel: 'curves'},
         ...spec.variants.map((each, n) => element('option', {value: n, textContent: each.name})));
       choice.addEventListener('change', () => this.choose(+choice.value));
       this.tools.append(choice);
