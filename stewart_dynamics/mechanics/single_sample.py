@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.entry_point import EntryPoint
-from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics import (
+    base_wrench, forward_dynamics, forward_kinematics, inverse_dynamics)
 from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import Pose
@@ -68,6 +69,9 @@ class SingleSample:
         self._forward_dynamics = _Memories(
             forward_dynamics.solve, constants, np.empty((1, MOTION)), np.empty((1, 6)),
             np.empty((1, WRENCH)), np.empty((1, BASE)), np.empty(forward_dynamics.WORK))
+        self._base_wrench = _Memories(
+            base_wrench.base_wrenches, constants, np.empty((1, MOTION)), np.empty((1, WRENCH)),
+            np.empty((1, BASE)), np.empty((1, WRENCH)))
         self._forward_kinematics = _Memories(
             forward_kinematics.poses, constants, np.empty((1, 6)), np.zeros((1, MOTION)),
             np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1))
@@ -89,6 +93,24 @@ class SingleSample:
         result = arrays[3].copy() if sound[0] else None
         self._inverse_dynamics.free(memory)
         return result
+
+    def base_wrench(self, motion: Motion, wrench: Any, base: Any) -> Array | None:
+        """Return the wrench (6,) on the base, whose motion (BASE,) must be given."""
+        if type(motion) is not Motion or type(base) is not BaseMotion:
+            return None
+        memory = self._base_wrench.take()
+        (of_motion, of_wrench, of_base, _), arrays, solve = memory
+        try:
+            of_motion[:] = motion.rows
+            of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+            of_base[:] = base.rows
+        except _NO_FLOATS:
+            self._base_wrench.free(memory)
+            return None
+        solve()
+        result = arrays[3][0].copy()
+        self._base_wrench.free(memory)
+        return result if math.isfinite(sum(result.tolist())) else None
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array | None:
         """Return the leg lengths (6,) at a pose."""

@@ -45,8 +45,9 @@ from stewart_dynamics.nodes.signals import SIGNALS
 from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics
 from stewart_dynamics.parameter_files import is_of_ros
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime import external_wrench, planned_trajectory
+from stewart_dynamics.runtime import base_wrench, external_wrench, planned_trajectory
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
+from stewart_dynamics.runtime.base_wrench import BASE_WRENCH, BaseWrench
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench
@@ -69,10 +70,11 @@ class _Models(NamedTuple):
 
     step: Step
     external_wrench: ExternalWrench
+    base_wrench: BaseWrench
 
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
-        return cls(Step(parameters), ExternalWrench(parameters))
+        return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
 
 
 class DynamicsNode(LifecycleNode):
@@ -98,6 +100,8 @@ class DynamicsNode(LifecycleNode):
         timer.cancel()
         self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
+        self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
+        self._base_wrench_read = False  # somebody subscribes to it
         self._planned = PlannedTrajectoryQueue(
             timer.reset, timer.cancel, self._planned_code, self._on_outcome)
         self.add_on_set_parameters_callback(self._on_set_parameters)
@@ -229,12 +233,20 @@ class DynamicsNode(LifecycleNode):
         publishers = self._topics.publishers
         for topic, message in self._messages.of_output(output):
             publishers[topic].publish(message)
+        if self._base_wrench_read:
+            self._publish_base_wrench(setpoint)
         self._markers.answered(setpoint, output)
         now = time.monotonic()
         if setpoint.base is not None:
             self._diagnostics.base.answered(setpoint, now)
         if self._diagnostics.answered(output, came, now):
             self._report()
+
+    def _publish_base_wrench(self, setpoint: Setpoint) -> None:
+        wrench = self._models.base_wrench(setpoint)
+        if wrench is not None:
+            self._topics.publishers[BASE_WRENCH].publish(
+                self._messages.of_base_wrench(setpoint.stamp, wrench))
 
     def _on_answered(self) -> bool:
         self._markers.publish_due(time.monotonic())
@@ -323,6 +335,10 @@ class DynamicsNode(LifecycleNode):
                             (MEASURED_LEGS, self._external_wrench_code)):
             if not code.ready and self._topics.writers_of(topic):
                 code.begin()  # the first message will come soon
+        reads = self._topics.publishers[BASE_WRENCH].get_subscription_count() > 0
+        if reads and not self._base_wrench_code.ready:
+            self._base_wrench_code.begin()
+        self._base_wrench_read = reads and self._base_wrench_code.ready
         self._markers.publish_due(now)  # the last answer before a silence
         if self._diagnostics.due_at_tick(now):
             self._report()

@@ -108,16 +108,21 @@ class BaseDiagnostics:
         return Status(_NAME, *self._state(now), tuple(values))
 
     def log_lines(self, now: float) -> list[LogLine]:
-        """Return the changes of level."""
-        return self._log.lines(self._state(now)) if self._heard else []
+        """Return that there are no forces, and that there are again; rejections are logged."""
+        # Where nothing has begun, nothing is wrong.
+        return self._log.lines(self._lack(now)) if self._samples or self._unknown else []
 
     def _state(self, now: float) -> Level:
+        lack, held = self._lack(now), self._held.at(now)
+        return held if held.level > lack.level else lack
+
+    def _lack(self, now: float) -> Level:
+        """Return whether the base's motion lacks."""
         if now - self._sampled_at > self._timeout:
             return Level(ERROR, f'no forces: {self._why(now)}')
-        unknown, held = self._unknown_held.at(now), self._held.at(now)
-        if unknown.level:
-            return Level(unknown.level, f'no forces: {unknown.message}')
-        return Level(held.level, held.message or 'known')
+        unknown = self._unknown_held.at(now)
+        return (Level(unknown.level, f'no forces: {unknown.message}') if unknown.level
+                else Level(OK, 'its motion is known'))
 
     def _why(self, now: float) -> str:
         """Return why the base's motion is not known."""
