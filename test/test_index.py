@@ -51,8 +51,8 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'force_rms_n': None if peak is None else 0.5 * abs(peak),
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
     return {'software': 'stewart_dynamics 9', 'complete': True,
-            'setpoints': {'answered': 1000, 'duration_s': 10.0, 'base_unknown': 0}, 'legs': legs, 'limits': [],
-            'limits_not_checked': [], 'measured': None,
+            'setpoints': {'answered': 1000, 'duration_s': 10.0, 'base_unknown': 0}, 'legs': legs,
+            'limits': [], 'limits_not_checked': [], 'measured': None,
             'rejected': [], 'singularity': {
                 'determinant_nearest_m3': 0.25, 'crossings': 0, 'condition_max': 4.5,
                 'warnings': 0}, **changes}
@@ -280,7 +280,8 @@ def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, [
         row(f'{long}/limits', 1, summary([1.0], limits=limits)),
         row(f'{long}/damaged', 3, summary([1.0]), reason), row(f'{long}/failed', 2, None, reason),
-        row(f'{long}/rejected', 3, summary([None], setpoints={'answered': 0, 'duration_s': 0.0}),
+        row(f'{long}/rejected', 3, summary([None], setpoints={
+            'answered': 0, 'duration_s': 0.0, 'base_unknown': 0}),
             'no setpoint could be answered')])
     boxes = page.page.eval_on_selector_all(
         'td.reason div', 'all => all.map((it) => it.getBoundingClientRect().right)')

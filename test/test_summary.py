@@ -507,7 +507,9 @@ def test_without_a_setpoint_there_is_nothing() -> None:
     json.dumps(found, allow_nan=False)
     assert found['setpoints'] == {
         'answered': 0, 'first_stamp_ns': None, 'last_stamp_ns': None, 'duration_s': 0.0,
-        'gaps': 0, 'gaps_s': 0.0, 'restarts': 0}
+        'gaps': 0, 'gaps_s': 0.0, 'restarts': 0, 'base_unknown': 0,
+        'base_unknown_first_at_s': None}
+    assert set(found['base_wrench']['moment'].values()) == {None}
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
     assert summary_lines(summary.values(), hexapod()) == ['no setpoint could be answered']
@@ -564,7 +566,7 @@ def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
     rows[:, 11], rows[:, 17] = 1.0, 0.123
     setpoints = batch(np.round(time * SECOND).astype(np.int64), motions=rows)
     summary = Summary(p)
-    summary.add(time, setpoints, Step(p).many(setpoints, None))
+    summary.add(time, setpoints, Step(p).many(setpoints, None), BaseWrench(p).many(setpoints))
     found = summary.values()['singularity']
     assert found['crossings_at_s'] == pytest.approx([(math.pi / 2.0 - 1.5) / 0.123], abs=1e-4)
     assert found['warnings'] == 1
@@ -710,6 +712,39 @@ def test_a_force_limit_is_not_checked_where_there_are_no_forces() -> None:
     assert 'limits.force_max could not be checked in 2 setpoints: J_inv cannot be solved' in text
     assert 'all limits held' not in text
     assert not Samples(4, demanded=demanded).summary(hexapod()).values()['limits_not_checked']
+
+
+def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None:
+    demanded, loads = np.ones((4, 6)), np.ones((4, 6))
+    demanded[1:3] = loads[1:3] = math.nan
+    samples = Samples(4, demanded=demanded, base_wrenches=loads, base_unknown=[0, 1, 1, 0])
+    limited = hexapod(**{'limits.force_max': 5.0})
+    for parameters, checked in ((limited, False), (hexapod(), True)):
+        found = samples.summary(parameters).values()
+        assert found['setpoints']['base_unknown'] == 2
+        assert found['setpoints']['base_unknown_first_at_s'] == 1.0
+        assert (found['singularity']['unsolved'], found['singularity']['suppressed']) == (0, 0)
+        assert bool(found['limits_not_checked']) is found['limit_met'] is not checked
+        text = '\n'.join(summary_lines(found, parameters))
+        assert ("the base's motion is not known in 2 setpoints, first at t = 1.00 s: they have no "
+                'forces') in text
+        assert ("limits.force_max could not be checked in 2 setpoints: the base's motion is not "
+                'known' in text) is not checked
+    both = Samples(4, demanded=demanded, base_wrenches=loads, base_unknown=[0, 1, 0, 0])
+    assert ("in 1 setpoint: J_inv cannot be solved; in 1 setpoint: the base's motion is not known"
+            in ' '.join(table_of(both, limited).split()))
+
+
+def test_the_base_wrench_is_summed_up_by_magnitude_and_component() -> None:
+    loads = np.zeros((3, 6))
+    loads[:, 2], loads[1, :2], loads[2, 3] = -4.0, (3.0, 0.0), -7.0
+    found = values(3, base_wrenches=loads)['base_wrench']
+    assert found['force'] == {
+        'rms_n': pytest.approx(math.sqrt(0.5 * 16.0 + 25.0 * 0.5 + 0.0)), 'mean_n': 4.5,
+        'peak_n': 5.0, 'peak_at_s': 1.0}
+    assert found['force_z'] == {'rms_n': 4.0, 'mean_n': -4.0, 'peak_n': -4.0, 'peak_at_s': 0.0}
+    assert (found['moment_x']['peak_n_m'], found['moment']['peak_n_m']) == (-7.0, 7.0)
+    assert found['moment']['peak_at_s'] == 2.0
 
 
 def test_a_limit_is_exceeded_only_above_its_tolerance() -> None:
