@@ -152,11 +152,11 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
     force = subtract(read3(wrench, 0), body_force)
     torque = subtract(read3(wrench, 3), body_moment)
     moving = moves(base)
-    felt = felt_at_origin(
-        constants, read3(base, GRAVITY.start), read3(base, BASE_ACCELERATION.start))
     spin = read3(base, BASE_ANGULAR_VELOCITY.start)
     spin_rate = read3(base, BASE_ANGULAR_ACCELERATION.start)
     carrying = carrying_matrix(spin, spin_rate)
+    felt = felt_at_origin(
+        constants, read3(base, GRAVITY.start), read3(base, BASE_ACCELERATION.start))
     if moving:
         load, moment_of_load = platform_load(
             constants, position, rotation, velocity, omega, felt, spin, spin_rate, carrying)
