@@ -39,7 +39,7 @@ from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
 from test_replay import (
-    joint_state, MS, motion, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
+    joint_state, motion, MS, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
     six_of, write_bag)
 
 MOVING = ('pose', 'motion', 'imu')
@@ -121,7 +121,8 @@ def replayed(of: list[Recorded], parameters: Parameters, folder: Path, *options:
 TYPES = {'deck_pose': INPUT_TYPES[BASE_POSE], 'deck_twist': INPUT_TYPES[BASE_TWIST],
          'deck_accel': INPUT_TYPES[BASE_ACCEL], 'deck_imu': INPUT_TYPES[BASE_IMU],
          'pose': INPUT_TYPES[POSE], 'twist': INPUT_TYPES[TWIST], 'accel': INPUT_TYPES[ACCEL],
-         'imu': INPUT_TYPES[BASE_IMU], 'where': INPUT_TYPES[POSE], 'state': 'sensor_msgs/msg/JointState'}
+         'imu': INPUT_TYPES[BASE_IMU], 'where': INPUT_TYPES[POSE],
+         'state': 'sensor_msgs/msg/JointState'}
 
 
 # The numbers

@@ -173,7 +173,8 @@ def random_samples(seed: int, many: int) -> Samples:
         suppressed=random.random(many) < 0.2, lengths=random.uniform(0.4, 1.6, (many, 6)),
         rates=random.integers(-10, 11, (many, 6)) * 0.1,
         unit_load=random.integers(1, 9, (many, 6)), det=random.integers(-2, 3, many),
-        condition=condition, base_wrenches=base_wrenches, base_unknown=base_unknown, warnings=random.random(many) < 0.4,
+        condition=condition, base_wrenches=base_wrenches, base_unknown=base_unknown,
+        warnings=random.random(many) < 0.4,
         time_to_crossing=random.choice([0.1, 0.2, 3.0, math.inf], many))
 
 

@@ -414,6 +414,15 @@ function pointAt(frequency) {
   for (const spectrum of spectra) spectrum.showCursor();
 }
 
+function highest({times, values}) {
+  let most = 0;
+  values.forEach((value, k) => { if (value > values[most]) most = k; });
+  return {time: times[most], value: values[most]};
+}
+
+// Three digits.
+function brief(value) { return shown(+value.toPrecision(3)).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, ''); }
+
 class SpectrumPlot extends TimePlot {
   constructor(spec, place) {
     super(spec, place);
@@ -465,15 +474,12 @@ class SpectrumPlot extends TimePlot {
     const place = this.drawn && pointedAt !== null;
     this.cursor.style.display = place ? 'block' : 'none';
     this.where.textContent = place ? 'at the cursor' : 'highest';
+    const found = this.curves.map(each => highest(curve(each.curve)));
+    const least = Math.max(...found.map(each => each.value)) * 10 ** -DECADES;
     this.curves.forEach((each, n) => {
-      if (place) {
-        this.values[n].textContent = shown(valueAt(each.curve, pointedAt));
-        return;
-      }
-      const {times, values} = curve(each.curve);
-      let most = 0;
-      values.forEach((value, k) => { if (value > values[most]) most = k; });
-      this.values[n].textContent = values[most] > 0 ? `${shown(values[most])} at ${shown(times[most])} Hz` : '0';
+      const {value, time: frequency} = found[n];
+      this.values[n].textContent = place ? shown(valueAt(each.curve, pointedAt))
+        : value > least ? `${brief(value)} at ${brief(frequency)} Hz` : '0';
     });
     if (!place) return;
     const {xaxis, yaxis} = this.canvas._fullLayout;
