@@ -25,6 +25,7 @@ import argparse
 import forward
 import inverse_dynamics
 from inverse_dynamics import Figure, summary, write
+import moving_base
 import starts
 
 BEGIN, END = '<!-- summary: begin -->', '<!-- summary: end -->'
@@ -48,6 +49,7 @@ def main() -> None:
             (inverse_dynamics.BEGIN, inverse_dynamics.END,
              inverse_dynamics.run(options.rounds, options.samples)),
             (forward.BEGIN, forward.END, forward.run(options.rounds)),
+            (moving_base.BEGIN, moving_base.END, moving_base.run(options.rounds)),
             (starts.BEGIN, starts.END, starts.run(options.starts))):
         print('\n'.join(lines))
         figures += found

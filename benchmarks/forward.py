@@ -24,7 +24,7 @@ from typing import Any
 
 from inverse_dynamics import (
     Contestant, example_hexapod, Figure, measure, measured_on, microseconds, once, random_motions,
-    ratio, repeated, table, Tree)
+    ratio, repeated, STILL, table, Tree)
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import root
@@ -113,7 +113,7 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
     dynamics = [
         Contestant('the compiled function alone', repeated(
             'solve()', solve=forward_dynamics.solve.bound(
-                platform.constants, row, force, no_wrench, work)), ABA),
+                platform.constants, row, force, no_wrench, STILL, work)), ABA),
         Contestant(ABA, repeated(
             'aba(model, data, q, v, tau)', aba=pin.aba, model=tree.model, data=tree.data, q=q,
             v=v, tau=np.zeros(tree.model.nv)), ABA),
@@ -122,7 +122,7 @@ def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
             forces=forces[0]), ABA),
         Contestant(f'`forward_dynamics.solve`, a sample of {SAMPLES:,}', once(
             SAMPLES, forward_dynamics.solve, platform.constants, motion.rows.copy(), forces,
-            no_wrench, work), ABA)]
+            no_wrench, STILL, work), ABA)]
 
     random = np.random.default_rng(20260103)
     pose = legal_poses(platform, random, 1)

@@ -32,7 +32,7 @@ typedef struct { double x, y, z; } vector;
 typedef struct {
   vector base_joint, platform_joint;
   double piston_mass, piston_com, cylinder_moment, joint_inertia;
-  double reflected_mass, viscous, coulomb;
+  double reflected_mass, viscous, coulomb, cylinder_mass;
 } leg;
 
 typedef struct {
@@ -56,7 +56,7 @@ typedef struct {
   double determinant, determinant_rate, condition;
 } result;
 
-_Static_assert(sizeof(machine) == (14 + 6 * 13) * sizeof(double), "MACHINE");
+_Static_assert(sizeof(machine) == (14 + 6 * 14) * sizeof(double), "MACHINE");
 _Static_assert(sizeof(motion) == 24 * sizeof(double), "MOTION");
 _Static_assert(sizeof(wrench) == 6 * sizeof(double), "WRENCH");
 _Static_assert(sizeof(result) == 27 * sizeof(double), "RESULT");

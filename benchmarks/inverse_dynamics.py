@@ -41,7 +41,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics import inverse_dynamics, lagrange
 from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.rotation import to_quaternion
-from stewart_dynamics.mechanics.rows import FORCES, RESULT, WRENCH
+from stewart_dynamics.mechanics.rows import FORCES, NO_BASE, RESULT, WRENCH
 from stewart_dynamics.parameters import inertia_matrix
 
 Array = NDArray[np.float64]
@@ -56,6 +56,7 @@ SAMPLES = 200_000
 LAGRANGE_SAMPLES = 2_000
 SINGLE_CALLS_SECONDS = 0.005
 AGREEMENT = 1e-9
+STILL = np.array([NO_BASE])
 
 # Actuators that the example hexapod does not have, so that their terms count in the checks.
 ACTUATORS = {
@@ -280,7 +281,7 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
 
     wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
     for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
-        inverse_dynamics.solve(numbers, rows, wrench, results, tile)
+        inverse_dynamics.solve(numbers, rows, wrench, STILL, results, tile)
         c.function(*c.arguments(numbers, rows, wrench, c_results))
         check(name, c_results, results)
     forces = results[:, FORCES]
@@ -295,7 +296,7 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     q, v, a, _ = tree.state(one)
     single = [
         Contestant(STEP, repeated('solve()', solve=inverse_dynamics.solve_sample.bound(
-            numbers, row[0], no_wrench[0], result[0], np.empty(1), tile)), RNEA),
+            numbers, row[0], no_wrench[0], STILL[0], result[0], np.empty(1), tile)), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),
@@ -310,7 +311,8 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
             arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
     batch = [
         Contestant(BATCH, once(
-            samples, inverse_dynamics.solve, numbers, rows, no_wrench, results, tile), PLAIN_C),
+            samples, inverse_dynamics.solve, numbers, rows, no_wrench, STILL, results, tile),
+            PLAIN_C),
         Contestant(PLAIN_C, once(
             samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),
         Contestant('`StewartPlatform.solve`: the default, all cores', once(

@@ -17,8 +17,8 @@ The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the computer; a caller asks
-for parameters and states meanwhile, a viewer takes the markers, a hexapod has its legs measured, a
-planner sends planned trajectories.
+for parameters and states meanwhile, a viewer takes the markers, a hexapod has its legs measured,
+an IMU is on the base, a planner sends planned trajectories.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from contextlib import suppress
 import gc
 import itertools
 from pathlib import Path
+import random
 import sys
 import time
 from typing import Any
@@ -44,7 +45,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
@@ -63,6 +64,7 @@ FIRST_STAMP = 1_700_000_000_000_000_000
 DISCOVERY_SECONDS = 60.0
 CALLS_PERIOD = 0.1  # [s]
 PLAN_SECONDS = 1.0
+IMU_EVERY = 5  # setpoints: 200 Hz
 # All six coordinates move, within the limits of config/platform.yaml, and repeat themselves.
 MOTION = {
     'motion.type': 'sine', 'motion.initial': (0.0, 0.0, 1.1, 0.0, 0.0, 0.0),
@@ -305,6 +307,33 @@ def measure(name: str) -> None:
     print(number, flush=True)
 
 
+def sway(name: str) -> None:
+    """
+    Publish the readings of an IMU to a node, one with every fifth setpoint's stamp.
+
+    It comes at any time until the next setpoint, as the clocks of an IMU and of setpoints drift.
+    """
+    node = rclpy.create_node('imu')
+    publisher = node.create_publisher(Imu, f'/{name}/base/imu', QOS)
+    message = Imu()
+    message.linear_acceleration.z, message.angular_velocity.x = 9.8, 0.1
+    body = bytes(serialize_message(message))
+    heard = itertools.count()
+    sent: list[int] = []
+
+    def follow(data: bytes) -> None:
+        if next(heard) % IMU_EVERY == 0:
+            time.sleep(PERIOD * 1e-9 * random.random())
+            publisher.publish(data[:12] + body[12:])
+            sent.append(1)
+
+    node.create_subscription(PoseStamped, f'/{name}/setpoint/pose', follow, QOS, raw=True)
+    wait_for(publisher.get_subscription_count, 'the node is there')
+    print('ready', flush=True)
+    spin(node)
+    print(len(sent), flush=True)
+
+
 def wait_for(condition: Any, what: str) -> None:
     """Wait for discovery."""
     end = time.monotonic() + DISCOVERY_SECONDS
@@ -328,6 +357,8 @@ def main() -> None:
         plan(Path(arguments[0]), arguments[1], int(arguments[2]))
     elif role == 'measure':
         measure(*arguments)
+    elif role == 'sway':
+        sway(*arguments)
     else:
         call(*arguments)
     rclpy.try_shutdown()

@@ -56,6 +56,8 @@ from stewart_dynamics.runtime.step import Setpoint, Step
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
 BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'
 BEGIN_LEGS, END_LEGS = '<!-- measured legs: begin -->', '<!-- measured legs: end -->'
+BEGIN_BASE, END_BASE = '<!-- IMU: begin -->', '<!-- IMU: end -->'
+PARTS = 'node', 'markers', 'legs', 'base'
 NODE = str(executable('stewart_dynamics'))
 
 DOMAIN = '101'  # the tests have those below
@@ -80,11 +82,11 @@ class Contestant(NamedTuple):
     command: tuple[str, ...]
 
 
-def ours(name: str, source: str) -> Contestant:
-    """Return the node under a name."""
+def ours(name: str, source: str, *parameters: str) -> Contestant:
+    """Return the node under a name, with parameters ``name:=value``."""
+    given = [part for each in (f'setpoint.source:={source}', *parameters) for part in ('-p', each)]
     return Contestant('`stewart_dynamics`', name, source, (
-        NODE, '--ros-args', '-r', f'__node:={name}', '--params-file', str(PARAMETERS),
-        '-p', f'setpoint.source:={source}'))
+        NODE, '--ros-args', '-r', f'__node:={name}', '--params-file', str(PARAMETERS), *given))
 
 
 def pass_through(how: str, source: str) -> Contestant:
@@ -210,7 +212,7 @@ class Measurement:
         How they talk.
     beside : str
         A role of ``latency.py`` that the first contestant has beside it all the time: its
-        services are called, its markers viewed, or its legs measured.
+        services are called, its markers viewed, its legs measured, or an IMU is on its base.
     killed : bool
         One more listener is killed by SIGKILL in the middle of the last turn.
 
@@ -399,6 +401,18 @@ def legs_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
     return ['', *markdown(cells), '', measurement_words(), '']
 
 
+def base_lines(rounds: int, seconds: int, folder: Path) -> list[str]:
+    """Return the table of a node with an IMU on its base beside one whose base is fixed."""
+    nodes = [ours('swaying', 'separate', 'base.source:=imu', 'base.timeout:=1.0'),
+             ours('alone', 'separate')]
+    turns = in_turns(nodes, rounds, seconds, folder, beside='sway')
+    cells = [HEADER[:-4] + ('p50, times fixed', 'p99, times fixed')]
+    for title, row in zip(('`~/base/imu` at 200 Hz', 'fixed base'),
+                          latency_rows('', nodes, turns, beside=1), strict=True):
+        cells.append((title, *row[1:-2]))
+    return ['', *markdown(cells), '']
+
+
 def measurement_words() -> str:
     """Return how long a measurement takes, from its message to the wrench's."""
     parameters = Parameters.from_yaml(PARAMETERS)
@@ -440,8 +454,8 @@ def main() -> None:
     parser.add_argument('--seconds', type=int, default=SECONDS, help='of a turn (%(default)s)')
     parser.add_argument('--minutes', type=int, default=MINUTES,
                         help='of the long run; 0: none (%(default)s)')
-    parser.add_argument('--parts', nargs='+', choices=('node', 'markers', 'legs'),
-                        default=('node', 'markers', 'legs'), help='what is measured (all of it)')
+    parser.add_argument('--parts', nargs='+', choices=PARTS, default=PARTS,
+                        help='what is measured (all of it)')
     parser.add_argument('--write', action='store_true', help='put the tables into README.md')
     options = parser.parse_args()
     if options.rounds < 1 or options.seconds < 1 or options.minutes < 0:
@@ -457,6 +471,9 @@ def main() -> None:
                 options.rounds, options.seconds, Path(name))
         if 'legs' in options.parts:
             lines[BEGIN_LEGS, END_LEGS] = legs_lines(
+                options.rounds, options.seconds, Path(name))
+        if 'base' in options.parts:
+            lines[BEGIN_BASE, END_BASE] = base_lines(
                 options.rounds, options.seconds, Path(name))
     versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'numba', 'ros-rclpy'))
     computer = (f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 from typing import Any
 from xml.etree import ElementTree
 
@@ -77,6 +78,17 @@ def visit_displaymath(translator: Any, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+# Links lead to the files that GitHub shows; on the site these are included in pages.
+
+def lead_to_pages(*arguments: Any) -> None:
+    """Replace links to README files in the text of a page, or of a file that it includes."""
+    content = arguments[-1]
+    content[0] = re.sub(r'\]\(\.\./benchmarks/README\.md', '](performance.md', content[0])
+    content[0] = re.sub(r'\]\(\.\./security/README\.md', '](security.md', content[0])
+
+
 def setup(app: Sphinx) -> None:
-    """Register the renderer of formulas."""
+    """Register what is above."""
+    app.connect('source-read', lead_to_pages)
+    app.connect('include-read', lead_to_pages)
     app.add_html_math_renderer('mathml', (visit_math, None), (visit_displaymath, None))

@@ -132,7 +132,10 @@ def main() -> None:
     parser.add_argument('--timeout', type=float, default=10.0,
                         help='for the node to appear, and to answer [s]')
     # The handlers of rclpy would shut ROS down in the middle of a call.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as exc:  # bad ROS arguments
+        sys.exit(f'plan_motion: {exc}')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
         answer = ask(Planner(), trajectory(options.start, options.to, options.duration),

@@ -87,7 +87,10 @@ def main() -> None:
     parser.add_argument('--timeout', type=float, default=10.0,
                         help='for the next external wrench [s]')
     # The handlers of rclpy would shut ROS down in the middle of a call.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as exc:  # bad ROS arguments
+        sys.exit(f'push_platform: {exc}')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     pusher = Pusher()
     try:

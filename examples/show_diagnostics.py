@@ -56,7 +56,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--values', action='store_true', help='print all values, too')
     # The handlers of rclpy would shut ROS down in the middle of a call.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as exc:  # bad ROS arguments
+        sys.exit(f'show_diagnostics: {exc}')
     monitor = Monitor(parser.parse_args(remove_ros_args(sys.argv)[1:]).values)
     try:
         while True:

@@ -60,6 +60,7 @@ class ParameterSet(Mapping[str, Any]):
 
     table: ClassVar[Mapping[str, Parameter]]
     node: ClassVar[str]
+    unused: ClassVar[frozenset[str]] = frozenset()  # accepted in a shared file, without effect
 
     def __init__(self, values: Mapping[str, Any], source: str = 'parameters', *,
                  exact_types: bool = False) -> None:

@@ -107,22 +107,28 @@ def combined(
 
 def trajectory(stamp: int, times: Sequence[int], rows: Sequence[Sequence[float]],
                frame: str = 'base', names: Sequence[str] = ('platform',),
-               little_endian: bool = True, parts: Sequence[tuple[int, int, int]] = ()) -> bytes:
+               little_endian: bool = True, parts: Sequence[tuple[int, int, int]] = (),
+               others: Sequence[Sequence[float]] = ()) -> bytes:
     """
     Return a MultiDOFJointTrajectory of points at times [ns].
 
-    Rows have position, quaternion, velocity and acceleration, 19 numbers; ``parts``: how many
-    transforms, velocities, accelerations each point has.
+    Rows have position, quaternion, velocity and acceleration, 19 numbers, ``others`` those of a
+    second joint; ``parts``: how many transforms, velocities, accelerations each point has of the
+    last joint.
     """
     points = []
-    for n, (time, row) in enumerate(zip(times, rows, strict=True)):
+    for n, time in enumerate(times):
+        joints = [each[n] for each in (rows, others) if len(each)]
         many = parts[n] if parts else (1, 1, 1)
-        transform = _new(
+        transforms = [_new(
             'geometry_msgs/msg/Transform', _new('geometry_msgs/msg/Vector3', *row[0:3]),
-            _new('geometry_msgs/msg/Quaternion', *row[3:7]))
+            _new('geometry_msgs/msg/Quaternion', *row[3:7])) for row in joints]
+        twists, accelerations = (
+            [_vectors('geometry_msgs/msg/Twist', row[part]) for row in joints]
+            for part in (slice(7, 13), slice(13, 19)))
         points.append(_new(
-            'trajectory_msgs/msg/MultiDOFJointTrajectoryPoint', [transform] * many[0],
-            [_vectors('geometry_msgs/msg/Twist', row[7:13])] * many[1],
-            [_vectors('geometry_msgs/msg/Twist', row[13:19])] * many[2],
+            'trajectory_msgs/msg/MultiDOFJointTrajectoryPoint', *(
+                each[:-1] + each[-1:] * number for each, number in zip(
+                    (transforms, twists, accelerations), many, strict=True)),
             _new('builtin_interfaces/msg/Duration', *divmod(time, 1_000_000_000))))
     return _bytes(_new(COMBINED, _header(stamp, frame), list(names), points), little_endian)

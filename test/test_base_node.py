@@ -41,8 +41,8 @@ OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 MS = 1_000_000
 KINDS: dict[str, Any] = {
     BASE_POSE: PoseStamped, BASE_TWIST: TwistStamped, BASE_ACCEL: AccelStamped, BASE_IMU: Imu}
-MOVING = Sample((0.1, -0.05, 1.15), (0.0, 0.0, 0.06, 0.9981983770774224), (0.2, 0.1, -0.3, 0.4, -0.5, 0.6),
-                (1.0, -2.0, 0.5, 2.0, 1.0, -3.0))
+MOVING = Sample((0.1, -0.05, 1.15), (0.0, 0.0, 0.06, 0.9981983770774224),
+                (0.2, 0.1, -0.3, 0.4, -0.5, 0.6), (1.0, -2.0, 0.5, 2.0, 1.0, -3.0))
 
 
 class OnBase:

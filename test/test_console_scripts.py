@@ -60,6 +60,8 @@ def test_help_is_answered_without_ros_and_without_a_compiler(program: str) -> No
     kind = PROGRAMS[program]
     assert run(program, '--help', ros='without ROS') == (0, f'{usage(kind)}\n[]\n', '')
     for name, parameter in kind.table.items():
+        if name in kind.unused:
+            continue
         line, = (line for line in usage(kind).splitlines() if line.startswith(f'  {name} ('))
         assert line.endswith(f': {parameter.text}')
         assert ('required' in line.partition('):')[0]) == parameter.required
@@ -72,6 +74,15 @@ def test_help_shows_defaults() -> None:
                  '  limits.force_max (double[1 or 6], N): ',
                  '  legs.piston.mass (double[1 or 6], kg, default 0.0): '):
         assert line in text
+
+
+def test_help_lists_what_the_simulator_uses() -> None:
+    head, _, rest = usage(SimulatorParameters).partition('\n\naccepted, ')
+    for name in ('setpoint.timeout', 'singularity.action', 'visualization_rate', 'autostart'):
+        assert f'  {name} (' not in head
+        assert name in rest
+    assert '  limits.force_max (' in head
+    assert 'accepted, ' not in usage(Parameters) + usage(ReferenceMotionParameters)
 
 
 @pytest.mark.parametrize('program', PROGRAMS)

@@ -25,7 +25,8 @@ from referees import symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.runtime.diagnostics.periodic_report import (
+    ERROR, LogLine, OK, STALE, Status, WARN)
 from stewart_dynamics.runtime.input_topics import ACCEL, POSE, TWIST
 from stewart_dynamics.runtime.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.runtime.step import Output, Setpoint, Step
@@ -265,6 +266,16 @@ def test_another_node_of_the_same_name_is_an_error() -> None:
     assert (of.level, of.message) == (ERROR, '3 nodes are named /ns/node')
     diagnostics.setpoints.found({}, {}, '/ns/node', 1)
     assert status(diagnostics, 'setpoints', BEGIN).level == OK
+
+
+def test_another_node_of_the_same_name_is_logged_once() -> None:
+    diagnostics = begun()
+    logged = []
+    for namesakes in (1, 2, 2, 3, 1, 2):
+        answered(diagnostics, BEGIN)
+        diagnostics.setpoints.found({}, {}, '/node', namesakes)
+        logged += diagnostics.setpoints.log_lines(BEGIN)
+    assert logged == 2 * [LogLine(WARN, 'setpoints: 2 nodes are named /node')]
 
 
 def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:

@@ -100,6 +100,7 @@ def test_links_of_the_site_lead_to_pages_and_anchors(site: dict[str, Page]) -> N
             if parts.path:
                 target = (page.path.parent / unquote(parts.path)).resolve()
             assert target.is_file(), f'{page.path.name}: {link}'
+            assert target.suffix != '.md', f'{page.path.name}: {link}'  # a download
             if parts.fragment and target.suffix == '.html':
                 found = site.get(target.name) or Page(target)
                 assert unquote(parts.fragment) in found.anchors, f'{page.path.name}: {link}'

@@ -106,6 +106,15 @@ def test_without_a_node_it_ends_with_one_line(domain: int, run: Run, name: str) 
     assert 'within 0.5 s' in line
 
 
+@pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')))
+def test_bad_ros_arguments_end_it_with_one_line(domain: int, run: Run, name: str) -> None:
+    program = run(name, domain, '--ros-args', '-r', 'no rule')
+    assert program.wait() == 1
+    line, = (line for line in program.stderr.splitlines() if '[rcl]: ' not in line)
+    assert line.startswith(f'{name.removesuffix(".py")}: ')
+    assert 'remap rule' in line
+
+
 @pytest.mark.slow
 def test_a_push_is_found_in_the_loop(ros_environment: None, tmp_path: Path, run: Run) -> None:
     """In the simulator's own time, so that it depends on no load of the computer."""

@@ -28,7 +28,7 @@ from referees import (
     printed_compiled_and_not, random_motion, random_parameters, random_wrench, relative, rng, ROOT,
     smooth_motion)
 
-from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.parameter_files import read_yaml
@@ -94,6 +94,35 @@ def times(random: np.random.Generator, many: int) -> list[int]:
 
 
 # Known loads
+
+def test_on_a_moving_base_its_motion_is_no_external_load() -> None:
+    """A hexapod held at rest on a base that rolls, under a load."""
+    random = rng(2)
+    parameters = random_parameters(random).replaced(UNFILTERED)
+    platform, of_base = StewartPlatform(parameters), smooth_motion(parameters, random)
+    pose = random_motion(parameters, random, 1)
+    still = Motion(pose.position[0], pose.rotation[0])
+    load = random_wrench(parameters, random, 1)[0]
+    step, found = ExternalWrench(parameters), []
+    row = tuple(still.rows.tolist())
+    for n in range(200):
+        base = BaseMotion.from_motion(of_base(n * 1e-3), parameters['gravity'])
+        # The forces of a millisecond are those of its middle.
+        middle = BaseMotion.from_motion(of_base((n - 0.5) * 1e-3), parameters['gravity'])
+        result = platform.inverse_dynamics(still, load, middle)
+        found.append(step(
+            Measurement(BEGIN + n * MILLISECOND, six(result.lengths), six(result.rates),
+                        six(result.forces)),
+            found[-1] if found else None, NO_WRENCH, row, tuple(base.rows.tolist())))
+    assert relative(wrenches(found), np.tile(load, (199, 1))) < 1e-4
+    without = ExternalWrench(parameters)
+    first = without(Measurement(BEGIN, *(six(each) for each in (
+        result.lengths, result.rates, result.forces))), None, NO_WRENCH, row)
+    then = without(Measurement(BEGIN + MILLISECOND, *(six(each) for each in (
+        result.lengths, result.rates, result.forces))), first, NO_WRENCH, row)
+    assert then.wrench is not None
+    assert relative(then.wrench, load) > 0.1
+
 
 def test_a_static_load_is_found() -> None:
     """On random hexapods, with a known load that is not external."""

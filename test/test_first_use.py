@@ -24,6 +24,7 @@ from typing import Any
 import pytest
 from running import DynamicsNode, Planner
 from stewart_dynamics.compilation.machine_code import COMPILED, folder_to_write
+from stewart_dynamics.compile_all import compile_all
 from stewart_dynamics.runtime.measured_legs import NOT_COMPILED
 from test_dynamics_node import MOVING
 from test_external_wrench_node import Felt
@@ -38,6 +39,7 @@ LATER = ('stewart_dynamics.mechanics.forward_kinematics.twists',
 @pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
 def test_what_is_needed_later_is_compiled_while_setpoints_are_answered(
         start: Callable[..., DynamicsNode], tmp_path: Path) -> None:
+    compile_all()  # in a workspace this may be the first test that needs it
     kept = tmp_path / 'kept'
     kept.mkdir()
     for file in folder_to_write().glob('*.code'):

@@ -41,6 +41,7 @@ import struct
 import subprocess
 import sys
 import termios
+from threading import Event, Thread
 import time
 from typing import Any
 
@@ -56,6 +57,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from stewart_dynamics import BagError, Parameters, StewartError
 from stewart_dynamics.replay.bag_task import kept, Task
 from stewart_dynamics.replay.bags import folders_of_results
+from stewart_dynamics.replay.local_processes import _uninterrupted
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.options import (
@@ -392,6 +394,8 @@ def test_an_interrupted_run_continues(bags: Path, tmp_path: Path, jobs: int) -> 
     for bag, folder in (pairs[0], pairs[-1]):
         replay(bag, PARAMETERS, folder, PLAIN._replace(run='interrupted'))
     (pairs[1][1] / 'bag').mkdir(parents=True)  # not complete: without summary.json
+    for _, folder in (pairs[0], pairs[2]):  # of a run that was killed
+        folder.with_name(f'.{folder.name}.{32 * "0"}.partial.12345678').mkdir(parents=True)
 
     def times() -> dict[Path, int]:
         return {folder: folder.stat().st_mtime_ns for _, folder in pairs if folder.exists()}
@@ -399,6 +403,7 @@ def test_an_interrupted_run_continues(bags: Path, tmp_path: Path, jobs: int) -> 
     before = times()
     fleet = replay_fleet(pairs, PARAMETERS, output, PLAIN, jobs)
     assert [each.kept for each in fleet.ended] == [True, *[False] * 9, True]
+    assert hidden(output) == []
     assert fleet.text().splitlines() == [
         '11 bags: 9 done, 1 limit or warning, 1 failed; 2 kept from an earlier run, their '
         'inputs have not changed', fleet.ended[1].error]
@@ -532,6 +537,27 @@ def test_an_interrupt_leaves_no_partial_results(
     # finished results are complete
     for folder in (path.parent for path in output.rglob('summary.json')):
         check_whole(folder, huge / folder.relative_to(output))
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_until_processes_are_started(number: signal.Signals) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, interrupted)
+    started, over = False, Event()
+    # It blocks no signal, as the threads of libraries.
+    other = Thread(target=over.wait)
+    other.start()
+    try:
+        with pytest.raises(KeyboardInterrupt), _uninterrupted():
+            signal.pthread_kill(other.ident, number)
+            time.sleep(0.01)
+            started = True
+    finally:
+        over.set()
+        signal.signal(number, before)
+    assert started
 
 
 @pytest.mark.slow

@@ -281,6 +281,10 @@ def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
     assert max(boxes) < 1440
     assert page.page.locator('nav button').all_inner_texts() == [
         'all 4', 'limit or warning 1', 'incomplete 1', 'nothing answered 1', 'failed 1']
+    # and on A4 across, with margins of 10 mm, all columns
+    page.page.set_viewport_size({'width': 1047, 'height': 700})
+    page.page.emulate_media(media='print')
+    assert page.page.eval_on_selector('table', 'it => it.getBoundingClientRect().right') <= 1047
 
 
 @in_browser

@@ -21,6 +21,7 @@ from referees import ROOT
 from stewart_dynamics import Parameters
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.runtime.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
@@ -49,6 +50,16 @@ def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
             'time it took (s)': '0.100'}
     planned.done(ACCEPTED._replace(warning=True), 0.1)
     assert report.make(BEGIN)[0][-1].level == WARN
+
+
+def test_outcomes_that_took_long_are_logged() -> None:
+    planned = PlannedTrajectoryDiagnostics()
+    for outcome, seconds in ((ACCEPTED, 1.9), (ACCEPTED, 2.14), (ACCEPTED, 3.0), (REJECTED, 4.0)):
+        planned.done(outcome, seconds)
+    assert planned.log_lines(BEGIN) == [
+        LogLine(OK, 'planned trajectory: accepted: 2 points (took 2.1 s)'),
+        LogLine(OK, 'planned trajectory: accepted: 2 points (took 3.0 s)'),
+        LogLine(ERROR, 'planned trajectory rejected: x (took 4.0 s)', 'why')]
 
 
 def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:

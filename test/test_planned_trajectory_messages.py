@@ -25,20 +25,24 @@ from hypothesis import strategies as st
 import messages
 import numpy as np
 import pytest
-from stewart_dynamics import Parameters, StewartPlatform
+from referees import rng
+from scipy.spatial.transform import Rotation
+from stewart_dynamics import (
+    BaseMotion, check_planned_trajectory, Motion, MotionError, Parameters, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.runtime import planned_trajectory
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.planned_trajectory import NOT_INCREASING, PIECE, TOO_FAR
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN, NOT_FINITE, NOT_UNIT
 from trajectories import (
     Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP, UNBOUND)
 
 
 def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = NO_WRENCH,
-               ) -> Outcome:
+               base: Array | None = None) -> Outcome:
     """Return what becomes of a trajectory."""
-    *pieces, outcome = planned.answer(parameters, wrench, data)
+    *pieces, outcome = planned.answer(parameters, wrench, data, base)
     assert outcome is not None
     assert not any(pieces)
     assert bool(outcome.answer) != bool(outcome.reason)
@@ -107,6 +111,99 @@ def test_without_effort_points_have_none(joint: str) -> None:
         assert point.time_from_start == other.time_from_start
 
 
+def on_base(many: int) -> tuple[list[list[float]], BaseMotion]:
+    """Return the motion of a base at points, in the world, as numbers and as the library's."""
+    random = rng()
+    rows = [[*random.normal(size=3), *Rotation.random(random_state=n).as_quat(),
+             *random.normal(size=12)] for n in range(many)]
+    numbers = np.array(rows)
+    return rows, BaseMotion.from_motion(Motion.from_quaternion(
+        *(numbers[:, part] for part in (
+            slice(3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 19)))),
+        PARAMETERS['gravity'])
+
+
+@pytest.mark.parametrize('points', [1, 2, PIECE + 1])
+@pytest.mark.parametrize('names', [('platform', 'base'), ('p', 'base'), ('', 'base')])
+@pytest.mark.parametrize('little_endian', [True, False])
+def test_the_second_joint_is_the_base(
+        points: int, names: tuple[str, str], little_endian: bool) -> None:
+    times, rows = some(points)
+    others, base = on_base(points)
+    data = messages.trajectory(STAMP, times, rows, names=names, others=others,
+                               little_endian=little_endian)
+    # Whatever the base does now does not matter.
+    outcome = outcome_of(data, FREE, base=np.full(12, np.nan))
+    result = StewartPlatform(FREE).inverse_dynamics(motion_of(rows), base=base)
+    assert np.array([point.effort for point in decoded(outcome).points]).tobytes() \
+        == result.forces.tobytes()
+    with_library = check_planned_trajectory(
+        StewartPlatform(FREE), np.array(times) * 1e-9, motion_of(rows), base=base)
+    assert np.array_equal(with_library.forces, result.forces)
+
+
+def test_without_the_base_it_is_at_rest_under_the_gravity_of_now() -> None:
+    times, rows = some(10)
+    row = np.zeros(12)
+    row[:3] = 1.0, 2.0, -9.0
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows), base=row)
+    result = StewartPlatform(PARAMETERS).inverse_dynamics(
+        motion_of(rows), base=BaseMotion([1.0, 2.0, -9.0]))
+    assert np.array([point.effort for point in decoded(outcome).points]).tobytes() \
+        == result.forces.tobytes()
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows), base=np.full(12, np.nan))
+    assert outcome.reason == BASE_NOT_KNOWN
+
+
+def test_a_base_that_is_wrong_is_rejected() -> None:
+    times, rows = some(3)
+    others, _ = on_base(3)
+    for names, text in ((('platform', 'ship'), "joint_names[1]: 'ship': the second joint is the "
+                         "base, 'base'"), (('a', 'b', 'base'), '3 joint_names: must be at most')):
+        outcome = outcome_of(messages.trajectory(STAMP, times, rows, names=names, others=others))
+        assert text in outcome.message
+    for n, number, reason in ((1, math.nan, NOT_FINITE), (2, 9.0, NOT_UNIT)):
+        wrong = [list(row) for row in others]
+        wrong[n][3] = number
+        outcome = outcome_of(messages.trajectory(
+            STAMP, times, rows, names=('platform', 'base'), others=wrong))
+        assert outcome.reason == reason
+        assert f'points[{n}]' in outcome.message
+    outcome = outcome_of(messages.trajectory(STAMP, times, rows, names=('platform', 'base')))
+    assert outcome.message.endswith('points[0]: 1 transforms: each point has one for each joint')
+
+
+def test_a_force_limit_is_checked_between_points_with_the_base_between_them() -> None:
+    """The hexapod rests; the base's gravity changes sign between two points."""
+    times = [0, SECOND]
+    rows = np.array([[*HOME, *REST, *REST]] * 2)
+    motion = motion_of(rows)
+    platform = StewartPlatform(FREE)
+    base = BaseMotion([[0.0, 0.0, -9.0], [0.0, 0.0, 9.0]])
+    forces = platform.inverse_dynamics(motion, base=base).forces
+    assert np.abs(forces).max() > 0.0
+    bounded = FREE.replaced({'limits.force_max': 1.01 * float(np.abs(forces).max())})
+    result = check_planned_trajectory(
+        StewartPlatform(bounded), np.array(times) * 1e-9, motion, base=base)
+    assert result.accepted
+    stronger = BaseMotion([[0.0, 0.0, -9.0], [0.0, 0.0, 9.2]])
+    result = check_planned_trajectory(
+        StewartPlatform(bounded), np.array(times) * 1e-9, motion, base=stronger)
+    assert not result.accepted
+    assert 'force' in result.message
+
+
+@pytest.mark.parametrize(('base', 'text'), [
+    (np.zeros(12), 'must be a BaseMotion'),
+    (BaseMotion(np.zeros((3, 3))), 'base: shape (3,): must be () or (2,)')])
+def test_a_base_of_another_type_or_shape_is_rejected(base: Any, text: str) -> None:
+    times, rows = some(2)
+    with pytest.raises(MotionError) as error:
+        check_planned_trajectory(
+            StewartPlatform(FREE), np.array(times) * 1e-9, motion_of(rows), base=base)
+    assert text in str(error.value)
+
+
 def test_values_have_the_largest_force_and_condition_number() -> None:
     times, rows = sampled('clear', SECOND // 100)
     outcome = outcome_of(messages.trajectory(STAMP, times, rows))
@@ -143,9 +240,10 @@ def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> N
     solved: list[int] = []
     solve = StewartPlatform.solve
 
-    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None) -> Array:
+    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None,
+                bases: Array | None = None) -> Array:
         solved.append(len(rows))
-        return solve(platform, rows, wrenches)
+        return solve(platform, rows, wrenches, bases)
 
     monkeypatch.setattr(StewartPlatform, 'solve', counted)
     for step in (SECOND, SECOND // 1000):
@@ -209,7 +307,7 @@ BAD: dict[str, tuple[bytes, str, str]] = {
     'cut short by a time': (WHOLE[:-8], 'malformed', 'points[3] is cut short'),
     'no points': (messages.trajectory(STAMP, [], []), 'malformed',
                   '0 points: must be 1 to 100000'),
-    'two joints': (spoilt(names=('a', 'b')), 'malformed', '2 joint_names'),
+    'two joints': (spoilt(names=('a', 'b')), 'malformed', 'the second joint is the base'),
     'no transform': (spoilt(parts=[(1, 1, 1), (0, 1, 1), (1, 1, 1), (1, 1, 1)]), 'malformed',
                      'points[1]: 0 transforms: each point has one'),
     'no velocity': (spoilt(parts=[(1, 1, 1), (1, 1, 1), (1, 0, 1), (1, 1, 1)]), 'malformed',

@@ -83,6 +83,28 @@ def worked(plant: Plant, periods: int, seed: int) -> tuple[float, float, float]:
     return energy_of(plant) - before, float(np.sum(work)), float(np.sum(np.abs(work)))
 
 
+def test_parameters_that_help_lists_as_not_used_change_nothing() -> None:
+    given = simulated()
+    changes: dict[str, Any] = {}
+    for name in SimulatorParameters.unused:
+        rule, value = given.table[name], given[name]
+        if rule.kind == 'bool':
+            changes[name] = not value
+        elif rule.choices:
+            changes[name] = next(each for each in rule.choices if each != value)
+        elif rule.kind == 'string':
+            changes[name] = f'other_{value}'
+        else:
+            changes[name] = 0.01 if value is None or np.ndim(value) else 0.5 + 1.5 * value
+    one, other = Plant(given), Plant(given.replaced(changes))
+    load = 0.2 * given['platform.mass'] * 9.81 * np.arange(6.0)
+    for _ in range(20):
+        both = [np.concatenate(each.advance(tuple(load), ZERO)) for each in (one, other)]
+        # J_inv is solved with moments over the characteristic length: rounding differs.
+        assert relative(*both) < 1e-12
+    assert max(np.abs(one.state.rates)) > 0.01  # above what limits.velocity_max is there
+
+
 # Energy
 
 @pytest.mark.parametrize('hexapod', ['config', 'random'])

@@ -923,6 +923,10 @@ def test_a_killed_replay_leaves_nothing_under_the_final_name(
     assert not (tmp_path / 'out' / 'long').exists()
     # its partial results do not prevent another replay
     assert run(ROOT / 'bags' / 'clear', tmp_path / 'out') == DONE
+    # and are removed by that of the same bag
+    assert len(list((tmp_path / 'out').glob('.long.*'))) == 1
+    assert run(long_bag, tmp_path / 'out') == DONE
+    assert not list((tmp_path / 'out').glob('.*'))
 
 
 @pytest.mark.parametrize('sent', [signal.SIGINT, signal.SIGTERM])
@@ -1179,6 +1183,23 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
     found = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())['setpoints']
     assert found['answered'] == 20
     assert found['duration_s'] == pytest.approx(9 * 1_700_000_000.0, rel=1e-6)
+
+
+# A signal when the module that reads the arguments is looked for, and when the process ends.
+@pytest.mark.parametrize('when, code, text', [
+    ("sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda name, *_: "
+     "end() if name.endswith('command_line') else None)}))", 130, 'interrupted'),
+    ('atexit.register(end)', BAD_INPUT,
+     'nowhere: not a bag that can be read: no such file or folder')])
+@pytest.mark.parametrize('sent', ['SIGINT', 'SIGTERM'])
+def test_a_signal_at_the_start_or_end_is_no_traceback(
+        sent: str, when: str, code: int, text: str) -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', 'import atexit, signal, sys\n'
+         f'def end():\n    signal.raise_signal(signal.{sent})\n'
+         f'from stewart_dynamics.replay import main\n{when}\nsys.exit(main())',
+         'nowhere', '--params', str(PARAMS)], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (code, f'stewart_replay: {text}\n')
 
 
 def test_an_interrupt_while_results_are_replaced_keeps_some(tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ class _Elements(HTMLParser):
         self.attributes: list[str] = []
         self.text = ''
         self._hidden = 0
-        self.feed(page)
+        self.feed(page.replace('<wbr>', ''))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.names.append(tag)
@@ -573,6 +573,21 @@ def test_nothing_is_wider_than_a_phone_or_paper(opened: Callable[..., Opened]) -
     report.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     report.until('[...byCanvas.values()].every(drawing => drawing.drawn)')
     assert report.page.evaluate('document.documentElement.scrollWidth') == 696
+    report.check()
+
+
+def test_paper_shows_the_whole_hexapod(opened: Callable[..., Opened]) -> None:
+    report = opened(trajectory('clear'))
+    report.see('platform')
+    eye = "document.getElementById('platform').layout.scene.camera.eye"
+    before = report.page.evaluate(eye)
+    for event, factor in (('beforeprint', 1.44), ('afterprint', 1.0)):
+        report.page.evaluate(f"window.dispatchEvent(new Event('{event}'))")
+        report.until('[...byCanvas.values()].every(drawing => drawing.drawn)')
+        assert report.page.evaluate(eye) == pytest.approx(
+            {axis: factor * value for axis, value in before.items()})
+    # Names of parameters break between their words.
+    assert 'limits.<wbr>force_<wbr>max' in report.page.inner_html('#parameters')
     report.check()
 
 

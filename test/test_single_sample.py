@@ -58,9 +58,10 @@ def test_one_sample_is_the_batch_bit_for_bit(
     guess = Pose(motion.position + 1e-3, motion.rotation)
     poses = platform.forward_kinematics(lengths, guess)
     for n in range(MANY):
-        assert np.array_equal(single.inverse_dynamics(motion[n], wrench[n]), batch.rows[n])
+        assert np.array_equal(single.inverse_dynamics(motion[n], wrench[n], None), batch.rows[n])
         assert np.array_equal(
-            single.forward_dynamics(motion[n], batch.forces[n], wrench[n]), back.rows[n])
+            single.forward_dynamics(
+                motion[n], batch.forces[n], wrench[n], None), back.rows[n])
         assert np.array_equal(single.forward_kinematics(lengths[n], guess[n]), poses.rows[n])
         # and the call of the library is this one
         assert np.array_equal(platform.inverse_dynamics(motion[n], wrench[n]).rows, batch.rows[n])

@@ -39,12 +39,8 @@ from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.body_dynamics import leg_inertia, leg_line
 from stewart_dynamics.mechanics.hexapod_constants import (
     gravity_of, joints_of, leg_of, platform_of)
-from stewart_dynamics.mechanics.rows import (
-    ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY,
-    GRAVITY, LINEAR_VELOCITY, POSITION, ROTATION)
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, Matrix3, read3, read9, rotate, rotate_back, scale, subtract, symmetric,
-    Vector3)
+    add, cross, dot, Matrix3, rotate, rotate_back, scale, subtract, symmetric, Vector3)
 
 
 @inlined
@@ -54,9 +50,19 @@ def carried(spin: Vector3, spin_rate: Vector3, arm: Vector3) -> Vector3:
 
 
 @inlined
-def _leg_load(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
-              velocity: Vector3, omega: Vector3, felt: Vector3, spin: Vector3,
-              spin_rate: Vector3) -> tuple[Vector3, Vector3]:
+def carrying_matrix(spin: Vector3, spin_rate: Vector3) -> Matrix3:
+    """Return the matrix that gives the same for every arm: skew(W') + W W^T - W.W."""
+    x, y, z = spin
+    dx, dy, dz = spin_rate
+    return (-(y * y + z * z), x * y - dz, x * z + dy,
+            x * y + dz, -(x * x + z * z), y * z - dx,
+            x * z - dy, y * z + dx, -(x * x + y * y))
+
+
+@inlined
+def leg_load(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
+             velocity: Vector3, omega: Vector3, felt: Vector3, spin: Vector3,
+             carrying: Matrix3) -> tuple[Vector3, Vector3]:
     """Return force and moment at the platform's origin that move a leg along with the base."""
     own = leg_of(constants, leg)
     base_joint, _ = joints_of(constants, leg)
@@ -64,11 +70,10 @@ def _leg_load(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
     x_rate = add(velocity, cross(omega, a))
     piston_moment, inertia = leg_inertia(own, length, inverse_length)
     hanging_mass = (own.cylinder_moment + piston_moment) * inverse_length
-    joint = add(felt, carried(spin, spin_rate, base_joint))
+    joint = add(felt, rotate(carrying, base_joint))
     q = cross(spin, s)
     q_squared = dot(q, q)
-    turning = scale(inertia * length, add(
-        add(cross(spin_rate, s), cross(spin, q)), scale(q_squared, s)))
+    turning = scale(inertia * length, add(rotate(carrying, s), scale(q_squared, s)))
     coriolis = add(
         scale(2.0 * piston_moment * inverse_length * dot(s, x_rate), q),
         scale(2.0 * inertia * dot(spin, s), cross(s, x_rate)))
@@ -79,14 +84,14 @@ def _leg_load(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
 
 
 @inlined
-def _platform_load(constants: Array, position: Vector3, rotation: Matrix3, velocity: Vector3,
-                   omega: Vector3, felt: Vector3, spin: Vector3, spin_rate: Vector3,
-                   ) -> tuple[Vector3, Vector3]:
+def platform_load(constants: Array, position: Vector3, rotation: Matrix3, velocity: Vector3,
+                  omega: Vector3, felt: Vector3, spin: Vector3, spin_rate: Vector3,
+                  carrying: Matrix3) -> tuple[Vector3, Vector3]:
     """Return force and moment at the platform's origin that move it along with the base."""
     mass, center, inertia = platform_of(constants)
     com = rotate(rotation, center)
     force = scale(mass, add(
-        add(felt, carried(spin, spin_rate, add(position, com))),
+        add(felt, rotate(carrying, add(position, com))),
         scale(2.0, cross(spin, add(velocity, cross(omega, com))))))
     # its angular velocity is W + w, its angular acceleration W' + w' + W x w
     w, base_w = rotate_back(rotation, omega), rotate_back(rotation, spin)
@@ -107,29 +112,29 @@ def base_load(constants: Array, position: Vector3, rotation: Matrix3, velocity: 
     The wrench on the platform is less by it. The motion of the platform comes first, then that
     of the base.
     """
-    felt = subtract(acceleration, subtract(gravity, gravity_of(constants)))
-    force, moment = _platform_load(
-        constants, position, rotation, velocity, omega, felt, spin, spin_rate)
-    for leg in range(6):
-        leg_force, leg_moment = _leg_load(
-            constants, leg, position, rotation, velocity, omega, felt, spin, spin_rate)
-        force, moment = add(force, leg_force), add(moment, leg_moment)
-    return force, moment
+    felt = felt_at_origin(constants, gravity, acceleration)
+    carrying = carrying_matrix(spin, spin_rate)
+    p, v, w = position, velocity, omega
+    force, moment = platform_load(
+        constants, p, rotation, v, w, felt, spin, spin_rate, carrying)
+    # Not a loop: the loop over samples becomes vector code then.
+    f0, m0 = leg_load(constants, 0, p, rotation, v, w, felt, spin, carrying)
+    f1, m1 = leg_load(constants, 1, p, rotation, v, w, felt, spin, carrying)
+    f2, m2 = leg_load(constants, 2, p, rotation, v, w, felt, spin, carrying)
+    f3, m3 = leg_load(constants, 3, p, rotation, v, w, felt, spin, carrying)
+    f4, m4 = leg_load(constants, 4, p, rotation, v, w, felt, spin, carrying)
+    f5, m5 = leg_load(constants, 5, p, rotation, v, w, felt, spin, carrying)
+    return (add(add(add(add(add(add(force, f0), f1), f2), f3), f4), f5),
+            add(add(add(add(add(add(moment, m0), m1), m2), m3), m4), m5))
+
+
+@inlined
+def felt_at_origin(constants: Array, gravity: Vector3, acceleration: Vector3) -> Vector3:
+    """Return the acceleration of the base's origin, less the gravity that the parameter lacks."""
+    return subtract(acceleration, subtract(gravity, gravity_of(constants)))
 
 
 @inlined
 def moves(base: Array) -> bool:
     """Return whether a row of the base's motion adds a load: a row of nan adds none."""
     return not math.isnan(base[0])
-
-
-@inlined
-def row_load(constants: Array, motion: Array, base: Array) -> tuple[Vector3, Vector3]:
-    """Return the load of the base for rows of motion; zero for a base of nan."""
-    if not moves(base):
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    return base_load(
-        constants, read3(motion, POSITION.start), read9(motion, ROTATION.start),
-        read3(motion, LINEAR_VELOCITY.start), read3(motion, ANGULAR_VELOCITY.start),
-        read3(base, GRAVITY.start), read3(base, BASE_ACCELERATION.start),
-        read3(base, BASE_ANGULAR_VELOCITY.start), read3(base, BASE_ANGULAR_ACCELERATION.start))

@@ -29,13 +29,14 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
-from stewart_dynamics.mechanics.base_load import row_load
+from stewart_dynamics.mechanics.base_load import (
+    carrying_matrix, felt_at_origin, leg_load, moves, platform_load)
 from stewart_dynamics.mechanics.body_dynamics import leg_dynamics, platform_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import (
     characteristic_length_of, leg_of, platform_of)
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION,
-    ROTATION)
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
+    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION, ROTATION)
 from stewart_dynamics.mechanics.vectors import (
     add, Matrix3, read3, read9, rotate, scale, subtract, symmetric, Symmetric3, Vector3)
 
@@ -148,9 +149,18 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
     moment = scale(mass, com)
     inertia = _sum6(_turned(rotation, platform_inertia), _point_inertia(mass, com))
     body_force, body_moment = platform_dynamics(constants, rotation, omega, _REST, _REST)
-    load_force, load_moment = row_load(constants, motion, base)
-    force = subtract(subtract(read3(wrench, 0), load_force), body_force)
-    torque = subtract(subtract(read3(wrench, 3), load_moment), body_moment)
+    force = subtract(read3(wrench, 0), body_force)
+    torque = subtract(read3(wrench, 3), body_moment)
+    moving = moves(base)
+    spin = read3(base, BASE_ANGULAR_VELOCITY.start)
+    spin_rate = read3(base, BASE_ANGULAR_ACCELERATION.start)
+    carrying = carrying_matrix(spin, spin_rate)
+    felt = felt_at_origin(
+        constants, read3(base, GRAVITY.start), read3(base, BASE_ACCELERATION.start))
+    if moving:
+        load, moment_of_load = platform_load(
+            constants, position, rotation, velocity, omega, felt, spin, spin_rate, carrying)
+        force, torque = subtract(force, load), subtract(torque, moment_of_load)
     work[:] = 0.0
     for n in range(6):
         leg = leg_dynamics(constants, n, position, rotation, velocity, omega, _REST, _REST)
@@ -159,6 +169,10 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
         inertia = _sum6(inertia, _point_inertia(leg.inertia, leg.arm))
         force = subtract(force, leg.force)
         torque = subtract(torque, leg.moment)
+        if moving:
+            load, moment_of_load = leg_load(
+                constants, n, position, rotation, velocity, omega, felt, spin, carrying)
+            force, torque = subtract(force, load), subtract(torque, moment_of_load)
         push = forces[n] - leg.actuator
         own = leg_of(constants, n)
         along = own.piston_mass + own.reflected_mass - leg.inertia

@@ -121,10 +121,13 @@ def _subtract_base_load(constants: Array, tile: Array, k: int) -> None:
 @inlined
 def _put_base(constants: Array, tile: Array, k: int, base: Array) -> None:
     """Store the base's motion; one of nan as one that adds zero."""
+    if moves(base):
+        for n in range(BASE):
+            tile[k + _BASE + n * LANES] = base[n]
+        return
     gravity = gravity_of(constants)
     for n in range(BASE):
-        tile[k + _BASE + n * LANES] = base[n] if moves(base) else (
-            gravity[n] if n < GRAVITY.stop else 0.0)
+        tile[k + _BASE + n * LANES] = gravity[n] if n < GRAVITY.stop else 0.0
 
 
 @compiled

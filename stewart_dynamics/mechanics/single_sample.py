@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.entry_point import EntryPoint
-from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics import (
+    base_wrench, forward_dynamics, forward_kinematics, inverse_dynamics)
 from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import Pose
@@ -64,31 +65,55 @@ class SingleSample:
     def __init__(self, constants: Array) -> None:
         self._inverse_dynamics = _Memories(
             inverse_dynamics.solve_sample, constants, np.empty(MOTION), np.empty(WRENCH),
-            np.empty(BASE), np.empty(RESULT), np.empty(1), np.empty(inverse_dynamics.TILE))
+            _NO_BASE, np.empty(RESULT), np.empty(1), np.empty(inverse_dynamics.TILE))
         self._forward_dynamics = _Memories(
             forward_dynamics.solve, constants, np.empty((1, MOTION)), np.empty((1, 6)),
-            np.empty((1, WRENCH)), np.empty((1, BASE)), np.empty(forward_dynamics.WORK))
+            np.empty((1, WRENCH)), _NO_BASE[None], np.empty(forward_dynamics.WORK))
+        self._base_wrench = _Memories(
+            base_wrench.base_wrenches, constants, np.empty((1, MOTION)), np.empty((1, WRENCH)),
+            np.empty((1, BASE)), np.empty((1, WRENCH)))
         self._forward_kinematics = _Memories(
             forward_kinematics.poses, constants, np.empty((1, 6)), np.zeros((1, MOTION)),
             np.empty(1, np.int64), np.empty(1, np.int64), np.empty(1))
 
     def inverse_dynamics(self, motion: Motion, wrench: Any, base: Any) -> Array | None:
         """Return the row of results (RESULT,) of a motion (MOTION,) under a wrench (6,)."""
-        if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):
+        if type(motion) is not Motion:
             return None
         memory = self._inverse_dynamics.take()
         (of_motion, of_wrench, of_base, _, sound, _), arrays, solve = memory
         try:
             of_motion[:] = motion.rows
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
-            of_base[:] = _NO_BASE if base is None else base.rows
+            if base is not None:
+                of_base[:] = _base_row(base)
         except _NO_FLOATS:
             self._inverse_dynamics.free(memory)
             return None
         solve()
+        if base is not None:
+            of_base[:] = _NO_BASE
         result = arrays[3].copy() if sound[0] else None
         self._inverse_dynamics.free(memory)
         return result
+
+    def base_wrench(self, motion: Motion, wrench: Any, base: Any) -> Array | None:
+        """Return the wrench (6,) on the base, whose motion (BASE,) must be given."""
+        if type(motion) is not Motion or type(base) is not BaseMotion:
+            return None
+        memory = self._base_wrench.take()
+        (of_motion, of_wrench, of_base, _), arrays, solve = memory
+        try:
+            of_motion[:] = motion.rows
+            of_wrench[:] = _NO_WRENCH if wrench is None else wrench
+            of_base[:] = base.rows
+        except _NO_FLOATS:
+            self._base_wrench.free(memory)
+            return None
+        solve()
+        result = arrays[3][0].copy()
+        self._base_wrench.free(memory)
+        return result if math.isfinite(sum(result.tolist())) else None
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array | None:
         """Return the leg lengths (6,) at a pose."""
@@ -102,7 +127,7 @@ class SingleSample:
     def forward_dynamics(self, motion: Motion, forces: Any, wrench: Any, base: Any,
                          ) -> Array | None:
         """Return the row of the motion (MOTION,) that follows from leg forces (6,)."""
-        if type(motion) is not Motion or (base is not None and type(base) is not BaseMotion):
+        if type(motion) is not Motion:
             return None
         memory = self._forward_dynamics.take()
         (of_motion, of_forces, of_wrench, of_base, _), arrays, solve = memory
@@ -110,11 +135,14 @@ class SingleSample:
             of_motion[:] = motion.rows
             of_forces[:] = forces
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
-            of_base[:] = _NO_BASE if base is None else base.rows
+            if base is not None:
+                of_base[:] = _base_row(base)
         except _NO_FLOATS:
             self._forward_dynamics.free(memory)
             return None
         solve()
+        if base is not None:
+            of_base[:] = _NO_BASE
         result = arrays[0][0].copy()
         self._forward_dynamics.free(memory)
         return result if math.isfinite(sum(result[ACCELERATION].tolist())) else None
@@ -135,6 +163,14 @@ class SingleSample:
         result = arrays[1][0, :_POSE].copy() if code[0] == forward_kinematics.FOUND else None
         self._forward_kinematics.free(memory)
         return result
+
+
+def _base_row(base: Any) -> Array:
+    """Return the row of one base motion; TypeError for anything else."""
+    if type(base) is not BaseMotion:
+        raise TypeError
+    row: Array = base.rows
+    return row
 
 
 class _Memories:

@@ -38,7 +38,7 @@ from stewart_dynamics.mechanics.platform_arguments import (
     base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.rows import (
-    BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, FORCES, GRAVITY,
+    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, FORCES, GRAVITY,
     LENGTHS, MOTION, POSE, POSITION, RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
@@ -81,6 +81,7 @@ class StewartPlatform:
         self._single = SingleSample(self.constants)
         self._breakdown: ForceBreakdownRows | None = None
         self._home: Pose | None = None
+        self._still = BaseMotion(parameters['gravity'])
 
     def __reduce__(self) -> tuple[type[StewartPlatform], tuple[Parameters]]:
         """Pickle and copy the parameters alone."""
@@ -174,15 +175,17 @@ class StewartPlatform:
         ``inverse_dynamics``. Forces within the hexapod, friction among them, do not matter, and
         singular poses are allowed.
         """
+        base = self._still if base is None else base
+        result = self._single.base_wrench(motion, wrench, base)
+        if result is not None:
+            return result
         rows, wrenches, bases, shape = loaded(motion, wrench, base)
-        results = self.base_wrenches(rows, wrenches, None if base is None else bases)
+        results = self.base_wrenches(rows, wrenches, bases)
         return check_finite('motion', results.reshape(*shape, WRENCH), len(shape))
 
     def base_wrenches(self, rows: Array, wrenches: Array, bases: Array | None = None) -> Array:
         """Return rows (N, 6) of ``base_wrench`` of rows of motion, unchecked, see ``solve``."""
-        if bases is None:  # still
-            bases = np.zeros((1, BASE))
-            bases[0, GRAVITY] = self.parameters['gravity']
+        bases = self._still.rows[None] if bases is None else bases
         results = np.empty((len(rows), WRENCH))
         batch.in_parts(base_wrench.base_wrenches, self.constants, *map(
             batch.compact, (rows, wrenches, bases)), results)

@@ -58,7 +58,11 @@ def usage(kind: type[ParameterSet]) -> str:
     return '\n'.join([
         f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
         *(['       stewart_dynamics --compile    compile all machine code now, and end']
-          if compiles else []), '', 'parameters:', *map(_described, kind.table.values())])
+          if compiles else []), '', 'parameters:',
+        *(_described(each) for each in kind.table.values() if each.name not in kind.unused),
+        *(['', 'accepted, so that programs can share a file, and not used:',
+           f'  {", ".join(name for name in kind.table if name in kind.unused)}']
+          if kind.unused else [])])
 
 
 def _described(parameter: Parameter) -> str:

@@ -221,9 +221,9 @@ class DynamicsNode(LifecycleNode):
 
     def _take_waiting(self) -> None:
         executor, topics = self.executor, self._topics
-        if topics.base:
+        # Where no setpoint has waited, the executor has taken the base's messages before it.
+        if take_waiting_messages(executor, topics.setpoints, self._on_setpoint, QUEUE):
             take_waiting_messages(executor, topics.base, self._on_base, QUEUE)
-        take_waiting_messages(executor, topics.setpoints, self._on_setpoint, QUEUE)
 
     def _answer(self) -> None:
         if self._active:

@@ -178,9 +178,11 @@ def describe_by(
 
 def take_waiting_messages(
         executor: Executor | None, subscriptions: Mapping[str, Any],
-        take: Callable[[str, bytes], None], most: int) -> None:
+        take: Callable[[str, bytes], None], most: int) -> bool:
     """
     Take the messages that wait in the middleware, from each raw subscription in turn.
+
+    Return whether there were any.
 
     The single-threaded executor runs a task before the messages that have come meanwhile
     (rclpy/executors.py, ``_wait_for_ready_callbacks``): a node that has fallen behind would answer
@@ -201,8 +203,8 @@ def take_waiting_messages(
 
     """
     if not isinstance(executor, SingleThreadedExecutor):
-        return
-    for _ in range(most):
+        return False
+    for n in range(most):
         came = False
         for topic, subscription in subscriptions.items():
             with subscription.handle:
@@ -211,7 +213,8 @@ def take_waiting_messages(
                 came = True
                 take(topic, taken[0])
         if not came:
-            return
+            return n > 0
+    return True
 
 
 class _TimeSource(TimeSource):

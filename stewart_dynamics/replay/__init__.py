@@ -18,14 +18,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import os
+import signal
 import sys
+
+_INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program stewart_replay; report a missing library in one line."""
+    """
+    Run the program stewart_replay; report a missing library in one line.
+
+    Without arguments, those of the command line, signals are ignored afterwards: the process ends.
+    """
+    before = {each: signal.signal(each, _end_at_once) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
-        from stewart_dynamics.replay.command_line import main as program
-    except ModuleNotFoundError as exc:
-        print(f'stewart_replay: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
-        return 2
-    return program(arguments)
+        try:
+            from stewart_dynamics.replay.command_line import main as program
+        except ModuleNotFoundError as exc:
+            print(f'stewart_replay: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
+            return 2
+        return program(arguments)
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, signal.SIG_IGN if arguments is None else handler)
+
+
+def _end_at_once(number: int, frame: object) -> None:
+    """End while libraries are imported: numpy turns an exception into another one."""
+    os.write(2, b'stewart_replay: interrupted\n')
+    os._exit(_INTERRUPTED)

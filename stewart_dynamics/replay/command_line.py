@@ -20,7 +20,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import io
-import os
 from pathlib import Path
 import re
 import signal
@@ -50,7 +49,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
             stream.reconfigure(errors='backslashreplace')
-    before = {each: signal.signal(each, _end_at_once) for each in _SIGNALS}
     try:
         return _run(given, _options(given))
     except StewartError as exc:
@@ -66,15 +64,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as exc:
         _complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
         return _INTERRUPTED
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
-
-
-def _end_at_once(number: int, frame: object) -> None:
-    """End while libraries are imported: numpy turns an exception into another one."""
-    os.write(2, b'stewart_replay: interrupted\n')
-    os._exit(_INTERRUPTED)
 
 
 def _interrupted(number: int, frame: object) -> None:
@@ -189,7 +178,9 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
 
     from stewart_dynamics.replay.bags import bytes_of
     from stewart_dynamics.replay.one_bag import replay
+    from stewart_dynamics.replay.results_folder import remove_abandoned
 
+    remove_abandoned([folder])
     with tqdm(total=bytes_of(bag), unit='B', unit_scale=True, disable=None, leave=False,
               dynamic_ncols=True) as bar:
         done = 0

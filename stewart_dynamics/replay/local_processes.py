@@ -106,8 +106,9 @@ class _Pool:
         progress, of_workers = _CONTEXT.Pipe(duplex=False)
         # When this end is closed, also by the death of this process, the others stop.
         until, kept_open = _CONTEXT.Pipe(duplex=False)
-        pool = ProcessPoolExecutor(
-            self._jobs, _CONTEXT, initializer=_set_up, initargs=(of_workers, until))
+        with _uninterrupted():  # a semaphore would remain that nobody removes
+            pool = ProcessPoolExecutor(
+                self._jobs, _CONTEXT, initializer=_set_up, initargs=(of_workers, until))
         pending: dict[Future[Ended], int] = {}
         try:
             with _uninterrupted():
@@ -144,7 +145,17 @@ class _Pool:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Block Ctrl-C in processes that are started: this process stops them."""
+    """
+    Hold signals while processes are started, and block Ctrl-C in these: this process stops them.
+
+    A process that is being started while an exception comes would be unknown to its pool.
+    """
+    held: list[int] = []
+    handlers = {}
+    if threading.current_thread() is threading.main_thread():
+        # Other threads, as those of OpenBLAS, receive signals that this one blocks.
+        handlers = {each: signal.signal(each, lambda number, _: held.append(number))
+                    for each in (signal.SIGINT, signal.SIGTERM)}
     # Starting the resource tracker later would lift the block.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -152,6 +163,10 @@ def _uninterrupted() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for each, handler in handlers.items():
+            signal.signal(each, handler)
+        for number in held[:1]:
+            signal.raise_signal(number)
 
 
 # In the processes

@@ -40,7 +40,7 @@ from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.index import Cell, listed_results, SEVERITY, write_fleet
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, Options, PARTLY_READ
 from stewart_dynamics.replay.progress_bar import ProgressBar
-from stewart_dynamics.replay.results_folder import partial_name
+from stewart_dynamics.replay.results_folder import partial_name, remove_abandoned
 
 _SEVERITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
 
@@ -108,6 +108,7 @@ def replay_fleet(
     if not options.force:
         ended = {task.number: found for task in tasks if (found := kept(task)) is not None}
     _check_replaceable(tasks, ended, output, options)
+    remove_abandoned(task.folder for task in tasks)
     sizes = [0 if task.number in ended else bytes_of(task.bag) for task in tasks]
     # The largest first: started last, it would run alone at the end.
     order = sorted((task for task in tasks if task.number not in ended),

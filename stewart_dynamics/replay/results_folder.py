@@ -13,16 +13,22 @@
 # limitations under the License.
 
 
-"""The folder of a bag's results: it gets its name only when it is complete."""
+"""
+The folder of a bag's results: it gets its name only when it is complete.
+
+Until then it is locked. What a killed run leaves is not, by which the next run finds it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+import fcntl
 import hashlib
 import json
 import os
 from pathlib import Path
+import re
 import shutil
 import tempfile
 from typing import Any
@@ -31,13 +37,17 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.replay.options import Options
 
 
+_REPLACED = '.replaced'
+_PARTIAL = re.compile(
+    rf'(\..+\.)(?:[0-9a-f]{{32}}|one)\.partial\.\w{{8}}(?:{re.escape(_REPLACED)})?', re.DOTALL)
+
+
 @contextmanager
 def whole_folder(final: Path, options: Options) -> Iterator[Path]:
     """Yield a folder that gets its final name only when it is complete."""
     final.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(
-        prefix=f'{partial_name(final, options.run)}partial.', dir=final.parent))
-    replaced = partial.with_name(f'{partial.name}.replaced')
+    partial, lock = _new_folder(final, options.run)
+    replaced = partial.with_name(f'{partial.name}{_REPLACED}')
     try:
         yield partial
         partial.chmod(0o755)
@@ -53,14 +63,74 @@ def whole_folder(final: Path, options: Options) -> Iterator[Path]:
             if left.is_symlink():
                 left.unlink()
             shutil.rmtree(left, ignore_errors=True)
+        os.close(lock)
+
+
+def _new_folder(final: Path, run: str) -> tuple[Path, int]:
+    """Return a folder for partial results, and the descriptor that locks it."""
+    while True:
+        partial = Path(tempfile.mkdtemp(
+            prefix=f'{partial_name(final, run)}partial.', dir=final.parent))
+        try:
+            lock = os.open(partial, os.O_RDONLY)
+        except FileNotFoundError:  # another run has removed it before it was locked
+            continue
+        if _try_to_lock(lock) is not False and partial.exists():
+            return partial, lock
+        os.close(lock)
+
+
+def _try_to_lock(descriptor: int) -> bool | None:
+    """Return whether a folder is locked now; None where the file system has no locks."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+    return True
+
+
+def remove_abandoned(folders: Iterable[Path]) -> None:
+    """Remove what killed runs have left of the results of these folders, beside them."""
+    finals: dict[Path, dict[str, Path]] = {}
+    for final in folders:
+        finals.setdefault(final.parent, {})[_beginning(final)] = final
+    for parent, of_names in finals.items():
+        # A folder comes before what it was to replace.
+        for path in sorted(parent.iterdir()) if parent.is_dir() else ():
+            found = _PARTIAL.fullmatch(path.name)
+            if found and found[1] in of_names:
+                _remove_if_abandoned(path, of_names[found[1]])
+
+
+def _remove_if_abandoned(path: Path, final: Path) -> None:
+    """Remove partial results, or put back what they were to replace, unless in use."""
+    partial = path.with_name(path.name.removesuffix(_REPLACED))
+    locked = partial if partial.exists() else final
+    try:
+        descriptor = os.open(locked, os.O_RDONLY)
+    except FileNotFoundError:
+        with suppress(OSError):
+            path.rename(final)
+        return
+    try:
+        if _try_to_lock(descriptor):
+            shutil.rmtree(path, ignore_errors=True)
+    finally:
+        os.close(descriptor)
 
 
 def partial_name(final: Path, run: str) -> str:
     """Return the prefix of the names of partial results, of a folder in a run."""
+    return f'{_beginning(final)}{run or "one"}.'
+
+
+def _beginning(final: Path) -> str:
     # A long name would exceed the limit of the file system with the suffix.
     short = (final.name if len(os.fsencode(final.name)) < 120
              else hashlib.sha256(os.fsencode(final.name)).hexdigest())
-    return f'.{short}.{run or "one"}.'
+    return f'.{short}.'
 
 
 def check_free(folder: Path, options: Options) -> None:

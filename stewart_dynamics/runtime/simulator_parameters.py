@@ -53,6 +53,10 @@ _OWN = (
     Parameter('noise.seed', 'double', 'seed of the noise: equal seeds give equal noise', '', 0.0),
 )
 
+# Beginnings of names.
+_OF_THE_NODE = ('autostart', 'external_wrench.', 'limits.velocity_max', 'platform_frame',
+                'setpoint.', 'singularity.', 'trajectory.', 'visualization_rate')
+
 SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
     # The node has no lifecycle: none of the hexapod's may change while it runs either.
     **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
@@ -64,6 +68,7 @@ class SimulatorParameters(Parameters):
 
     table = SIMULATOR_PARAMETERS
     node = 'stewart_simulator'
+    unused = frozenset(name for name in PARAMETERS if name.startswith(_OF_THE_NODE))
 
     def _check_together(self, source: str) -> None:
         """Check what one parameter demands of another."""

@@ -446,6 +446,9 @@ function legLines(joints, forces) {
   return {x: column(points, 0), y: column(points, 1), z: column(points, 2), colors};
 }
 
+// A narrow scene is seen from farther away.
+function distance(width) { return Math.max(1, 620 / width, width < NARROW ? 720 / width : 0); }
+
 // Axes of equal scale that contain base and platform in all frames.
 function scene(numbers, width) {
   const beside = besideBase();
@@ -460,12 +463,11 @@ function scene(numbers, width) {
     }
   }
   const pad = 0.06 * Math.max(...high.map((value, k) => value - low[k]), 1e-9);
-  const far = Math.max(1, 620 / width, width < NARROW ? 720 / width : 0);
+  const far = distance(width);
   const axis = (name, k) => ({title: {text: `${name} [m]`}, range: [low[k] - pad, high[k] + pad],
     gridcolor: '#dde2e8', zerolinecolor: '#c3cad3', backgroundcolor: '#fff', showbackground: false,
     showspikes: false, tickfont: {size: 11}});
   return {xaxis: axis('X', 0), yaxis: axis('Y', 1), zaxis: axis('Z', 2), aspectmode: 'data',
-    // a narrow scene is seen from farther away
     camera: {eye: {x: 1.15 * far, y: -1.35 * far, z: 0.62 * far}, center: {x: 0, y: 0, z: -0.12}}};
 }
 
@@ -762,15 +764,27 @@ document.addEventListener('click', event => {
 
 // For printing all plots are drawn, in the width of the paper.
 const PAPER = 500;  // [px], beside the values in 186
+const FAR = 1.44;  // of a scene of this width, with a color bar
 window.addEventListener('beforeprint', () => {
   for (const drawing of byCanvas.values()) {
     inView.add(drawing);
+    const far = Math.max(1, FAR / distance(drawing.canvas.clientWidth));
     drawing.appear();
-    Plotly.relayout(drawing.canvas, {width: PAPER});
+    Plotly.relayout(drawing.canvas, {width: PAPER, ...seenFrom(drawing, far)});
+    drawing.back = 1 / far;
   }
 });
 window.addEventListener('afterprint', () => {
-  for (const drawing of byCanvas.values()) Plotly.relayout(drawing.canvas, {width: null, autosize: true});
+  for (const drawing of byCanvas.values()) {
+    Plotly.relayout(drawing.canvas, {width: null, autosize: true, ...seenFrom(drawing, drawing.back)});
+  }
 });
+// The change of layout by which a scene is seen from farther away.
+function seenFrom(drawing, far) {
+  const {scene} = drawing.canvas.layout;
+  if (!scene) return {};
+  const {x, y, z} = scene.camera.eye;
+  return {'scene.camera.eye': {x: far * x, y: far * y, z: far * z}};
+}
 
 setUp();

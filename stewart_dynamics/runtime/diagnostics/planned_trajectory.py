@@ -23,6 +23,7 @@ from stewart_dynamics.runtime.diagnostics.periodic_report import (
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
 _NAME = 'planned trajectory'
+_LONG = 2.0  # [s]
 
 
 class PlannedTrajectoryDiagnostics:
@@ -44,9 +45,12 @@ class PlannedTrajectoryDiagnostics:
             ('rejected', str(counts.total() - counts['accepted'])),
             *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'accepted'),
             *outcome.values, ('time it took (s)', f'{seconds:.3f}')))
-        lines = self._log.lines(Level(level, outcome.message))
+        message = outcome.message + (f' (took {seconds:.1f} s)' if seconds > _LONG else '')
+        lines = self._log.lines(Level(level, message))
         if outcome.reason:  # each, whatever came before
-            lines = [LogLine(ERROR, f'{_NAME} {outcome.message}', outcome.reason)]
+            lines = [LogLine(ERROR, f'{_NAME} {message}', outcome.reason)]
+        elif seconds > _LONG:
+            lines = [LogLine(level, f'{_NAME}: {message}')]
         self._lines += lines
 
     def level(self, now: float) -> int:
@@ -58,6 +62,6 @@ class PlannedTrajectoryDiagnostics:
         return self._status
 
     def log_lines(self, now: float) -> list[LogLine]:
-        """Return the rejections, and the changes of level besides."""
+        """Return rejections, changes of level, and outcomes that took long."""
         lines, self._lines = self._lines, []
         return lines

@@ -92,6 +92,7 @@ class SetpointDiagnostics:
         self._writers: dict[str, int] = {}
         self._readers: dict[str, int] = {}
         self._namesakes = '', 1
+        self._lines: list[LogLine] = []
         self._trouble: list[str] = []  # who publishes that should not
         self._rejections: Counter[Rejection] = Counter()
         self._rejected = Held()
@@ -125,10 +126,13 @@ class SetpointDiagnostics:
         """
         self._writers.update(writers)
         self._readers.update(readers)
+        alone = self._namesakes[1] <= 1
         self._namesakes = name, namesakes
         self._trouble = [f'{topic} has {n} writers' for topic, n in self._writers.items() if n > 1]
         if namesakes > 1:
             self._trouble.append(f'{namesakes} nodes are named {name}')
+            if alone:
+                self._lines = [LogLine(WARN, f'setpoints: {self._trouble[-1]}')]
 
     def found_writers(self, topic: str, writers: int) -> None:
         """Note how many publishers one setpoint topic has."""
@@ -171,21 +175,22 @@ class SetpointDiagnostics:
 
     def log_lines(self, now: float) -> list[LogLine]:
         """
-        Return the warning that messages arrive but none completes a setpoint.
+        Return the warnings: another node of this name; messages that complete no setpoint.
 
         Nothing else: rejections are logged one by one, and without setpoints there is no
         fault.
         """
+        lines, self._lines = self._lines, []
         last = max(self._heard.values())
         if last <= self._answers.at:
             self._incomplete_since = math.inf
-            return []
+            return lines
         self._incomplete_since = min(self._incomplete_since, now)
         if (last - self._incomplete_since < _PATIENCE or last <= self._warned_at
                 or now - self._warned_at < SECONDS or self._rejected.level(now)):
-            return []
+            return lines
         self._warned_at = now
-        return [LogLine(WARN, f'setpoints: {self._no_setpoint(now)}')]
+        return [*lines, LogLine(WARN, f'setpoints: {self._no_setpoint(now)}')]
 
     def _message(self, now: float) -> str:
         found = list(self._trouble)

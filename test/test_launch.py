@@ -1,0 +1,155 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The launch files under ROS's launch, which is not on PyPI: skipped where it is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+import sys
+
+import pytest
+
+pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
+
+from running import executable, own_domain, Peer, Program, ROOT  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import Float64MultiArray  # noqa: E402
+
+NAME = 'stewart_dynamics'
+FILES = sorted(path.name for path in (ROOT / 'launch').glob('*.launch.py'))
+
+# As ``ros2 launch`` runs a file.
+RUN = """\
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+file, *arguments = sys.argv[1:]
+service = LaunchService(argv=arguments)
+service.include_launch_description(LaunchDescription([IncludeLaunchDescription(
+    PythonLaunchDescriptionSource(file),
+    launch_arguments=[argument.split(':=') for argument in arguments])]))
+sys.exit(service.run())
+"""
+
+Launch = Callable[..., Program]
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """Return an install space with the executables that are tested and the files as they are."""
+    folder = tmp_path / 'prefix'
+    share, scripts = folder / 'share' / NAME, folder / 'lib' / NAME
+    index = folder / 'share' / 'ament_index' / 'resource_index' / 'packages'
+    for each in (share, scripts, index):
+        each.mkdir(parents=True)
+    (index / NAME).touch()
+    for name in ('config', 'examples', 'launch'):
+        (share / name).symlink_to(ROOT / name)
+    for name in ('stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'):
+        (scripts / name).symlink_to(executable(name))
+    return folder
+
+
+@pytest.fixture
+def peer(ros_environment: None) -> Iterator[Peer]:
+    """Return a participant in a domain of its own."""
+    with own_domain() as domain:
+        each = Peer(domain)
+        each.domain = domain
+        try:
+            yield each
+        finally:
+            each.close()
+
+
+@pytest.fixture
+def launch(peer: Peer, prefix: Path, tmp_path: Path) -> Iterator[Launch]:
+    """Return a function that launches a file; what it started ends with the test."""
+    begun: list[Program] = []
+
+    def begin(file: str, *arguments: str) -> Program:
+        paths = filter(None, [str(prefix), os.environ.get('AMENT_PREFIX_PATH')])
+        begun.append(Program(
+            [sys.executable, '-c', RUN, ROOT / 'launch' / file, *arguments], peer.domain,
+            tmp_path / 'launch', AMENT_PREFIX_PATH=os.pathsep.join(paths),
+            PYTHONUNBUFFERED='1'))
+        return begun[-1]
+
+    yield begin
+    for program in begun:
+        if not program.ended:  # so that it ends its nodes
+            program.stop()
+
+
+def said(program: Program) -> str:
+    """Return what launch and its nodes have printed."""
+    return program.stdout + program.stderr
+
+
+def nodes(peer: Peer) -> set[str]:
+    """Return the other nodes that are found."""
+    return set(peer.node.get_node_names()) - {peer.node.get_name()}
+
+
+@pytest.mark.parametrize('factor', ['abc', '0.0', 'nan'])
+def test_a_payload_that_is_no_number_ends_the_launch(
+        launch: Launch, peer: Peer, factor: str) -> None:
+    program = launch('demo.launch.py', f'payload_factor:={factor}')
+    assert program.wait() == 1
+    assert f'payload_factor: {factor}: must be a number above 0' in said(program)
+    assert 'process started' not in said(program)
+    peer.spin(0.5)
+    assert nodes(peer) == set()
+
+
+@pytest.mark.parametrize('file', FILES)
+def test_a_missing_file_is_named(launch: Launch, file: str) -> None:
+    program = launch(file, 'params_file:=/nowhere/hexapod.yaml')
+    assert program.wait() == 1
+    assert 'params_file: /nowhere/hexapod.yaml: no such file' in said(program)
+    assert 'process started' not in said(program)
+
+
+@pytest.mark.slow
+def test_topics_of_the_node_are_remapped(launch: Launch, peer: Peer) -> None:
+    program = launch(
+        'stewart_dynamics.launch.py', 'leg_forces:=/efforts/commands', 'namespace:=cell',
+        'leg_trajectory:=/follower/joint_trajectory', 'measured_legs:=/joint_states')
+    peer.until(lambda: peer.node.count_publishers('/efforts/commands')
+               and peer.node.count_publishers('/follower/joint_trajectory')
+               and peer.node.count_subscribers('/joint_states')
+               and peer.node.count_subscribers('/cell/stewart_dynamics/setpoint/pose'),
+               'all topics are there')
+    for topic in ('leg_forces', 'leg_trajectory', 'measured_legs'):
+        assert not peer.node.get_publishers_info_by_topic(f'/cell/stewart_dynamics/{topic}')
+        assert not peer.node.get_subscriptions_info_by_topic(f'/cell/stewart_dynamics/{topic}')
+    assert program.stop() == 0
+    peer.until(lambda: nodes(peer) == set(), 'the node has ended')
+
+
+@pytest.mark.slow
+def test_the_demo_runs_and_ends(launch: Launch, peer: Peer) -> None:
+    measured = peer.listen('/stewart_simulator/leg_states', JointState)
+    commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)
+    program = launch('demo.launch.py', 'payload_factor:=1.3')
+    peer.until(lambda: len(commands) > 100 and len(measured) > 100, 'the loop runs')
+    assert nodes(peer) == {
+        'leg_controller', 'stewart_dynamics', 'stewart_simulator', 'stewart_trajectory'}
+    assert program.stop() == 0
+    assert said(program).count('process has finished cleanly') == 4, said(program)
+    peer.until(lambda: nodes(peer) == set(), 'all have ended')
