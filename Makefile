@@ -5,8 +5,8 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop docs \
-  docs-site environment lint test
+.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop demo-ship \
+  docs docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -69,6 +69,9 @@ demo: $(INSTALLED)
 
 demo-loop: $(INSTALLED)
 	@.venv/bin/python demo/loop.py
+
+demo-ship: $(INSTALLED)
+	@.venv/bin/python demo/ship.py
 
 bench: $(INSTALLED)
 	.venv/bin/python benchmarks/bench.py --write

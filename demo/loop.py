@@ -24,7 +24,7 @@ for each command, so that no figure depends on the load of the computer.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import json
 import math
 import os
@@ -131,7 +131,7 @@ class Recorder(Node):
 
     def __init__(self) -> None:
         super().__init__('recorder')
-        self._readers = 0
+        self.diagnostics: dict[str, str] = {}
         self.states = self._kept(JointState, f'{SIMULATOR}/leg_states')
         self.poses = self._kept(PoseStamped, f'{SIMULATOR}/pose')
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
@@ -143,9 +143,7 @@ class Recorder(Node):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            for pair in status.values:
-                if pair.key == 'leg_states: readers':
-                    self._readers = int(pair.value)
+            self.diagnostics.update({pair.key: pair.value for pair in status.values})
 
     def ready(self) -> bool:
         """
@@ -154,7 +152,8 @@ class Recorder(Node):
         The node answers each setpoint once, so the controller must be connected before the first.
         Everything else is repeated, or waited for, until it is received.
         """
-        return self._readers > 0 and bool(self.states) and bool(self.poses)
+        return (int(self.diagnostics.get('leg_states: readers', 0)) > 0
+                and bool(self.states) and bool(self.poses))
 
     @property
     def time(self) -> int:
@@ -192,12 +191,12 @@ def _stamp(message: bytes) -> int:
 class Program:
     """One of the four programs, in its own process."""
 
-    def __init__(self, name: str, arguments: Sequence[str | Path], folder: Path) -> None:
+    def __init__(self, name: str, command: Sequence[str | Path], folder: Path) -> None:
         self.name = name
         self._output = folder / f'{name}.txt'
         with self._output.open('wb') as output:
-            self._process = subprocess.Popen([*PROGRAMS[name], *arguments], stdout=output,
-                                             stderr=output, stdin=subprocess.DEVNULL)
+            self._process = subprocess.Popen(
+                command, stdout=output, stderr=output, stdin=subprocess.DEVNULL)
 
     @property
     def last_line(self) -> str:
@@ -221,6 +220,72 @@ class Program:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+
+
+def simulate(commands: Mapping[str, Sequence[str | Path]], files: Mapping[str, Sequence[Path]],
+             given: Mapping[str, Any], recorder: Recorder, end: int,
+             progress: Callable[[int], object]) -> None:
+    """
+    Run programs until the simulated time has come to its end, and record the measured states.
+
+    Parameters
+    ----------
+    commands : mapping of str to sequence
+        Of each program, by its name; the last one is started when the others are connected.
+    files : mapping of str to sequence of Path
+        Their parameter files.
+    given : mapping
+        Further parameters, as in a file.
+    recorder : Recorder
+        Is destroyed.
+    end : int
+        [ns] since the start.
+    progress : callable
+        Called with the simulated time [ns].
+
+    """
+    executor = EventsExecutor()
+    executor.add_node(recorder)
+    programs: list[Program] = []
+
+    def until(done: Callable[[], bool]) -> None:
+        reached, since, looked = 0, time.monotonic(), 0.0
+        while not done():
+            executor.spin_once(timeout_sec=LOOK)
+            now = time.monotonic()
+            if now - looked < LOOK:
+                continue
+            looked = now
+            for program in programs:
+                program.check()
+            if reached != (reached := recorder.time):
+                since = now
+                progress(reached)
+            if now - since > PATIENCE:
+                raise Failure(f'no progress at {reached * 1e-9:.3f} s; ' + '; '.join(
+                    f'{each.name}: {each.last_line}' for each in programs))
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / 'given.yaml'
+        file.write_text(yaml.safe_dump(given), encoding='utf-8')
+        try:
+            for n, (name, command) in enumerate(commands.items(), start=1):
+                if n == len(commands):
+                    until(recorder.ready)
+                arguments = [part for path in (*files.get(name, ()), file)
+                             for part in ('--params-file', path)]
+                programs.append(Program(name, [
+                    *command, *([] if '--ros-args' in command else ['--ros-args']), *arguments],
+                    Path(folder)))
+            until(lambda: recorder.time >= end)
+        finally:
+            for program in programs:
+                program.stop()
+            for program in programs:
+                program.wait()
+            executor.shutdown()
+            recorder.destroy_node()
+    progress(end)
 
 
 class Loop:
@@ -283,46 +348,7 @@ class Loop:
         given['stewart_simulator']['ros__parameters'].update({
             'platform.mass': payload * mass, 'platform.inertia': (payload * inertia).tolist()})
         recorder = Recorder()
-        executor = EventsExecutor()
-        executor.add_node(recorder)
-        programs: list[Program] = []
-
-        def until(done: Callable[[], bool]) -> None:
-            reached, since, looked = 0, time.monotonic(), 0.0
-            while not done():
-                executor.spin_once(timeout_sec=LOOK)
-                now = time.monotonic()
-                if now - looked < LOOK:
-                    continue
-                looked = now
-                for program in programs:
-                    program.check()
-                if reached != (reached := recorder.time):
-                    since = now
-                    progress(reached)
-                if now - since > PATIENCE:
-                    raise Failure(f'no progress at {reached * 1e-9:.3f} s; ' + '; '.join(
-                        f'{each.name}: {each.last_line}' for each in programs))
-
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / 'given.yaml'
-            file.write_text(yaml.safe_dump(given), encoding='utf-8')
-            try:
-                for name in PROGRAMS:
-                    if name == 'stewart_trajectory':
-                        until(recorder.ready)
-                    arguments = [part for path in (*self._files.get(name, ()), file)
-                                 for part in ('--params-file', path)]
-                    programs.append(Program(name, ['--ros-args', *arguments], Path(folder)))
-                until(lambda: recorder.time >= self.times[-1])
-            finally:
-                for program in programs:
-                    program.stop()
-                for program in programs:
-                    program.wait()
-                executor.shutdown()
-                recorder.destroy_node()
-        progress(int(self.times[-1]))
+        simulate(PROGRAMS, self._files, given, recorder, int(self.times[-1]), progress)
         return Run(feed_forward, payload, recorder.errors(
             self.times, self._lengths, self._motion))
 

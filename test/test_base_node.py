@@ -83,6 +83,10 @@ class OnBase:
         """Wait until the diagnostics of the base have a level and a text."""
         self.node.until_status('base', level, text)
 
+    def until_counted(self, key: str) -> None:
+        """Wait until the diagnostics of the base have a key."""
+        self.node.until(lambda: key in self.node.values('base'), f'{key} is counted')
+
     def answer(self, stamp: int) -> JointState:
         """Check that a moving setpoint is answered with the library's bits."""
         self.node.send(MOVING, stamp)
@@ -170,9 +174,7 @@ def test_what_is_wrong_is_rejected_and_counted(fresh: Start) -> None:
         on.send(stamp)
         for topic, make, reason in bad:
             on.publish([(topic, make(stamp + MS))])
-            key = f'rejected, {topic}: {reason}'
-            on.node.until(lambda key=key: key in on.node.values('base'),  # type: ignore[misc]
-                          f'{key} is counted')
+            on.until_counted(f'rejected, {topic}: {reason}')
         assert on.node.status('base').level in (OK, WARN)
         on.answer(stamp + 2 * MS)
         on.send(stamp + 3 * MS)

@@ -21,12 +21,17 @@ from pathlib import Path
 import re
 import sys
 
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
 import numpy as np
 import pytest
-from running import DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT
+from rclpy.serialization import deserialize_message
+from running import (
+    assert_only_log_lines, DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT)
+from stewart_dynamics import Motion
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
 from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'
@@ -158,3 +163,66 @@ def test_a_push_is_found_in_the_loop(ros_environment: None, tmp_path: Path, run:
     for row, load in zip(rows, ([0.0] * 6, [200.0, -100.0, 50.0, 10.0, 0.0, -40.0], [0.0] * 6),
                          strict=True):
         assert row == pytest.approx(load, abs=1.0)
+
+
+def test_motion_compensation_keeps_the_platform_still_until_the_base_motion_stops(
+        domain: int, run: Run) -> None:
+    peer = Peer(domain)
+    kinds = {'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
+    writers = {name: peer.writer(f'/stewart_simulator/base/{name}', kind)
+               for name, kind in kinds.items()}
+    heard = {name: peer.listen(f'/stewart_dynamics/setpoint/{name}', kind)
+             for name, kind in kinds.items()}
+    # A loaded computer may be late: the timeout is long.
+    program = run('motion_compensation.py', domain, '--ros-args', '-p', 'timeout:=5.0',
+                  '-p', 'position:=[0.1, 0.0, 1.2]', '-p', 'angles:=[0.0, 0.1, 0.2]')
+    peer.watched = program
+
+    def publish(n: int, base: Motion, names: tuple[str, ...] = tuple(kinds)) -> None:
+        numbers = {'pose': [*base.position, *base.quaternion], 'twist': base.rows[12:18],
+                   'accel': base.rows[18:]}
+        for name in names:
+            writers[name].publish(StampedWriter('world', len(numbers[name])).write(
+                n * 10_000_000, numbers[name]))
+
+    try:
+        peer.until(lambda: all(writer.get_subscription_count() for writer in writers.values())
+                   and all(peer.node.count_publishers(f'/stewart_dynamics/setpoint/{name}')
+                           for name in kinds), 'it is there')
+        base = Motion.from_euler([0.2, 0.1, -0.1], [0.1, -0.2, 0.3], [0.5, 0.4, 0.3],
+                                 [0.1, 0.2, 0.3], [1.0, -1.0, 0.5], [0.3, -0.2, 0.1])
+        # An accel that never comes leaves a motion without setpoint.
+        publish(1, base, ('pose', 'twist'))
+        publish(2, base)
+        publish(3, Motion([0.0, 0.0, 0.0], np.eye(3)))
+        peer.until(lambda: all(len(each) == 2 for each in heard.values()), 'it answers')
+        for name, messages in heard.items():
+            read = pose if name == 'pose' else twist
+            assert [read(data).stamp for data in messages] == [20_000_000, 30_000_000]
+            assert read(messages[0]).frame == b'base'
+        position = np.array(pose(heard['pose'][0]).values[:3])
+        world = base.position + base.rotation @ position
+        np.testing.assert_allclose(world, [0.1, 0.0, 1.2], atol=1e-14)
+        # The velocity of the platform in the world is zero.
+        velocity, spin = np.reshape(twist(heard['twist'][0]).values, (2, 3))
+        np.testing.assert_allclose(
+            base.rotation @ velocity + base.linear_velocity
+            + np.cross(base.angular_velocity, base.rotation @ position), 0.0, atol=1e-14)
+        np.testing.assert_allclose(base.rotation @ spin, -base.angular_velocity, atol=1e-14)
+        level = deserialize_message(heard['pose'][1], PoseStamped).pose.orientation
+        np.testing.assert_allclose(
+            Motion.from_quaternion([0.0] * 3, [level.x, level.y, level.z, level.w]).rotation,
+            from_euler([0.0, 0.1, 0.2]), atol=1e-14)
+        writers['accel'].publish(StampedWriter('world', 6).write(40_000_000, [np.nan] * 6))
+        publish(4, base, ('pose', 'twist'))
+        peer.until(lambda: 'no setpoint: ' in program.stderr, 'it rejects what is not finite')
+        peer.until(lambda: 'no base motion for 5.0 s: setpoints stop' in program.stderr,
+                   'it stops')
+        for n in range(5, 8):
+            publish(n, base)
+        peer.until(lambda: 'setpoints have stopped' in program.stderr, 'it stays stopped')
+        assert [len(each) for each in heard.values()] == [2, 2, 2]
+        assert program.stop() == 0
+        assert_only_log_lines(program.stderr)
+    finally:
+        peer.close()

@@ -73,7 +73,9 @@ def test_topics_are_those_of_the_code() -> None:
     for pages, topics in ((('README.md', 'docs/node.md'), node),
                           (('docs/simulator.md',), {
                               **simulator_messages.INPUT_TYPES,
-                              **simulator_messages.OUTPUT_TYPES})):
+                              **simulator_messages.OUTPUT_TYPES,
+                              **simulator_messages.BASE_TYPES,
+                              simulator_messages.IMU: simulator_messages.IMU_TYPE})):
         for page in pages:
             for topic, kind in topics.items():
                 assert f'| `~/{topic}` | {kind.replace("/msg", "")} |' in TEXTS[page]

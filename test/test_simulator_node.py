@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -38,14 +39,18 @@ from rosgraph_msgs.msg import Clock
 from running import (
     assert_only_log_lines, bits, executable, Inside, log_lines, nanoseconds, participants, Peer,
     PLATFORM, Program, ROOT, wrench_message)
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
-from stewart_dynamics import Pose, StewartError, StewartPlatform
-from stewart_dynamics.nodes.simulator_messages import OUTPUT_TYPES, StateMessages
+from stewart_dynamics import BaseMotion, Motion, Pose, StewartError, StewartPlatform
+from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.nodes.simulator_messages import (
+    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.nodes.simulator_node import SimulatorNode
 from stewart_dynamics.parameter_files import read_yaml
+from stewart_dynamics.runtime.generated_base_motion import GeneratedBaseMotion
 from stewart_dynamics.runtime.plant import Plant
+from stewart_dynamics.runtime.simulated_base import GeneratedBase
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 SIMULATOR = '/stewart_simulator'
@@ -547,5 +552,161 @@ def test_help_has_its_parameters(domain: int, tmp_path: Path) -> None:
 
 
 def test_topics_and_messages_have_the_same_types() -> None:
-    assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
-            for topic, kind in TYPES.items()} == OUTPUT_TYPES
+    for types, named in ((TYPES, OUTPUT_TYPES), (OF_BASE, {**BASE_TYPES, IMU: IMU_TYPE})):
+        assert {topic: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
+                for topic, kind in types.items()} == named
+
+
+# A base that moves
+
+OF_BASE = {'base/pose': PoseStamped, 'base/twist': TwistStamped, 'base/accel': AccelStamped,
+           'imu': Imu}
+SEA = {'base_motion.source': 'sea', 'base_motion.ramp': 0.02,
+       'base_motion.sea.response': [0.3, 0.4, 0.8, 0.03, 0.02, 0.01],
+       'base_motion.lever_arm': [10.0, 0.0, 5.0], 'imu.noise.specific_force': 0.01}
+
+
+def given_as(parameters: dict[str, Any]) -> list[str]:
+    """Return parameters as on the command line."""
+    return [f'{name}:={value}' for name, value in parameters.items()]
+
+
+def listen_to_base(simulator: Simulator) -> dict[str, list[bytes]]:
+    """Return lists that get the messages of the base."""
+    return {topic: simulator.peer.listen(f'{SIMULATOR}/{topic}', kind)
+            for topic, kind in OF_BASE.items()}
+
+
+def test_on_a_generated_sea_it_moves_and_measures_as_the_library(begin: Start) -> None:
+    simulator = begin(STEPPED, *given_as(SEA))
+    of_base = listen_to_base(simulator)
+    simulator.until(lambda: all(of_base.values()), 'the base is there')
+    for messages in of_base.values():
+        assert {stamp_of(data) for data in messages} == {FIRST}
+    commands = np.array(holding()) + rng().uniform(-300.0, 300.0, (40, 6))
+    for command in commands:
+        simulator.step(command)
+    simulator.until(lambda: all(stamp_of(of_base[topic][-1]) == FIRST + 40 * PERIOD
+                                for topic in of_base), 'all have come')
+    parameters = SimulatorParameters({**GIVEN, **SEA})
+    plant, base = Plant(parameters), GeneratedBase(parameters)
+    base_messages, messages = BaseMessages(parameters), StateMessages(parameters)
+    list(base_messages.write(FIRST, 0, base.period(0, 0)))
+    # The newest message of each stamp: the first is repeated until the first command.
+    seen = {topic: {stamp_of(data): data for data in raw}
+            for topic, raw in {**simulator.raw, **of_base}.items()}
+    written: Counter[str] = Counter()
+    for n, command in enumerate(commands.tolist(), start=1):
+        period, stamp = base.period(n, 0), FIRST + n * PERIOD
+        plant.advance(tuple(command), NO_LOAD, period.rows)
+        for topic, data in (*base_messages.write(stamp, n, period),
+                            *messages.write(stamp, plant.measured())):
+            assert seen[topic][stamp] == data, topic
+            written[topic] += 1
+    # 500 periods and 250 readings in a second
+    assert written == {**dict.fromkeys((*TYPES, 'base/pose', 'base/twist', 'base/accel'), 40),
+                       'imu': 20}
+    twist = deserialize_message(of_base['base/twist'][-1], TwistStamped)
+    assert np.abs(numbers_of(twist)).max() > 1e-2
+
+
+def test_in_real_time_the_base_moves_from_the_first_command_on(begin: Start) -> None:
+    simulator = begin(*given_as({
+        'base_motion.source': 'sine', 'base_motion.ramp': 0.2, 'base_motion.frequency': 1.0,
+        'base_motion.amplitude': [0.0, 0.0, 0.2, 0.1, 0.0, 0.0], 'imu.rate': 100.0}))
+    of_base = listen_to_base(simulator)
+    simulator.until(lambda: len(of_base['imu']) > 20, 'the IMU is there')
+    for data in of_base['imu']:
+        force = deserialize_message(data, Imu).linear_acceleration
+        assert (force.x, force.y, force.z) == (0.0, 0.0, 9.80665)
+    assert not np.any([numbers_of(deserialize_message(data, TwistStamped))
+                       for data in of_base['base/twist']])
+    simulator.command(holding())
+    simulator.until(lambda: deserialize_message(
+        of_base['base/pose'][-1], PoseStamped).pose.position.z > 0.1, 'it heaves')
+    message = deserialize_message(of_base['base/pose'][-1], PoseStamped)
+    assert message.header.frame_id == 'world'
+    imu = deserialize_message(of_base['imu'][-1], Imu)
+    assert imu.header.frame_id == 'imu'
+    assert imu.orientation_covariance[0] == -1.0
+    # A busy computer may hold it up.
+    if not simulator.said('WARN', 'fell behind by'):
+        assert set(np.diff([stamp_of(data) for data in of_base['imu']])) == {10_000_000}
+
+
+class Base:
+    """Publishes the motion of the base, as a whole or in part."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._writers = {topic: simulator.peer.writer(f'{SIMULATOR}/{topic}', kind)
+                         for topic, kind in OF_BASE.items() if topic != 'imu'}
+        simulator.until(lambda: all(each.get_subscription_count()
+                                    for each in self._writers.values()), 'it listens')
+        self._simulator = simulator
+        self._bad = 0
+
+    def publish(self, stamp: int, motion: Motion, frame: str = 'world') -> None:
+        """Publish a motion of the base frame in the world at a time [ns]."""
+        for writer, numbers in zip(self._writers.values(), (
+                [*motion.position, *motion.quaternion], motion.rows[12:18], motion.rows[18:]),
+                strict=True):
+            writer.publish(StampedWriter(frame, len(numbers)).write(stamp, numbers))
+
+    def until_heard(self) -> None:
+        """Wait until all has been heard, which a rejected message on each topic shows."""
+        self._bad += 1
+        for topic, writer in self._writers.items():
+            for _ in range(2):
+                writer.publish(f'bad {self._bad:03d} {topic}'.encode())
+        for topic in self._writers:
+            self._simulator.until_said('WARN', f'{topic} rejected: malformed')
+
+
+def test_on_a_base_of_topics_it_moves_as_the_library(begin: Start) -> None:
+    given = {'base_motion.source': 'topics', 'base.timeout': 0.05, 'imu.rate': 500.0}
+    simulator = begin(STEPPED, *given_as(given))
+    imus = simulator.peer.listen(f'{SIMULATOR}/imu', Imu)
+    base = Base(simulator)
+    parameters = SimulatorParameters({**GIVEN, **given})
+    at = GeneratedBaseMotion(SimulatorParameters({**GIVEN, **SEA})).at
+    many = 20
+    for n in range(-1, many + 1):
+        base.publish(FIRST + n * PERIOD, at(0.5 + n * PERIOD * 1e-9))
+    base.until_heard()
+    simulator.until(lambda: imus, 'the IMU is there')
+    plant, messages = Plant(parameters), StateMessages(parameters)
+    for n in range(1, many + 1):
+        stamp = simulator.step(holding())
+        ends = BaseMotion.from_motion(
+            at(0.5 + (n - np.array([1.0, 0.0])) * PERIOD * 1e-9), parameters['gravity']).rows
+        plant.advance(tuple(holding()), NO_LOAD, np.array([ends[0], 0.5 * (ends[0] + ends[1]),
+                                                           ends[1]]))
+        state = dict(messages.write(stamp, plant.measured()))
+        np.testing.assert_allclose(
+            numbers_of(simulator.last('accel')),
+            numbers_of(deserialize_message(state['accel'], AccelStamped)), rtol=1e-9, atol=1e-9)
+        simulator.until(lambda stamp=stamp: stamp_of(imus[-1]) == stamp, 'the IMU, too')
+        spin = deserialize_message(imus[-1], Imu).angular_velocity
+        np.testing.assert_allclose([spin.x, spin.y, spin.z], ends[1, 6:9], atol=1e-12)
+    assert simulator.said('WARN', 'the base follows its topics')
+    # Samples stop: 25 periods later it is at rest.
+    for _ in range(27):
+        simulator.step(holding())
+    simulator.until_said('WARN', 'no base motion for 0.05 s: the base is at rest')
+    simulator.until(lambda: stamp_of(imus[-1]) == stamp_of(simulator.raw['clock'][-1]), 'the IMU')
+    assert deserialize_message(imus[-1], Imu).angular_velocity.x == 0.0
+
+
+def test_bad_motions_of_the_base_are_rejected(begin: Start) -> None:
+    simulator = begin(STEPPED, 'base_motion.source:=topics')
+    base = Base(simulator)
+    still = Motion([0.0, 0.0, 0.0], np.eye(3))
+    base.publish(FIRST, still, frame='base')
+    for topic in ('base/pose', 'base/twist', 'base/accel'):
+        simulator.until_said('WARN', f"{topic} rejected: wrong frame_id: 'base'")
+    base.publish(FIRST, Motion([0.0, 0.0, 0.0], np.eye(3), [0.0, 0.0, 0.0], [1e200, 0.0, 0.0]))
+    base.until_heard()
+    # What overflows is not followed.
+    simulator.step(holding())
+    assert np.isfinite(numbers_of(simulator.last('accel'))).all()
+    assert not simulator.said('ERROR', '')

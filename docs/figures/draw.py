@@ -16,8 +16,8 @@
 Draw the pictures of README.md and docs/ into docs/figures/.
 
 ``make docs`` runs it. The paper's motion is drawn from bags/singular through the joining and the
-step of node and replay; the loop is what demo/loop.py measures, which also writes loop.json; the
-report is that of stewart_replay in a browser.
+step of node and replay; loop and ship are what demo/loop.py and demo/ship.py measure, which also
+write loop.json and ship.json; the report is that of stewart_replay in a browser.
 """
 
 from __future__ import annotations
@@ -225,7 +225,9 @@ def main() -> None:
     draw_singular(HERE / 'singular.png', recorded)
     draw_figures(HERE / 'paper.png', recorded)
     draw_report(HERE / 'report.png')
-    subprocess.run([sys.executable, ROOT / 'demo' / 'loop.py', '--output', HERE], check=True)
+    for demo in ('loop', 'ship'):
+        subprocess.run(
+            [sys.executable, ROOT / 'demo' / f'{demo}.py', '--output', HERE], check=True)
 
 
 if __name__ == '__main__':

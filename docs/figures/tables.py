@@ -96,6 +96,20 @@ def loop(figures: Mapping[str, Any]) -> str:
     return '\n'.join(lines)
 
 
+def ship(figures: Mapping[str, Any]) -> str:
+    """Return the table of the errors that demo/ship.py measured: RMS and peak."""
+    lines = ['| feed-forward, `base.source` of the node | legs, um | platform in the world, um | '
+             'platform in the world, urad | ratio to `fixed` |', '| --- | --- | --- | --- | --- |']
+    runs = {run['base.source']: run for run in figures['runs']}
+    for source, run in runs.items():
+        line = f'| `{source}` |' if source else '| none: PD only |'
+        for name in ('all legs', 'position', 'rotation'):
+            line += f' {_digits(run["rms"][name])} ({_digits(run["peak"][name])}) |'
+        ratio = runs['fixed']['rms']['position'] / run['rms']['position']
+        lines.append(f'{line} {f"1/{ratio:.0f}" if ratio > 1.0 else ""} |')
+    return '\n'.join(lines)
+
+
 def _digits(number: float) -> str:
     """Return three digits of a number, or all before its point."""
     return f'{number:.0f}' if number >= 100.0 else f'{number:.3g}'
@@ -138,7 +152,8 @@ def accuracy_and_speed() -> str:
 
 def pages() -> dict[Path, dict[str, str]]:
     """Return of each page with generated tables their names and texts."""
-    figures = json.loads((HERE / 'loop.json').read_text(encoding='utf-8'))
+    figures, on_a_ship = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
+                          for name in ('loop', 'ship'))
     return {
         ROOT / 'README.md': {
             'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
@@ -147,7 +162,8 @@ def pages() -> dict[Path, dict[str, str]]:
             'parameters of stewart_dynamics': parameters_of(Parameters),
             'parameters of stewart_trajectory': parameters_of(ReferenceMotionParameters),
             'parameters of stewart_simulator': parameters_of(SimulatorParameters)},
-        ROOT / 'docs' / 'simulator.md': {'errors in the loop': loop(figures)}}
+        ROOT / 'docs' / 'simulator.md': {
+            'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)}}
 
 
 def generated(text: str, tables: Mapping[str, str]) -> str:

@@ -19,7 +19,9 @@ The method is the classical Runge-Kutta method of fourth order, on position, qua
 After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
 Wanner, Geometric Numerical Integration, 2nd ed., IV.4, doi:10.1007/3-540-30666-8). Forces and
 wrench are constant within a call, so that the work of a leg force is the force times the change
-of its leg's length, exactly, and an energy balance shows the error of the method alone.
+of its leg's length, exactly, and an energy balance shows the error of the method alone. The
+motion of the base is given at begin, middle and end of a call, which are the stages of the method
+where a call is one step; with more steps it is the parabola through them.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ import math
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.base_load import moves
 from stewart_dynamics.mechanics.body_dynamics import leg_line
 from stewart_dynamics.mechanics.end_stops import stop_force
 from stewart_dynamics.mechanics.forward_dynamics import acceleration
@@ -45,12 +48,13 @@ _LINEAR, _ANGULAR = STATE_TWIST.start, STATE_TWIST.start + 3
 RESULT_LENGTHS, RESULT_RATES, RESULT_FORCES, RESULT_ACCELERATION = consecutive(6, 6, 6, 6)
 RESULT_SOUND = RESULT_ACCELERATION.stop
 RESULT = RESULT_SOUND + 1
-# Six commands, the wrench on the platform, and the motion of the base.
-COMMANDS, WRENCH, BASE_MOTION = consecutive(6, 6, BASE)
-LOADS = BASE_MOTION.stop
+# Six commands, the wrench on the platform, and rows of the base's motion at begin, middle and end.
+COMMANDS, WRENCH, BASE_BEGIN, BASE_MIDDLE, BASE_END = consecutive(6, 6, BASE, BASE, BASE)
+LOADS = BASE_END.stop
 # Scratch memory.
-_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN = consecutive(MOTION, 6, STATE, STATE, STATE)
-SCRATCH = _MEAN.stop
+_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE = consecutive(
+    MOTION, 6, STATE, STATE, STATE, BASE)
+SCRATCH = _BASE.stop
 
 # In one step the platform may turn by at most this [rad], and a platform joint move by at most
 # this part of its leg's length: a larger move would not be resolved.
@@ -73,10 +77,26 @@ def _twist(state: Array) -> tuple[Vector3, Vector3]:
     return read3(state, _LINEAR), read3(state, _ANGULAR)
 
 
+@inlined
+def _move_base(loads: Array, part: float, base: Array) -> None:
+    """Write the base's motion after a part of the call, between 0 and 1."""
+    if not moves(loads[BASE_BEGIN]):
+        return
+    begin, middle, end = ((1.0 - part) * (1.0 - 2.0 * part), 4.0 * part * (1.0 - part),
+                          part * (2.0 * part - 1.0))
+    for n in range(BASE):
+        base[n] = (begin * loads[BASE_BEGIN.start + n] + middle * loads[BASE_MIDDLE.start + n]
+                   + end * loads[BASE_END.start + n])
+
+
 @compiled
-def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: Array,
-           forces: Array, work: Array, slope: Array) -> None:
-    """Write a state's time derivative under its loads; motion, forces, work: scratch memory."""
+def _slope(constants: Array, stops: Array, state: Array, loads: Array, base: Array,
+           motion: Array, forces: Array, work: Array, slope: Array) -> None:
+    """
+    Write a state's time derivative under its loads and a motion of the base.
+
+    motion, forces, work: scratch memory.
+    """
     position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
     velocity, omega = _twist(state)
     for n in range(3):
@@ -89,7 +109,7 @@ def _slope(constants: Array, stops: Array, state: Array, loads: Array, motion: A
         a, length, _, s = leg_line(constants, leg, position, rotation)
         rate = dot(s, add(velocity, cross(omega, a)))
         forces[leg] = loads[COMMANDS.start + leg] + stop_force(stops, leg, length, rate)
-    acceleration(constants, motion, forces, loads[WRENCH], loads[BASE_MOTION], work)
+    acceleration(constants, motion, forces, loads[WRENCH], base, work)
     at = STATE_QUATERNION.start
     vector, scalar = read3(state, at), state[at + 3]
     turning = add(scale(scalar, omega), cross(omega, vector))
@@ -123,23 +143,30 @@ def _write_legs(constants: Array, state: Array, result: Array) -> float:
 
 
 @compiled
-def _next_state(constants: Array, stops: Array, loads: Array, state: Array, h: float,
-                motion: Array, forces: Array, work: Array, slope: Array, mean: Array,
-                after: Array) -> bool:
-    """Write the state one step later; return whether it is finite. The rest: scratch memory."""
-    _slope(constants, stops, state, loads, motion, forces, work, slope)
+def _next_state(constants: Array, stops: Array, loads: Array, state: Array, step: int, steps: int,
+                h: float, base: Array, motion: Array, forces: Array, work: Array, slope: Array,
+                mean: Array, after: Array) -> bool:
+    """
+    Write the state after a step of a call; return whether it is finite.
+
+    base is the motion of the base at its begin, and becomes that at its end; the rest: scratch
+    memory.
+    """
+    _slope(constants, stops, state, loads, base, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] = slope[n]
         after[n] = state[n] + 0.5 * h * slope[n]
-    _slope(constants, stops, after, loads, motion, forces, work, slope)
+    _move_base(loads, (step + 0.5) / steps, base)
+    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] += 2.0 * slope[n]
         after[n] = state[n] + 0.5 * h * slope[n]
-    _slope(constants, stops, after, loads, motion, forces, work, slope)
+    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
     for n in range(STATE):
         mean[n] += 2.0 * slope[n]
         after[n] = state[n] + h * slope[n]
-    _slope(constants, stops, after, loads, motion, forces, work, slope)
+    _move_base(loads, (step + 1.0) / steps, base)
+    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
     finite = True
     square = 0.0
     for n in range(STATE):
@@ -168,8 +195,9 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
     largest_forces : (6,)
         To which the commands are clipped [N].
     loads : (LOADS,)
-        Commands [N], force and moment on the platform [N, N m], a row of the base's motion;
-        commands are clipped in place.
+        Commands [N], force and moment on the platform [N, N m], rows of the base's motion at
+        begin, middle and end of the call, of nan where it is still; commands are clipped in
+        place.
     state : (STATE,)
         The initial state, overwritten with the final one. Where a step cannot be computed: the
         last state that could be, at rest.
@@ -182,22 +210,24 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
 
     """
     motion, forces, after = scratch[_MOTION], scratch[_FORCES], scratch[_AFTER]
-    slope, mean = scratch[_SLOPE], scratch[_MEAN]
+    slope, mean, base = scratch[_SLOPE], scratch[_MEAN], scratch[_BASE]
+    for n in range(BASE):
+        base[n] = loads[BASE_BEGIN.start + n]
     for leg in range(6):
         most = largest_forces[leg]
         force = min(max(loads[COMMANDS.start + leg], -most), most)
         loads[COMMANDS.start + leg] = result[RESULT_FORCES.start + leg] = force
     sound = h * _write_legs(constants, state, result) <= LARGEST_MOVE
-    for _step in range(steps):
-        finite = _next_state(
-            constants, stops, loads, state, h, motion, forces, work, slope, mean, after)
+    for step in range(steps):
+        finite = _next_state(constants, stops, loads, state, step, steps, h, base, motion,
+                             forces, work, slope, mean, after)
         sound = (sound and finite
                  and h * _write_legs(constants, after, result) <= LARGEST_MOVE)
         if not sound:
             break
         for n in range(STATE):
             state[n] = after[n]
-    _slope(constants, stops, state, loads, motion, forces, work, slope)
+    _slope(constants, stops, state, loads, base, motion, forces, work, slope)
     for n in range(6):
         sound = sound and math.isfinite(slope[STATE_TWIST.start + n])
     for n in range(6):

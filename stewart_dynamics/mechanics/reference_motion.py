@@ -115,9 +115,14 @@ def _progress(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array
         s, ds, dds = ((1.0 - np.cos(np.pi * u)) / 2.0, np.pi / 2.0 * np.sin(np.pi * u),
                       np.pi ** 2 / 2.0 * np.cos(np.pi * u))
     else:
-        s, ds, dds = (u ** 3 * (10.0 + u * (6.0 * u - 15.0)), 30.0 * (u * (1.0 - u)) ** 2,
-                      60.0 * u * (1.0 - u) * (1.0 - 2.0 * u))
+        s, ds, dds = quintic(u)
     return s, sign * moving * ds / duration, moving * dds / duration ** 2
+
+
+def quintic(u: Array) -> tuple[Array, Array, Array]:
+    """Return 10 u^3 - 15 u^4 + 6 u^5 for u (...) from 0 to 1, and its first two derivatives."""
+    return (u ** 3 * (10.0 + u * (6.0 * u - 15.0)), 30.0 * (u * (1.0 - u)) ** 2,
+            60.0 * u * (1.0 - u) * (1.0 - 2.0 * u))
 
 
 def _rotation_vector(rotation: Array) -> Array:

@@ -12,17 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The messages of the simulator: what it publishes for a state of the plant."""
+"""The messages of the simulator: what it publishes for states of the plant and of its base."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from operator import sub
 
+from stewart_dynamics.messages.imu import ImuWriter
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.plant import State
+from stewart_dynamics.runtime.simulated_base import BasePeriod
+from stewart_dynamics.runtime.simulated_imu import SimulatedImu
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
@@ -35,6 +39,14 @@ OUTPUT_TYPES = {
     'twist': 'geometry_msgs/msg/TwistStamped',
     'accel': 'geometry_msgs/msg/AccelStamped',
 }
+# Those of the base: published where its motion is generated, subscribed where it comes by topics.
+BASE_TYPES = {
+    'base/pose': 'geometry_msgs/msg/PoseStamped',
+    'base/twist': 'geometry_msgs/msg/TwistStamped',
+    'base/accel': 'geometry_msgs/msg/AccelStamped',
+}
+IMU = 'imu'
+IMU_TYPE = 'sensor_msgs/msg/Imu'
 
 
 class StateMessages:
@@ -61,3 +73,33 @@ class StateMessages:
         yield 'pose', self._pose.write(stamp, state.pose)
         yield 'twist', self._six.write(stamp, state.twist)
         yield 'accel', self._six.write(stamp, state.acceleration)
+
+
+class BaseMessages:
+    """
+    Writes the messages of a base that moves.
+
+    Parameters
+    ----------
+    parameters : SimulatorParameters
+        The world frame and the IMU.
+
+    """
+
+    def __init__(self, parameters: SimulatorParameters) -> None:
+        frame = parameters['world_frame']
+        self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
+        self._imu = SimulatedImu(parameters)
+        self._imu_writer = ImuWriter(IMU, parameters['imu.noise.angular_velocity'],
+                                     parameters['imu.noise.specific_force'])
+        self._imu_periods = round(parameters['rate'] / parameters['imu.rate'])
+
+    def write(self, stamp: int, index: int, period: BasePeriod) -> Iterator[tuple[str, bytes]]:
+        """Yield topics and messages for the end of a period: its time [ns] and its number."""
+        if period.pose:
+            yield 'base/pose', self._pose.write(stamp, period.pose)
+            yield 'base/twist', self._six.write(stamp, period.twist)
+            yield 'base/accel', self._six.write(stamp, period.acceleration)
+        if index % self._imu_periods == 0:
+            readings = self._imu.read(period.rows[-1])
+            yield IMU, self._imu_writer.write(stamp, readings[:3], readings[3:])

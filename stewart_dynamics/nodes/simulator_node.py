@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The simulator node: the plant in real time, or one period for each command."""
+"""The simulator node: plant and base in real time, or one period for each command."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from functools import partial
 import gc
 import math
@@ -29,7 +29,7 @@ from rclpy.clock import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics.arrays import Six
@@ -40,10 +40,12 @@ from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.nodes.declared_parameters import declare_parameters
 from stewart_dynamics.nodes.run import run
 from stewart_dynamics.nodes.signals import SIGNALS
-from stewart_dynamics.nodes.simulator_messages import INPUT_TYPES, OUTPUT_TYPES, StateMessages
+from stewart_dynamics.nodes.simulator_messages import (
+    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.runtime.plant import Plant
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
 from stewart_dynamics.runtime.repeated_events import Series
+from stewart_dynamics.runtime.simulated_base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 from stewart_dynamics.runtime.wrench_input import WrenchInput
 
@@ -52,6 +54,7 @@ _TYPES: dict[str, Any] = {
     'geometry_msgs/msg/TwistStamped': TwistStamped,
     'geometry_msgs/msg/AccelStamped': AccelStamped,
     'geometry_msgs/msg/WrenchStamped': WrenchStamped,
+    'sensor_msgs/msg/Imu': Imu,
     'sensor_msgs/msg/JointState': JointState,
     'std_msgs/msg/Float64MultiArray': Float64MultiArray,
 }
@@ -70,7 +73,8 @@ class SimulatorNode(Node):
     """
     Moves the hexapod under the commanded forces, and publishes its state.
 
-    Brakes hold it until the first command, and when none comes for ``command_timeout``.
+    Brakes hold it until the first command, and when none comes for ``command_timeout``. A base
+    whose motion is generated is at rest until the first command, and then goes on.
 
     In real time it takes the periods that are due by a steady clock, several where it is late;
     what is later than 0.1 s is skipped. With ``use_sim_time`` each command is one period, and
@@ -95,27 +99,39 @@ class SimulatorNode(Node):
             self.get_logger().warning(mistake)
         self._rejections = Rejections(self._on_rejection)
         self._wrench_input = WrenchInput(self._settings, self._rejections)
+        source = self._settings['base_motion.source']
+        self._base: GeneratedBase | BaseOfTopics | None = (
+            None if source == 'fixed' else GeneratedBase(self._settings) if source != 'topics'
+            else BaseOfTopics(self._settings, self._rejections, self.get_logger().warning))
+        self._base_messages = BaseMessages(self._settings)
+        self._base_now: BasePeriod | None = None
         self._commands: Six | None = None
         self._stamp = _BEGIN
         self._index = 0
         self._braked = False
         self._commanded = 0  # the index at the last command
+        self._begun = 0  # the index at the first one
         timeout = self._settings['command_timeout']
         self._patience = math.inf if timeout is None else timeout * self._settings['rate']
         self._rate: float = self._settings['rate']
         qos = QoSProfile(depth=_QUEUE)
         self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
-                         for topic, kind in OUTPUT_TYPES.items()}
-        for topic, take in (('commands', self._on_commands),
-                            ('wrench', self._wrench_input.take)):
+                         for topic, kind in self._output_types().items()}
+        inputs: dict[str, Callable[[bytes], None]] = {
+            'commands': self._on_commands, 'wrench': self._wrench_input.take}
+        if isinstance(self._base, BaseOfTopics):
+            inputs.update({topic: partial(self._on_base, self._base, topic)
+                           for topic in BASE_TYPES})
+        for topic, take in inputs.items():
             self.create_subscription(
-                _TYPES[INPUT_TYPES[topic]], f'~/{topic}', take, qos, raw=True)
+                _TYPES[{**INPUT_TYPES, **BASE_TYPES}[topic]], f'~/{topic}', take, qos, raw=True)
         self.get_logger().info(
             f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
                 'one period for each command' if self._stepped else 'in real time')
             + f', {self._rate:g} periods per second of {self._plant.steps} steps each')
         if self._stepped:
             self._clock_output = self.create_publisher(Clock, '/clock', qos)
+            self._move_base()
             self._messages = self._messages_now()
             self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
         else:
@@ -125,6 +141,12 @@ class SimulatorNode(Node):
         # What exists now stays: see DynamicsNode.
         gc.collect()
         gc.freeze()
+
+    def _output_types(self) -> dict[str, str]:
+        if self._base is None:
+            return OUTPUT_TYPES
+        generated = {} if isinstance(self._base, BaseOfTopics) else BASE_TYPES
+        return {**OUTPUT_TYPES, **generated, IMU: IMU_TYPE}
 
     def _timer(self, seconds: float, callback: Any) -> Any:
         # ROS time stands still until it is advanced here, or jumps.
@@ -144,6 +166,8 @@ class SimulatorNode(Node):
             self._rejections.reject('commands', NOT_FINITE, str(values))
             return
         first, second, third, fourth, fifth, sixth = values
+        if self._commands is None:
+            self._begun = self._index
         if self._braked:
             self.get_logger().info('a command came: brakes released')
             self._braked = False
@@ -152,6 +176,9 @@ class SimulatorNode(Node):
         if self._stepped:
             self._announcing.reset()
             self._advance()
+
+    def _on_base(self, base: BaseOfTopics, topic: str, data: bytes) -> None:
+        base.input.take(topic, data, lambda: self._stamp + self._time_of(self._index))
 
     def _on_time(self) -> None:
         """Take the periods that are due."""
@@ -174,10 +201,12 @@ class SimulatorNode(Node):
     def _advance(self) -> None:
         """Take one period, with the brakes on until there is a command, and when they stop."""
         self._index += 1
+        self._move_base()
         if self._commands is not None and self._index - self._commanded > self._patience:
             self._brake()
         if self._commands is not None and not self._plant.fault and not self._braked:
-            state = self._plant.advance(self._commands, self._wrench_input.wrench)
+            state = self._plant.advance(self._commands, self._wrench_input.wrench,
+                                        self._base_now and self._base_now.rows)
             if self._plant.fault:
                 self.get_logger().error(self._plant.fault)
             elif state.forces != self._commands:
@@ -192,9 +221,18 @@ class SimulatorNode(Node):
             self.get_logger().warning(
                 f'no command for {self._settings["command_timeout"]:g} s: brakes engaged')
 
+    def _move_base(self) -> None:
+        """Move the base, if it moves, on to the end of the present period."""
+        if self._base is not None:
+            moved = 0 if self._commands is None else self._index - self._begun
+            self._base_now = self._base.period(moved, self._stamp + self._time_of(self._index))
+
     def _messages_now(self) -> list[tuple[str, bytes]]:
-        return list(self._state_messages.write(
-            self._stamp + self._time_of(self._index), self._plant.measured()))
+        stamp = self._stamp + self._time_of(self._index)
+        # The base first: who answers a state with a command has its motion, too.
+        return [*(() if self._base_now is None else self._base_messages.write(
+            stamp, self._index, self._base_now)),
+            *self._state_messages.write(stamp, self._plant.measured())]
 
     def _announce(self) -> None:
         """Publish again what is not answered: all messages until the first command."""

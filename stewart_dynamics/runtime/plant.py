@@ -22,19 +22,20 @@ integration, ``mechanics.end_stops`` and ``mechanics.integration_step_size``.
 
 from __future__ import annotations
 
+import math
 from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.end_stops import stops_of
 from stewart_dynamics.mechanics.forward_dynamics import WORK
 from stewart_dynamics.mechanics.integration_step_size import substeps
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.plant_dynamics import (
-    advance, LARGEST_MOVE, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
+    advance, BASE_BEGIN, LARGEST_MOVE, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
     RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
 from stewart_dynamics.mechanics.rotation import from_euler, to_quaternion
 from stewart_dynamics.mechanics.rows import NO_BASE
@@ -93,7 +94,7 @@ class Plant:
         """Steps in a period."""
         self._step = period / self.steps
         self._limits = Limits(parameters)
-        self._loads = np.array(NO_WRENCH + NO_WRENCH + NO_BASE)
+        self._loads = np.array(NO_WRENCH + NO_WRENCH + 3 * NO_BASE)
         numbers = np.zeros(STATE + RESULT)
         self._memory = numbers.data  # the same as bytes
         self._state, self._result = numbers[:STATE], numbers[STATE:]
@@ -111,7 +112,7 @@ class Plant:
             parameters['noise.length'], parameters['noise.rate'], parameters['noise.force']], 6)
         self._noise = np.random.default_rng(np.float64(parameters['noise.seed']).view(np.uint64))
 
-    def advance(self, commands: Six, wrench: Six) -> State:
+    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> State:
         """
         Return the state one period later.
 
@@ -121,10 +122,14 @@ class Plant:
             Forces of the actuators [N], + pushes; they saturate at limits.force_max.
         wrench : (6,)
             External wrench on the platform at its origin, base axes [N, N m].
+        base : (3, BASE), optional
+            How the base moves at begin, middle and end of the period, see ``mechanics.rows``;
+            not at all by default.
 
         """
         if not self.fault:
-            self._loads[:] = commands + wrench + NO_BASE
+            self._loads[:BASE_BEGIN.start] = commands + wrench
+            self._loads[BASE_BEGIN.start:] = math.nan if base is None else base.ravel()
             self.state = self._run(self.steps)
         return self.state
 
@@ -132,7 +137,7 @@ class Plant:
         """Return the state at rest in the present pose: the brakes take all speed at once."""
         if not self.fault:
             self._state[STATE_TWIST] = 0.0
-            self._loads[:] = NO_WRENCH + NO_WRENCH + NO_BASE
+            self._loads[:] = NO_WRENCH + NO_WRENCH + 3 * NO_BASE
             self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         return self.state
 

@@ -28,6 +28,8 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameter_rules import Parameter
 from stewart_dynamics.parameters import PARAMETERS, Parameters
 
+_POSE = 'X Y Z alpha beta gamma'
+
 _OWN = (
     Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '
               'platform until the first command', 'm, rad', required=True, sizes=(6,)),
@@ -51,6 +53,41 @@ _OWN = (
     Parameter('noise.force', 'double', 'standard deviation of the measured forces', 'N', 0.0,
               minimum=0.0, maximum=1e9),
     Parameter('noise.seed', 'double', 'seed of the noise: equal seeds give equal noise', '', 0.0),
+    Parameter('base_motion.source', 'string', 'how the base moves: not at all, as ~/base/pose, '
+              'twist and accel give it, by a sine on each axis, or as a ship in a seaway', '',
+              'fixed', choices=('fixed', 'topics', 'sine', 'sea')),
+    Parameter('base_motion.center', 'double', f'{_POSE} in the world at rest, about which sine '
+              'and sea move', 'm, rad', (0.0,) * 6, sizes=(6,), minimum=-1e6, maximum=1e6),
+    Parameter('base_motion.lever_arm', 'double', 'position of the base frame from the point that '
+              'sine or sea move, as the center of gravity of a ship; base axes', 'm',
+              (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
+    Parameter('base_motion.ramp', 'double', 'time in which sine and sea grow from rest, from the '
+              'first command on', 's', 5.0, minimum=0.0, maximum=1e6),
+    Parameter('base_motion.amplitude', 'double', f'of {_POSE}: surge, sway, heave, roll, pitch, '
+              'yaw; sine only', 'm, rad', (0.0,) * 6, sizes=(6,), minimum=-1e4, maximum=1e4),
+    Parameter('base_motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
+              (0.1,), sizes=(1, 6), minimum=0.0, maximum=100.0),
+    Parameter('base_motion.phase', 'double', f'of {_POSE}; sea: relative to the wave', 'rad',
+              (0.0,) * 6, sizes=(6,), minimum=-1e3, maximum=1e3),
+    Parameter('base_motion.sea.wave_height', 'double', 'significant wave height of the '
+              'Bretschneider spectrum', 'm', 2.0, minimum=0.0, maximum=100.0),
+    Parameter('base_motion.sea.peak_period', 'double', 'period of its peak', 's', 10.0,
+              minimum=0.1, maximum=1e3),
+    Parameter('base_motion.sea.response', 'double', f'amplitude of {_POSE} for a wave of '
+              'amplitude 1 m', 'm/m, rad/m', (0.0,) * 6, sizes=(6,), minimum=-1e3, maximum=1e3),
+    Parameter('base_motion.sea.seed', 'double', 'seed of the waves: equal seeds give equal '
+              'motion', '', 0.0),
+    Parameter('imu.rate', 'double', 'rate of ~/imu where the base moves; rate is a whole multiple '
+              'of it. The IMU is mounted as base.imu.position and .orientation say', 'Hz', 250.0,
+              minimum=0.0, above=True, maximum=1e4),
+    Parameter('imu.noise.specific_force', 'double', 'standard deviation of each reading', 'm/s^2',
+              0.0, minimum=0.0, maximum=1e6),
+    Parameter('imu.noise.angular_velocity', 'double', 'standard deviation of each reading',
+              'rad/s', 0.0, minimum=0.0, maximum=1e6),
+    Parameter('imu.bias.specific_force', 'double', 'constant error of the readings, IMU axes',
+              'm/s^2', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
+    Parameter('imu.bias.angular_velocity', 'double', 'constant error of the readings, IMU axes',
+              'rad/s', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
 )
 
 # Beginnings of names.
@@ -78,3 +115,9 @@ class SimulatorParameters(Parameters):
             raise ParameterError(
                 f'{source}: rate: {self["rate"]} Hz: a period must be a whole number of steps of '
                 f'{self["step"]:g} s, not {steps:.6g}')
+        periods = self['rate'] / self['imu.rate']
+        if self['base_motion.source'] != 'fixed' and (
+                round(periods) < 1 or not math.isclose(periods, round(periods), rel_tol=1e-9)):
+            raise ParameterError(
+                f'{source}: imu.rate: {self["imu.rate"]} Hz: rate, {self["rate"]:g} Hz, must be a '
+                f'whole multiple of it, not {periods:.6g}')
