@@ -68,21 +68,24 @@ def batch_of(times: Array, motions: Array, restarts: Any = ()) -> Batch:
     flags[list(restarts)] = True
     stamps = START + np.round(times * 1e9).astype(np.int64)
     wrenches = np.arange(6.0 * len(times)).reshape(-1, 6)
-    return Batch(stamps, rows, wrenches, flags, stamps + 1000)
+    bases = np.arange(1.0, 12.0 * len(times) + 1.0).reshape(-1, 12)
+    return Batch(stamps, rows, wrenches, flags, stamps + 1000, bases)
 
 
 def pieces(batch: Batch, cuts: Any) -> Iterator[Batch]:
     """Return a batch cut before these setpoints."""
     edges = [0, *sorted(cuts), len(batch.stamps)]
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
-        yield Batch(*(each[begin:end] for each in batch))
+        yield batch.chosen(slice(begin, end))
 
 
 def differentiated(differentiator: Differentiator, batches: Any) -> Batch:
     """Return all that comes out of it."""
     done = [differentiator.add(batch) for batch in batches]
     done.append(differentiator.finish())
-    return Batch(*map(np.concatenate, zip(*done, strict=True)))
+    # nothing is done yet, or something with a row of the base for each
+    some = [each for each in done if len(each.stamps)]
+    return Batch(*map(np.concatenate, zip(*some, strict=True))) if some else done[-1]
 
 
 def worst(a: Array, b: Array) -> float:
@@ -390,16 +393,27 @@ def test_poses_that_turn_too_fast_for_the_cutoff_are_left_out_and_counted() -> N
 
 def test_one_wrench_for_all_is_given_to_each() -> None:
     times = np.arange(0.0, 1.0, 1e-2)
-    stamps, motions, _, restarts, came = batch_of(times, motion_at(times).rows)
-    batch = Batch(stamps, motions, np.arange(6.0)[None], restarts, came)
+    batch = batch_of(times, motion_at(times).rows)._replace(wrenches=np.arange(6.0)[None])
     done = differentiated(Differentiator(10.0, 0.1), [batch])
     assert np.array_equal(done.wrenches, np.tile(np.arange(6.0), (100, 1)))
+
+
+def test_every_setpoint_keeps_its_base_and_a_still_base_stays_still() -> None:
+    times = np.arange(0.0, 2.0, 1e-2)
+    batch = batch_of(times, motion_at(times).rows)
+    done = differentiated(Differentiator(10.0, 0.1, window=30), pieces(batch, [7, 90]))
+    assert done.bases is not None
+    assert np.array_equal(done.bases, batch.bases)
+    still = Differentiator(10.0, 0.1)
+    still.add(batch._replace(bases=None))
+    assert still.finish().bases is None
 
 
 def test_no_poses_give_no_setpoints() -> None:
     differentiator = Differentiator(10.0, 0.1)
     done = differentiator.finish()
-    assert [each.shape for each in done] == [(0,), (0, 24), (0, 6), (0,), (0,)]
+    assert [each.shape for each in done[:-1]] == [(0,), (0, 24), (0, 6), (0,), (0,)]
+    assert done.bases is None
     assert not differentiator.left_out
     assert differentiator.deviation == (0.0, 0.0, 0.0, 0.0)
 

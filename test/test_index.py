@@ -51,8 +51,8 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'force_rms_n': None if peak is None else 0.5 * abs(peak),
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
     return {'software': 'stewart_dynamics 9', 'complete': True,
-            'setpoints': {'answered': 1000, 'duration_s': 10.0}, 'legs': legs, 'limits': [],
-            'limits_not_checked': [], 'measured': None,
+            'setpoints': {'answered': 1000, 'duration_s': 10.0, 'base_unknown': 0}, 'legs': legs,
+            'limits': [], 'limits_not_checked': [], 'measured': None,
             'rejected': [], 'singularity': {
                 'determinant_nearest_m3': 0.25, 'crossings': 0, 'condition_max': 4.5,
                 'warnings': 0}, **changes}
@@ -92,7 +92,8 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
 
 
 def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
-    unanswered = summary([None] * 6, setpoints={'answered': 0, 'duration_s': 0.0}, rejected=[
+    unanswered = summary([None] * 6, setpoints={
+        'answered': 0, 'duration_s': 0.0, 'base_unknown': 0}, rejected=[
         {'topic': 'setpoint/pose', 'reason': reason, 'count': count}
         for reason, count in (('wrong frame_id', 2), ('not finite', 900))])
     write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
@@ -100,6 +101,12 @@ def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
     assert [(cells['result'], cells['reason']) for cells in table(tmp_path)] == [
         ('nothing answered', 'no setpoint could be answered; setpoint/pose: 900 not finite; '
                              'setpoint/pose: 2 wrong frame_id'), ('incomplete', 'cut off')]
+
+
+def test_a_base_that_is_not_known_is_a_reason(tmp_path: Path) -> None:
+    write_fleet(tmp_path, [row('a', 0, summary([1.0], setpoints={
+        'answered': 9, 'duration_s': 1.0, 'base_unknown': 2}))])
+    assert table(tmp_path)[0]['reason'] == "the base's motion is not known in 2 setpoints"
 
 
 def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: Path) -> None:
@@ -273,7 +280,8 @@ def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, [
         row(f'{long}/limits', 1, summary([1.0], limits=limits)),
         row(f'{long}/damaged', 3, summary([1.0]), reason), row(f'{long}/failed', 2, None, reason),
-        row(f'{long}/rejected', 3, summary([None], setpoints={'answered': 0, 'duration_s': 0.0}),
+        row(f'{long}/rejected', 3, summary([None], setpoints={
+            'answered': 0, 'duration_s': 0.0, 'base_unknown': 0}),
             'no setpoint could be answered')])
     boxes = page.page.eval_on_selector_all(
         'td.reason div', 'all => all.map((it) => it.getBoundingClientRect().right)')

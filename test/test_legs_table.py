@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
 from stewart_dynamics.runtime.step import Outputs
-from test_output import LEGS, turning
+from test_output import base_wrenches_of, LEGS, turning
 
 RESULTS = 27
 
@@ -76,7 +76,8 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
     for table in tables:
         for outputs in blocks:
             number = len(outputs.stamps)
-            table.write(seconds_of(number), motions_of(number), outputs)
+            table.write(seconds_of(number), motions_of(number), outputs,
+                        base_wrenches_of(outputs))
         table.close()
     head, rows = read_csv(folder / 'legs.csv')
     parquet = pyarrow.parquet.read_table(folder / 'legs.parquet')
@@ -92,7 +93,8 @@ def check_tables(folder: Path, blocks: list[Outputs]) -> None:
             expected = [seconds[n], *motions[n, :3], *quaternions[n], *outputs.lengths[n],
                         *outputs.rates[n], *outputs.forces[n],
                         *outputs.demanded_forces[n], outputs.determinants[n],
-                        outputs.determinant_rates[n], outputs.conditions[n]]
+                        outputs.determinant_rates[n], outputs.conditions[n],
+                        *base_wrenches_of(outputs)[n]]
             assert int(row[0]) == same[0] == outputs.stamps[n]
             assert len(row) == len(expected) + 2
             for text, value, truth in zip(row[1:-1], same[1:-1], expected, strict=True):
@@ -148,7 +150,7 @@ def test_numbers_at_the_edges(tmp_path: Path) -> None:
 def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> None:
     legs = ('größe', 'a "leg"', 'one, two', 'line\nbreak', ' ', "'=1+1'")
     writer = table(tmp_path, legs)
-    writer.write(seconds_of(2), motions_of(2), turning(2))
+    writer.write(seconds_of(2), motions_of(2), turning(2), base_wrenches_of(turning(2)))
     writer.close()
     if table is CsvTable:
         head, rows = read_csv(tmp_path / 'legs.csv')
@@ -157,6 +159,14 @@ def test_any_names_of_legs_are_written_exactly(table: Any, tmp_path: Path) -> No
         head = pyarrow.parquet.read_table(tmp_path / 'legs.parquet').column_names
     assert [name.removesuffix('_length_m') for name in head[9:15]] == list(legs)
     assert [name.removesuffix('_force_n') for name in head[21:27]] == list(legs)
+
+
+def test_the_base_wrench_is_before_the_warning(tmp_path: Path) -> None:
+    CsvTable(tmp_path, LEGS).close()
+    head, _ = read_csv(tmp_path / 'legs.csv')
+    assert head[-8:] == [
+        'condition', 'base_force_x_n', 'base_force_y_n', 'base_force_z_n', 'base_moment_x_n_m',
+        'base_moment_y_n_m', 'base_moment_z_n_m', 'warning']
 
 
 def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
@@ -169,21 +179,21 @@ def test_no_column_name_is_a_formula(tmp_path: Path) -> None:
 @pytest.mark.parametrize('table', [CsvTable, ParquetTable])
 def test_tables_without_rows(table: Any, tmp_path: Path) -> None:
     writer = table(tmp_path, LEGS)
-    writer.write(seconds_of(0), motions_of(0), turning(0))
+    writer.write(seconds_of(0), motions_of(0), turning(0), base_wrenches_of(turning(0)))
     writer.close()
     file, = tmp_path.iterdir()
     if table is CsvTable:
-        assert len(read_csv(file)[0]) == 37
+        assert len(read_csv(file)[0]) == 43
         assert not read_csv(file)[1]
     else:
-        assert pyarrow.parquet.read_table(file).shape == (0, 37)
+        assert pyarrow.parquet.read_table(file).shape == (0, 43)
 
 
 def test_parquet_is_written_in_groups_of_many_rows(tmp_path: Path) -> None:
     outputs = turning(1000)
     table = ParquetTable(tmp_path, LEGS)
     for _ in range(100):
-        table.write(seconds_of(1000), motions_of(1000), outputs)
+        table.write(seconds_of(1000), motions_of(1000), outputs, base_wrenches_of(outputs))
     table.close()
     file = pyarrow.parquet.ParquetFile(tmp_path / 'legs.parquet')
     assert file.metadata.num_rows == 100_000

@@ -26,7 +26,7 @@ from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from referees import random_parameters, rng, size_of
+from referees import random_base_motion, random_parameters, rng, size_of
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.replay.residuals import Comparison
@@ -60,7 +60,7 @@ class Case(NamedTuple):
             self.motion.position, self.motion.rotation, self.motion.linear_velocity,
             self.motion.angular_velocity, self.motion.linear_acceleration,
             self.motion.angular_acceleration)))
-        batch = Batch(*(each[which] for each in self.setpoints))
+        batch = self.setpoints.chosen(which)
         return Case(self.parameters, motion, self.seconds[which], batch,
                     Step(self.parameters).many(batch, None))
 
@@ -162,6 +162,27 @@ def test_a_load_in_the_model_leaves_no_residual() -> None:
         (batch.stamps, case.forces(load)))
     assert np.max(np.abs(wrench)) < 1e-9
     assert comparison.values()['contacts']['count'] == 0
+
+
+def test_a_mass_on_a_base_that_moves_is_found_by_its_acceleration_in_the_world() -> None:
+    case = case_of()
+    base = random_base_motion(case.parameters, rng(1), 500)
+    batch = case.setpoints._replace(bases=base.rows)
+    outputs = Step(case.parameters).many(batch, None)
+    heavier = StewartPlatform(case.parameters.replaced({
+        'platform.mass': case.parameters['platform.mass'] + 3.0,
+        'platform.center_of_mass': [0.0, 0.0, 0.0]}))
+    centered = StewartPlatform(case.parameters.replaced(
+        {'platform.center_of_mass': [0.0, 0.0, 0.0]}))
+    forces = outputs.demanded_forces + (
+        heavier.inverse_dynamics(case.motion, base=base).forces
+        - centered.inverse_dynamics(case.motion, base=base).forces)
+    comparison = Comparison(case.parameters)
+    compared(comparison, Case(case.parameters, case.motion, case.seconds, batch, outputs),
+             (batch.stamps, forces))
+    mass = comparison.values()['mass']
+    assert mass['unmodelled_kg'] == pytest.approx(3.0, rel=1e-9)
+    assert mass['share'] == pytest.approx(1.0, rel=1e-9)
 
 
 def test_a_contact_may_last_for_nearly_half_of_the_bag() -> None:

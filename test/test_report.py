@@ -38,11 +38,13 @@ from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURC
 from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.rows import BASE, NO_BASE
 from stewart_dynamics.replay.html_pages import digits, number, thousands
 from stewart_dynamics.replay.report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline
+from stewart_dynamics.runtime.base_wrench import BaseWrench
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 if TYPE_CHECKING:
@@ -65,19 +67,23 @@ class Given:
     """A motion, what it gives, and the report of it."""
 
     def __init__(self, seconds: Array, motions: Array, parameters: Parameters = PARAMETERS,
-                 ) -> None:
+                 bases: Array | None = None) -> None:
         self.seconds, self.motions, self.parameters = seconds, motions, parameters
         many = len(seconds)
         stamps = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
         self.setpoints = Batch(
-            stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps)
+            stamps, motions, np.zeros((many, 6)), np.zeros(many, dtype=bool), stamps, bases)
         self.outputs: Outputs = Step(parameters).many(self.setpoints, None)
-        self.breakdown = ForceBreakdownRows(parameters)(motions, self.setpoints.wrenches)
+        self.base_wrenches = BaseWrench(parameters).many(self.setpoints)
+        self.breakdown = ForceBreakdownRows(parameters)(motions, self.setpoints.wrenches, bases)
+        if bases is not None:
+            self.breakdown[np.isnan(bases[:, 0])] = np.nan
 
     def summary(self, **changes: Any) -> dict[str, Any]:
         """Return what summary.json would hold."""
         summary = Summary(self.parameters)
-        summary.add(self.seconds, self.setpoints, self.outputs, self.breakdown)
+        summary.add(self.seconds, self.setpoints, self.outputs, self.base_wrenches,
+                    self.breakdown)
         return {
             'version': 1, 'software': 'stewart_dynamics 0.1.0', 'bag': 'bags/example', 'run': '',
             'complete': True, 'missing': [], 'notices': [],
@@ -90,7 +96,8 @@ class Given:
     def report(self, measured: bool = False) -> Report:
         report = Report(self.parameters, measured)
         if len(self.seconds):
-            report.add(self.seconds, self.setpoints, self.outputs, self.breakdown)
+            report.add(self.seconds, self.setpoints, self.outputs, self.base_wrenches,
+                       self.breakdown)
         return report
 
     def write(self, path: Path, **changes: Any) -> dict[str, Any]:
@@ -173,7 +180,8 @@ def test_a_million_setpoints_fit_into_ten_megabytes(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).standard_normal((4, 5000, 6))
     for n in range(200):
         seconds = 5.0 * n + block.seconds
-        report.add(seconds, block.setpoints, block.outputs, block.breakdown)
+        report.add(seconds, block.setpoints, block.outputs, block.base_wrenches,
+                   block.breakdown)
         report.add_measured(seconds, *noise[:3])
     path = tmp_path / 'report.html'
     report.write(path, block.summary())
@@ -193,7 +201,9 @@ def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
                'forces': given.outputs.demanded_forces,
                'powers': given.outputs.demanded_forces * given.outputs.rates,
                'determinant': given.outputs.determinants[:, None],
-               'condition': given.outputs.conditions[:, None]}
+               'condition': given.outputs.conditions[:, None],
+               'base_force': given.base_wrenches[:, :3],
+               'base_moment': given.base_wrenches[:, 3:]}
     for plot, truth in columns.items():
         for n, column in enumerate(truth.T):
             at, values = curve_of(data, plot, n)
@@ -204,7 +214,9 @@ def test_plots_contain_the_samples_and_every_peak(tmp_path: Path) -> None:
                           ('rates', 'rate_peak_m_s')):
             _, values = curve_of(data, plot, n)
             assert np.abs(values).max() == abs(np.float32(leg[key]))
-        parts = sum(curve_of(data, 'force_breakdown', 1 + c, n)[1] for c in range(len(SOURCES)))
+        # a fixed base is no source
+        parts = sum(curve_of(data, 'force_breakdown', 1 + c, n)[1]
+                    for c in range(len(SOURCES) - 1))
         whole = curve_of(data, 'force_breakdown', 0, n)[1]
         assert np.abs(parts - whole).max() <= 1e-6 * np.abs(whole).max()
 
@@ -216,12 +228,73 @@ def test_angles_are_those_of_the_paper_and_continue_past_half_a_turn(tmp_path: P
     given = Given(seconds, motion.rows)
     report = Report(PARAMETERS)
     for part in (slice(0, 150), slice(150, 151), slice(151, 400)):
-        report.add(seconds[part], Batch(*(each[part] for each in given.setpoints)),
-                   Outputs(*(each[part] for each in given.outputs)), given.breakdown[part])
+        report.add(seconds[part], given.setpoints.chosen(part),
+                   Outputs(*(each[part] for each in given.outputs)), given.base_wrenches[part],
+                   given.breakdown[part])
     report.write(tmp_path / 'report.html', given.summary())
     data = data_of(tmp_path / 'report.html')
     drawn = np.stack([curve_of(data, 'angles', n)[1] for n in range(3)], axis=1)
     np.testing.assert_allclose(drawn, np.degrees(angles), atol=1e-4)
+
+
+def moving(unknown: slice = slice(0, 0)) -> Given:
+    """Return a motion on a base that heaves, in part not known."""
+    given = trajectory('clear')
+    bases = np.zeros((len(given.seconds), BASE))
+    bases[:, 2] = -9.80665
+    bases[:, 5] = 2.0 * np.sin(2.0 * np.pi * 5.0 * given.seconds)
+    bases[unknown] = NO_BASE
+    return Given(given.seconds, given.motions, PARAMETERS.replaced({'base.source': 'motion'}),
+                 bases)
+
+
+def test_a_spectrum_shows_at_which_frequency_the_base_is_loaded(tmp_path: Path) -> None:
+    given = moving()
+    given.write(tmp_path / 'report.html')
+    data = data_of(tmp_path / 'report.html')
+    frequencies, values = curve_of(data, 'base_force_spectrum', 2)
+    assert frequencies[-1] == pytest.approx(50.0)  # the Nyquist rate
+    assert np.all(np.diff(frequencies) > 0.0)
+    near = (frequencies > 4.0) & (frequencies < 6.0)
+    assert values[near].max() == values[frequencies > 1.0].max()
+    assert abs(frequencies[near][values[near].argmax()] - 5.0) < 0.3
+    mass = (PARAMETERS['platform.mass'] + PARAMETERS['legs.cylinder.mass'].sum()
+            + PARAMETERS['legs.piston.mass'].sum())
+    power = np.sum(values[near] ** 2) * (frequencies[1] - frequencies[0])
+    assert power == pytest.approx((2.0 * mass) ** 2 / 2.0, rel=0.01)
+    # a fixed base has no source of its own
+    for name, of, shown in (('moving', given, True), ('still', trajectory('clear'), False)):
+        of.write(tmp_path / f'{name}.html')
+        plot = next(each for each in data_of(tmp_path / f'{name}.html')['plots']
+                    if each['key'] == 'force_breakdown')
+        names = [curve['name'] for curve in plot['variants'][0]['curves']]
+        assert ('base motion' in names) is shown
+        text = _Elements((tmp_path / f'{name}.html').read_text(encoding='utf-8')).text
+        assert ('Base motion' in text) is shown
+
+
+def test_a_base_that_is_not_known_is_shown(tmp_path: Path) -> None:
+    moving(slice(100, 130)).write(tmp_path / 'report.html')
+    text = ' '.join(_Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text.split())
+    for shown in ("The base's motion is not always known",
+                  "30 setpoints without forces, since the base's motion is not known, first at "
+                  '1.000 s',
+                  "not checked: limits.force_max , the base's motion is not known at 30 setpoints",
+                  "Without 30 setpoints where the base's motion is not known.",
+                  'base.source : motion'):
+        assert shown in text, shown
+    data = data_of(tmp_path / 'report.html')
+    for plot in ('base_force', 'forces', 'force_breakdown'):
+        _, values = curve_of(data, plot, 1)
+        assert np.flatnonzero(np.isnan(values)).tolist() == list(range(100, 130))
+
+
+def test_few_setpoints_have_no_spectrum(tmp_path: Path) -> None:
+    whole = trajectory('clear')
+    Given(whole.seconds[:50], whole.motions[:50]).write(tmp_path / 'report.html')
+    keys = [plot['key'] for plot in data_of(tmp_path / 'report.html')['plots']]
+    assert 'base_moment' in keys
+    assert 'base_moment_spectrum' not in keys
 
 
 def test_names_are_text_and_never_markup(tmp_path: Path) -> None:
@@ -414,7 +487,7 @@ def test_everything_is_drawn_without_an_error_or_the_network(
     report = opened(given, functools.partial(write_measured, given))
     report.see_everything()
     drawn = report.page.evaluate('[...byCanvas.keys()].map(canvas => canvas.id)')
-    assert len(drawn) == 19
+    assert len(drawn) == 23
     assert report.page.evaluate("document.querySelectorAll('#platform canvas').length") > 0
     report.check()
 
@@ -619,6 +692,47 @@ def test_the_leg_can_be_selected_and_a_curve_hidden(opened: Callable[..., Opened
     report.until(f'{first} === {float(np.float32(given.outputs.demanded_forces[0, 3]))!r}')
     plot.locator('.readout button').nth(1).click()
     report.until("document.getElementById('plot_force_breakdown').data[1].visible === false")
+    report.check()
+
+
+def test_a_spectrum_has_its_own_axes_and_values_at_its_cursor(
+        opened: Callable[..., Opened]) -> None:
+    report = opened(moving())
+    report.see('plot_base_force_spectrum')
+    canvas = "document.getElementById('plot_base_force_spectrum')"
+    axes = report.page.evaluate(
+        f'(() => {{ const {{xaxis, yaxis}} = {canvas}._fullLayout; return [xaxis.type, yaxis.type,'
+        ' xaxis.title.text, yaxis.title.text, ...xaxis.range]; })()')
+    assert axes[:4] == ['log', 'log', 'frequency [Hz]', '[N/√Hz]']
+    assert axes[5] == pytest.approx(np.log10(50.0))
+    readout = report.page.locator('.plot:has(#plot_base_force_spectrum) .readout')
+    assert readout.locator('thead').inner_text().startswith('highest')
+    assert ' at ' in readout.locator('tbody td').nth(2).inner_text()
+    # the zoom of the plots over time is not that of the spectra
+    report.page.evaluate('zoomTo([1, 2])')
+    report.see('plot_base_moment')
+    report.until("document.getElementById('plot_base_moment')._fullLayout.xaxis.range[1] === 2")
+    assert report.page.evaluate(f'{canvas}._fullLayout.xaxis.range[1]') == axes[5]
+    report.see('plot_base_force_spectrum')
+    box = report.page.locator('#plot_base_force_spectrum .nsewdrag').bounding_box()
+    assert box is not None
+    at = (np.log10(5.0) - axes[4]) / (axes[5] - axes[4])
+    report.page.mouse.move(box['x'] + at * box['width'], box['y'] + 0.5 * box['height'])
+    report.until('pointedAt !== null')
+    assert report.page.evaluate('pointedAt') == pytest.approx(5.0, rel=0.05)
+    assert readout.locator('thead').inner_text().startswith('at the cursor')
+    shown = float(readout.locator('tbody td').nth(2).inner_text().replace('\u202f', ''))
+    assert shown > 100.0
+    cursor = report.page.locator('#plot_base_force_spectrum .cursor')
+    assert cursor.inner_text().endswith(' Hz')
+    report.page.mouse.move(5, 5)
+    report.until('pointedAt === null')
+    assert not cursor.is_visible()
+    # one component alone: the weight does not hide it
+    plot = report.page.locator('.plot:has(#plot_base_force)')
+    report.see('plot_base_force')
+    plot.locator('select').select_option(label='F x')
+    report.until("document.getElementById('plot_base_force').data.length === 1")
     report.check()
 
 

@@ -125,10 +125,10 @@ def test_the_policy_is_one_of_sros2() -> None:
 
 
 def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
-    """Each name that the node has with any source of setpoints is in it, and no other."""
+    """Each name that the node has with any source of setpoints or base is in it, and no other."""
     union: dict[str, set[str]] = {}
-    for begin, overrides in ((fresh, ('setpoint.source:=separate',)),
-                             (fresh, ('setpoint.source:=combined',)),
+    for begin, overrides in ((fresh, ('setpoint.source:=separate', 'base.source:=motion')),
+                             (fresh, ('setpoint.source:=combined', 'base.source:=imu')),
                              (start, ('setpoint.source:=pose', 'use_sim_time:=true'))):
         node = begin(*overrides)
         node.until_active()

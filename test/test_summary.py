@@ -35,11 +35,14 @@ from referees import (
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
-from stewart_dynamics.mechanics.rows import MOTION, RESULT, WRENCH
-from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME
+from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
+from stewart_dynamics.mechanics.singularity_warning import (
+    CAUSE, STATE, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.replay.block_statistics import LISTED
+from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines
+from stewart_dynamics.runtime.base_wrench import BaseWrench
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
@@ -59,13 +62,14 @@ def hexapod(**changes: Any) -> Parameters:
 
 
 def batch(stamps: NDArray[np.int64], restarts: NDArray[np.bool_] | None = None,
-          motions: Array | None = None, wrenches: Array | None = None) -> Batch:
+          motions: Array | None = None, wrenches: Array | None = None,
+          bases: Array | None = None) -> Batch:
     """Return setpoints; what is not given is zero."""
     many = len(stamps)
     return Batch(
         stamps, np.zeros((many, MOTION)) if motions is None else motions,
         np.zeros((many, WRENCH)) if wrenches is None else wrenches,
-        np.zeros(many, dtype=bool) if restarts is None else restarts, stamps)
+        np.zeros(many, dtype=bool) if restarts is None else restarts, stamps, bases)
 
 
 class Samples:
@@ -91,7 +95,9 @@ class Samples:
         self.det, self.condition = numbers('det'), numbers('condition')
         self.time_to_crossing = numbers('time_to_crossing', default=math.inf)
         self.warnings = numbers('warnings', default=0.0) > 0.0
-        self.breakdown = numbers('breakdown', 6, 6) if 'breakdown' in given else None
+        self.breakdown = numbers('breakdown', len(SOURCES), 6) if 'breakdown' in given else None
+        self.base_wrenches = numbers('base_wrenches', 6)
+        self.base_unknown = numbers('base_unknown', default=0.0) > 0.0
         assert not given
 
     def outputs(self) -> Outputs:
@@ -109,16 +115,22 @@ class Samples:
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs
 
+    def setpoints(self) -> Batch:
+        """Return what they are of; the base is still where it is always known."""
+        bases = np.zeros((len(self.seconds), BASE))
+        bases[self.base_unknown] = NO_BASE
+        return batch(self.stamps, self.restarts,
+                     bases=bases if self.base_unknown.any() else None)
+
     def summary(self, parameters: Parameters, edges: Sequence[int] = ()) -> Summary:
         """Return the summary of them, given to it in parts."""
         many = len(self.seconds)
-        outputs = self.outputs()
-        setpoints = batch(self.stamps, self.restarts)
+        outputs, setpoints = self.outputs(), self.setpoints()
         summary = Summary(parameters)
         for first, end in zip([0, *edges], [*edges, many], strict=True):
             part = slice(first, end)
-            summary.add(self.seconds[part], Batch(*(each[part] for each in setpoints)),
-                        Outputs(*(each[part] for each in outputs)),
+            summary.add(self.seconds[part], setpoints.chosen(part),
+                        Outputs(*(each[part] for each in outputs)), self.base_wrenches[part],
                         None if self.breakdown is None else self.breakdown[part])
         return summary
 
@@ -149,15 +161,20 @@ def random_samples(seed: int, many: int) -> Samples:
     unsolved = random.random(many) < random.choice([0.0, 0.2, 1.0], p=[0.4, 0.5, 0.1])
     demanded = random.integers(-100, 101, (many, 6)) * 1.0
     demanded[unsolved] = math.nan
-    breakdown = random.normal(size=(many, 6, 6))
-    breakdown[unsolved] = math.nan
+    breakdown = random.normal(size=(many, len(SOURCES), 6))
+    base_wrenches = random.integers(-100, 101, (many, 6)) * 1.0
+    base_unknown = random.random(many) < random.choice([0.0, 0.2, 1.0], p=[0.5, 0.4, 0.1])
+    condition = np.where(unsolved, UNSOLVABLE_CONDITION, random.integers(1, 9, many))
+    demanded[base_unknown] = base_wrenches[base_unknown] = math.nan
+    breakdown[np.isnan(demanded[:, 0])] = math.nan
     return Samples(
         many, seconds=np.cumsum(steps) - steps[0], restarts=restarts, demanded=demanded,
         forces=np.clip(demanded, -50.0, 50.0), breakdown=breakdown,
         suppressed=random.random(many) < 0.2, lengths=random.uniform(0.4, 1.6, (many, 6)),
         rates=random.integers(-10, 11, (many, 6)) * 0.1,
         unit_load=random.integers(1, 9, (many, 6)), det=random.integers(-2, 3, many),
-        condition=random.integers(1, 9, many), warnings=random.random(many) < 0.4,
+        condition=condition, base_wrenches=base_wrenches, base_unknown=base_unknown,
+        warnings=random.random(many) < 0.4,
         time_to_crossing=random.choice([0.1, 0.2, 3.0, math.inf], many))
 
 
@@ -223,7 +240,7 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'rate_margin_m_s': fastest - max(map(abs, rate)),
             'force_margin_n': None if none else strongest - abs(peak[0])}
         breakdown[name] = {}
-        for n, source in enumerate(SOURCES):
+        for n, source in enumerate(SOURCES[:7 if p['base.source'] != 'fixed' else 6]):
             forces = s.breakdown[:, n, leg].tolist()
             breakdown[name][source] = {
                 'peak_n': first_peak(forces, t)[0],
@@ -262,7 +279,14 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
     soonest = min(range(len(t)), key=lambda n: (s.time_to_crossing[n], n))
     worst = max(range(len(t)), key=lambda n: (s.condition[n], -n))
     ever = s.time_to_crossing[soonest] < math.inf
-    unsolved = np.isnan(s.demanded[:, 0])
+    without = np.isnan(s.demanded[:, 0])
+    unsolved = without & (~s.base_unknown | (s.condition >= UNSOLVABLE_CONDITION))
+    unknown = np.flatnonzero(s.base_unknown)
+    base_wrench = {}
+    for name, part in (('force', s.base_wrenches[:, :3]), ('moment', s.base_wrenches[:, 3:])):
+        base_wrench[name] = of_base(np.linalg.norm(part, axis=1).tolist(), t, gap, name)
+    for n, name in enumerate(AXES):
+        base_wrench[name] = of_base(s.base_wrenches[:, n].tolist(), t, gap, name)
     most_loaded = int(np.argmax(s.unit_load.max(axis=0)))
     return {
         'quasi_static': False,
@@ -271,14 +295,15 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'last_stamp_ns': int(s.stamps[-1]), 'duration_s': t[-1],
             'gaps': sum(step > gap for step in steps),
             'gaps_s': math.fsum(step for step in steps if step > gap),
-            'restarts': sum(s.restarts.tolist())},
+            'restarts': sum(s.restarts.tolist()), 'base_unknown': len(unknown),
+            'base_unknown_first_at_s': t[unknown[0]] if len(unknown) else None},
         'legs': legs, 'limits': limits, 'limits_not_checked': not_checked,
         'singularity': {
             'determinant_nearest_m3': s.det[nearest], 'determinant_nearest_at_s': t[nearest],
             'crossings': len(crossings), 'crossings_at_s': crossings[:LISTED],
             'condition_max': s.condition[worst], 'condition_max_at_s': t[worst],
             'unsolved': int(unsolved.sum()),
-            'suppressed': int((np.isnan(s.forces[:, 0]) & ~unsolved).sum()),
+            'suppressed': int((np.isnan(s.forces[:, 0]) & ~without).sum()),
             'time_to_crossing_min_s': s.time_to_crossing[soonest] if ever else None,
             'time_to_crossing_min_at_s': t[soonest] if ever else None,
             'unit_load_force_max': s.unit_load.max(),
@@ -286,8 +311,17 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'warnings': len(spans), 'warnings_from_to_s': spans[:LISTED],
             'warning_s': math.fsum(step for n, step in enumerate(steps)
                                    if s.warnings[n] and step <= gap)},
-        'force_breakdown': breakdown,
+        'force_breakdown': breakdown, 'base_wrench': base_wrench,
         'limit_met': bool(limits or not_checked or spans)}
+
+
+def of_base(numbers: list[float], times: list[float], gap: float, name: str) -> dict[str, Any]:
+    """Return what the summary has of a component of the base wrench."""
+    unit = 'n_m' if name.startswith('moment') else 'n'
+    peak, at = first_peak(numbers, times)
+    return {f'rms_{unit}': root(over_time([x * x for x in numbers], times, gap)[1]),
+            f'mean_{unit}': over_time(numbers, times, gap)[1], f'peak_{unit}': peak,
+            'peak_at_s': at}
 
 
 def assert_same(found: Any, truth: Any, at: str = '') -> None:
@@ -341,13 +375,12 @@ def test_a_long_motion_is_the_same_in_blocks_of_any_size(size: int) -> None:
 
 def test_it_can_be_read_before_the_end() -> None:
     samples, parameters = random_samples(3, 40), hexapod(**LIMITS)
-    outputs = samples.outputs()
-    setpoints = batch(samples.stamps, samples.restarts)
+    outputs, setpoints = samples.outputs(), samples.setpoints()
     summary = Summary(parameters)
     for first in range(0, 40, 10):
         part = slice(first, first + 10)
-        summary.add(samples.seconds[part], Batch(*(each[part] for each in setpoints)),
-                    Outputs(*(each[part] for each in outputs)))
+        summary.add(samples.seconds[part], setpoints.chosen(part),
+                    Outputs(*(each[part] for each in outputs)), samples.base_wrenches[part])
         assert summary.values()['setpoints']['answered'] == first + 10
         assert summary.values() == summary.values()
 
@@ -359,7 +392,8 @@ def test_it_summarizes_the_outputs_of_the_step() -> None:
     setpoints = batch(np.arange(200) * SECOND, motions=motion.rows, wrenches=wrench)
     outputs = Step(p).many(setpoints, None)
     summary = Summary(p)
-    summary.add(np.arange(200) * 1.0, setpoints, outputs,
+    base_wrenches = BaseWrench(p).many(setpoints)
+    summary.add(np.arange(200) * 1.0, setpoints, outputs, base_wrenches,
                 ForceBreakdownRows(p)(setpoints.motions, setpoints.wrenches))
     found = summary.values()
     assert 0 < len(found['limits']) == np.any(np.abs(outputs.demanded_forces) > 2000.0,
@@ -373,21 +407,25 @@ def test_it_summarizes_the_outputs_of_the_step() -> None:
         assert of_leg['force_rms_n'] == pytest.approx(
             math.sqrt((forces ** 2)[1:-1].sum() / 199.0
                       + 0.5 * (forces[0] ** 2 + forces[-1] ** 2) / 199.0), rel=1e-12)
-        assert set(found['force_breakdown'][name]) == set(SOURCES)
+        assert set(found['force_breakdown'][name]) == {*SOURCES} - {'base motion'}
     assert found['singularity']['condition_max'] == outputs.conditions.max()
+    load = found['base_wrench']
+    assert abs(load['moment_y']['peak_n_m']) == np.abs(base_wrenches[:, 4]).max()
+    assert load['force']['peak_n'] == pytest.approx(
+        np.linalg.norm(base_wrenches[:, :3], axis=1).max(), rel=1e-12)
 
 
 def test_it_keeps_no_samples() -> None:
     samples, parameters = random_samples(1, 2000), hexapod(**LIMITS)
-    outputs = samples.outputs()
-    setpoints = batch(samples.stamps, samples.restarts)
+    outputs, setpoints = samples.outputs(), samples.setpoints()
     summary = Summary(parameters)
 
     def held_after(blocks: int) -> int:
         for n in range(blocks):
             # new arrays: what is kept of them would be seen
-            summary.add(samples.seconds + n, Batch(*map(np.copy, setpoints)),
-                        Outputs(*map(np.copy, outputs)), samples.breakdown.copy())
+            summary.add(samples.seconds + n, setpoints.chosen(np.arange(2000)),
+                        Outputs(*map(np.copy, outputs)), samples.base_wrenches.copy(),
+                        samples.breakdown.copy())
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
@@ -406,13 +444,20 @@ def test_every_key_is_documented() -> None:
             return keys(tree[0], f'{at}[]')
         return {at.lstrip('.')}
 
-    samples, parameters = random_samples(1, 50), hexapod(**LIMITS)
+    samples = random_samples(1, 50)
+    parameters = hexapod(**LIMITS, **{'base.source': 'imu'})
     found = keys(samples.summary(parameters).values())
     for leg in parameters['joints']:
         found = {key.replace(f'legs.{leg}.', 'legs.NAME.').replace(
             f'force_breakdown.{leg}.', 'force_breakdown.NAME.') for key in found}
     for source in SOURCES:
         found = {key.replace(f'.{source}.', '.SOURCE.') for key in found}
+    # one row of the page has the keys of several
+    loads = {key for key in found if key.startswith('base_wrench.')}
+    assert loads == {f'base_wrench.{kind}{axis}.{key}' for kind, unit in (
+        ('force', 'n'), ('moment', 'n_m')) for axis in ('', '_x', '_y', '_z') for key in (
+        f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s')}
+    found -= loads
     text = (ROOT / 'docs' / 'summary.md').read_text(encoding='utf-8')
     documented = set(re.findall(r'^\| `([^`]+)` \|', text, flags=re.MULTILINE))
     assert found <= documented
@@ -463,7 +508,9 @@ def test_without_a_setpoint_there_is_nothing() -> None:
     json.dumps(found, allow_nan=False)
     assert found['setpoints'] == {
         'answered': 0, 'first_stamp_ns': None, 'last_stamp_ns': None, 'duration_s': 0.0,
-        'gaps': 0, 'gaps_s': 0.0, 'restarts': 0}
+        'gaps': 0, 'gaps_s': 0.0, 'restarts': 0, 'base_unknown': 0,
+        'base_unknown_first_at_s': None}
+    assert set(found['base_wrench']['moment'].values()) == {None}
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
     assert summary_lines(summary.values(), hexapod()) == ['no setpoint could be answered']
@@ -520,7 +567,7 @@ def test_a_motion_through_a_singularity_crosses_when_it_does() -> None:
     rows[:, 11], rows[:, 17] = 1.0, 0.123
     setpoints = batch(np.round(time * SECOND).astype(np.int64), motions=rows)
     summary = Summary(p)
-    summary.add(time, setpoints, Step(p).many(setpoints, None))
+    summary.add(time, setpoints, Step(p).many(setpoints, None), BaseWrench(p).many(setpoints))
     found = summary.values()['singularity']
     assert found['crossings_at_s'] == pytest.approx([(math.pi / 2.0 - 1.5) / 0.123], abs=1e-4)
     assert found['warnings'] == 1
@@ -538,7 +585,9 @@ def test_a_small_example() -> None:
         demanded=[[10.0, -20.0, 5.0, 0.0, 1.0, 2.0], [-30.0, 15.0, 5.0, 0.0, 1.0, 2.0],
                   [20.0, 25.0, 5.0, 0.0, 1.0, 3.0], [nan] * 6],
         rates=0.25, det=[3.0, 1.0, -1.0, -2.0], condition=[1.0, 2.0, 3.0, 2.0],
-        warnings=[False, True, True, False])
+        warnings=[False, True, True, False],
+        base_wrenches=[[0.0, 0.0, -10.0, 1.0, 1.0, 1.0], [30.0, 0.0, -40.0, 1.0, 1.0, 1.0],
+                       [0.0, 0.0, -40.0, 1.0, 1.0, 1.0], [0.0, 0.0, -20.0, 1.0, 1.0, 1.0]])
     assert table_of(samples, hexapod(**{
         'limits.length_min': 0.75, 'limits.length_max': 10.0, 'limits.force_max': 25.0,
     })).splitlines() == [
@@ -566,6 +615,8 @@ def test_a_small_example() -> None:
         'limits.force_max, 25, exceeded by front left in 1 setpoint from t = 1.00 s on: -30 at '
         'worst',
         'limits.force_max could not be checked in 1 setpoint: J_inv cannot be solved',
+        'base wrench: at most 50.0 N at t = 1.00 s (RMS 36.6) and 1.7 N m at t = 0.00 s (RMS '
+        '1.7)',
         '',
         'det(J) crossed zero at t = 1.500 s: forces grow without bound there',
         'det(J) nearest zero: 1 m^3 at t = 1.00 s',
@@ -629,7 +680,8 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     samples = Samples(3, rates=0.0, breakdown=1.0)
     parameters = hexapod(**LIMITS)
     summary = Summary(parameters, quasi_static=True)
-    summary.add(samples.seconds, batch(samples.stamps), samples.outputs(), samples.breakdown)
+    summary.add(samples.seconds, batch(samples.stamps), samples.outputs(),
+                samples.base_wrenches, samples.breakdown)
     found = summary.values()
     leg = found['legs']['b']
     assert {key for key, value in leg.items() if value is None} == {
@@ -645,7 +697,8 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     assert 'limits.velocity_max could not be checked' in text
     assert 'all limits held' not in text
     without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
-    without.add(samples.seconds, batch(samples.stamps), samples.outputs())
+    without.add(samples.seconds, batch(samples.stamps), samples.outputs(),
+                samples.base_wrenches)
     assert not without.values()['limit_met']
 
 
@@ -660,6 +713,39 @@ def test_a_force_limit_is_not_checked_where_there_are_no_forces() -> None:
     assert 'limits.force_max could not be checked in 2 setpoints: J_inv cannot be solved' in text
     assert 'all limits held' not in text
     assert not Samples(4, demanded=demanded).summary(hexapod()).values()['limits_not_checked']
+
+
+def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None:
+    demanded, loads = np.ones((4, 6)), np.ones((4, 6))
+    demanded[1:3] = loads[1:3] = math.nan
+    samples = Samples(4, demanded=demanded, base_wrenches=loads, base_unknown=[0, 1, 1, 0])
+    limited = hexapod(**{'limits.force_max': 5.0})
+    for parameters, checked in ((limited, False), (hexapod(), True)):
+        found = samples.summary(parameters).values()
+        assert found['setpoints']['base_unknown'] == 2
+        assert found['setpoints']['base_unknown_first_at_s'] == 1.0
+        assert (found['singularity']['unsolved'], found['singularity']['suppressed']) == (0, 0)
+        assert bool(found['limits_not_checked']) is found['limit_met'] is not checked
+        text = '\n'.join(summary_lines(found, parameters))
+        assert ("the base's motion is not known in 2 setpoints, first at t = 1.00 s: they have no "
+                'forces') in text
+        assert ("limits.force_max could not be checked in 2 setpoints: the base's motion is not "
+                'known' in text) is not checked
+    both = Samples(4, demanded=demanded, base_wrenches=loads, base_unknown=[0, 1, 0, 0])
+    assert ("in 1 setpoint: J_inv cannot be solved; in 1 setpoint: the base's motion is not known"
+            in ' '.join(table_of(both, limited).split()))
+
+
+def test_the_base_wrench_is_summed_up_by_magnitude_and_component() -> None:
+    loads = np.zeros((3, 6))
+    loads[:, 2], loads[1, :2], loads[2, 3] = -4.0, (3.0, 0.0), -7.0
+    found = values(3, base_wrenches=loads)['base_wrench']
+    assert found['force'] == {
+        'rms_n': pytest.approx(math.sqrt(0.5 * 16.0 + 25.0 * 0.5 + 0.0)), 'mean_n': 4.5,
+        'peak_n': 5.0, 'peak_at_s': 1.0}
+    assert found['force_z'] == {'rms_n': 4.0, 'mean_n': -4.0, 'peak_n': -4.0, 'peak_at_s': 0.0}
+    assert (found['moment_x']['peak_n_m'], found['moment']['peak_n_m']) == (-7.0, 7.0)
+    assert found['moment']['peak_at_s'] == 2.0
 
 
 def test_a_limit_is_exceeded_only_above_its_tolerance() -> None:

@@ -17,32 +17,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.options import Options
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.runtime import input_topics as inputs
+from stewart_dynamics.runtime.base_wrench import BASE_WRENCH
 
 MEASURED = 'measured'
 _MEASURED_TYPE = 'sensor_msgs/msg/JointState'
 # At most so many of a kind are listed.
 LISTED = 20
+_OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
 
 
 def find_topics(recording: Recording, parameters: Parameters, options: Options) -> dict[str, str]:
     """Return the name in the bag of each topic that is read."""
     wanted = inputs.SOURCES[parameters['setpoint.source']]
-    for name in options.topics:
-        if name != 'wrench' and f'setpoint/{name}' not in wanted:
-            raise StewartError(f'--{name}: is not read where setpoint.source is '
-                               f'{parameters["setpoint.source"]}')
-    found = {key: _topic(recording, key, options) for key in wanted}
-    wrench = options.topics.get('wrench')
+    of_base = inputs.BASE_SOURCES[parameters['base.source']]
+    for key in inputs.INPUT_TYPES:
+        if key not in (*wanted, *of_base, inputs.WRENCH) and name_of(key) in options.topics:
+            source = 'base.source' if key in _OF_BASE else 'setpoint.source'
+            raise StewartError(f'{_option(key)}: is not read where {source} is '
+                               f'{parameters[source]}')
+    # Setpoints and the base's motion may be of one type: a topic that is named as the base's is no
+    # setpoint, and the base's is not found by its type then.
+    named = {key: name for key in of_base if (name := _named(recording, key, options))}
+    found = {}
+    for key in wanted:
+        found[key] = _named(recording, key, options) or _by_type(
+            recording, key, options, {*named.values()})
+    for key in of_base:
+        found[key] = named.get(key) or _base_by_type(
+            recording, key, options, parameters['base.source'], found)
     # A WrenchStamped found by its type could be anything: a load cell, an estimate.
-    if wrench or f'{options.node}/{inputs.WRENCH}' in recording.topics:
-        found[inputs.WRENCH] = _topic(recording, inputs.WRENCH, options)
+    if load := _named(recording, inputs.WRENCH, options, ending=False):
+        found[inputs.WRENCH] = load
     if options.measured:
         found[MEASURED] = _of_type(recording, options.measured, _MEASURED_TYPE)
     names = list(found.values())
@@ -53,37 +65,81 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     return found
 
 
-def notices_of(recording: Recording, topics: Mapping[str, str], options: Options) -> list[str]:
+def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Parameters,
+               options: Options) -> list[str]:
     """Return notices about the choice of topics."""
     notices = [f'{key} is read from {name}, the only topic that matches'
                for key, name in topics.items()
                if key in inputs.INPUT_TYPES and name != f'{options.node}/{key}'
                and name not in options.topics.values()]
     loads = sorted(name for name, kind in recording.topics.items()
-                   if kind == inputs.INPUT_TYPES[inputs.WRENCH] and name not in topics.values())
+                   if kind == inputs.INPUT_TYPES[inputs.WRENCH] and name not in topics.values()
+                   and name != f'{options.node}/{BASE_WRENCH}')
     if loads and inputs.WRENCH not in topics:
         notices.append(f'{", ".join(loads)}: not used as external wrench; --wrench selects one')
+    base = sorted(name for name in recording.topics if name not in topics.values()
+                  and name in [f'{options.node}/{key}' for key in _OF_BASE])
+    if base:
+        notices.append(f'{", ".join(base)}: not used: base.source is {parameters["base.source"]}')
     return notices
 
 
-def _topic(recording: Recording, key: str, options: Options) -> str:
-    """Return a topic's name in the bag: as given, the usual one, or the only one that matches."""
+def name_of(key: str) -> str:
+    """Return the name of an input in Options.topics: pose, base_pose."""
+    return key.removeprefix('setpoint/').replace('/', '_')
+
+
+def _option(key: str) -> str:
+    return f'--{name_of(key).replace("_", "-")}'
+
+
+def _named(recording: Recording, key: str, options: Options, ending: bool = True) -> str | None:
+    """Return a topic's name in the bag: as given, the usual one, or the only one ending so."""
     kind = inputs.INPUT_TYPES[key]
     usual = f'{options.node}/{key}'
-    given = options.topics.get(key.rpartition('/')[2])
+    given = options.topics.get(name_of(key))
     if given or usual in recording.topics:
         return _of_type(recording, given or usual, kind)
-    of_type = sorted(name for name, other in recording.topics.items() if other == kind)
-    named = [name for name in of_type if name.endswith(f'/{key}')]
-    for candidates in (named, of_type):
-        if len(candidates) == 1:
-            return candidates[0]
-    option = f'--{key.rpartition("/")[2]}'
-    if of_type:
+    found = [name for name, other in recording.topics.items()
+             if other == kind and name.endswith(f'/{key}')] if ending else []
+    return found[0] if len(found) == 1 else None
+
+
+def _by_type(recording: Recording, key: str, options: Options, taken: Container[str]) -> str:
+    """Return the only topic that has the type of an input and is not another input."""
+    kind = inputs.INPUT_TYPES[key]
+    usual = f'{options.node}/{key}'
+    candidates = _candidates(recording, key, options, taken)
+    if len(candidates) == 1:
+        return candidates[0]
+    if candidates:
         raise BagError(f'{recording.path}: has no topic {usual}, and several of its type, '
-                       f'{kind}: {", ".join(of_type)}: select one by {option}')
+                       f'{kind}: {", ".join(candidates)}: select one by {_option(key)}')
     raise BagError(f'{recording.path}: has no topic {usual}, nor another of its type, {kind}; '
                    f'it contains {_held(recording)}{_advice(recording, key)}')
+
+
+def _base_by_type(recording: Recording, key: str, options: Options, source: str,
+                  found: Mapping[str, str]) -> str:
+    """Return the same for a topic of the base, unless setpoints are of its type, too."""
+    kind = inputs.INPUT_TYPES[key]
+    candidates = _candidates(recording, key, options, found.values())
+    if len(candidates) == 1 and kind not in {inputs.INPUT_TYPES[each] for each in found
+                                             if each not in _OF_BASE}:
+        return candidates[0]
+    text = (f'{recording.path}: base.source is {source}, and the bag has no topic '
+            f'{options.node}/{key}')
+    if candidates:
+        raise BagError(f'{text}; of its type, {kind}, it has {", ".join(candidates)}: '
+                       f'{_option(key)} selects one')
+    raise BagError(f'{text}, nor another of its type, {kind}; it contains {_held(recording)}')
+
+
+def _candidates(recording: Recording, key: str, options: Options, taken: Container[str],
+                ) -> list[str]:
+    others = [f'{options.node}/{other}' for other in inputs.INPUT_TYPES if other != key]
+    return sorted(name for name, kind in recording.topics.items()
+                  if kind == inputs.INPUT_TYPES[key] and name not in taken and name not in others)
 
 
 def _advice(recording: Recording, key: str) -> str:

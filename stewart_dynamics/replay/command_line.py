@@ -36,6 +36,12 @@ if TYPE_CHECKING:
 _INTERRUPTED = 130
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _CUTOFF = 10.0
+_TOPICS = {
+    'pose': 'poses', 'twist': 'twists', 'accel': 'accelerations',
+    'combined': 'setpoints in one message; sets setpoint.source',
+    'wrench': 'external wrench on the platform; never found by its type',
+    'base_pose': 'poses of the base in the world', 'base_twist': 'twists of the base',
+    'base_accel': 'accelerations of the base', 'base_imu': 'IMU on the base'}
 # Up to this number of bags the summary of each is printed; of more only the totals.
 _FEW = 10
 
@@ -95,14 +101,12 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument('--strict', action='store_true',
                         help='exit code 1 when a limit or singularity warning was met')
     topics = parser.add_argument_group(
-        'topics', 'Setpoints are looked for under the usual names, then by their type.')
+        'topics', 'Inputs are looked for under the usual names, then by their type.')
     topics.add_argument('--node', default=NODE, metavar='NAME', type=_node,
                         help=f'name before the usual topics (default: {NODE})')
-    for name, what in (
-            ('pose', 'poses'), ('twist', 'twists'), ('accel', 'accelerations'),
-            ('combined', 'setpoints in one message; sets setpoint.source'),
-            ('wrench', 'external wrench on the platform; never found by its type')):
-        topics.add_argument(f'--{name}', metavar='TOPIC', help=f'topic of the {what}')
+    for name, what in _TOPICS.items():
+        topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
+                            help=f'topic of the {what}')
     topics.add_argument('--measured', metavar='TOPIC',
                         help='JointState whose efforts are compared with the computed forces')
     poses = parser.add_argument_group('bags that have only poses')
@@ -128,10 +132,9 @@ def _arguments() -> argparse.ArgumentParser:
 
 
 def _options(given: argparse.Namespace) -> Options:
-    names = ('pose', 'twist', 'accel', 'combined', 'wrench')
     return Options(
         node=given.node,
-        topics={name: getattr(given, name) for name in names if getattr(given, name)},
+        topics={name: getattr(given, name) for name in _TOPICS if getattr(given, name)},
         cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
         measured=given.measured or None,
         parquet=given.parquet, report=not given.no_report, force=given.force)

@@ -32,6 +32,7 @@ from stewart_dynamics.replay.html_pages import page
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, PARTLY_READ
 from stewart_dynamics.replay.spreadsheet import harmless
 from stewart_dynamics.replay.summary_text import plural
+from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]
@@ -190,12 +191,14 @@ def _reasons(summary: dict[str, Any]) -> list[str]:
     found = [_exceeded(summary)] if summary['limits'] else []
     found += [f'{name.removeprefix("limits.")} not checked'
               for name in summary['limits_not_checked']]
-    singularity = summary['singularity']
+    points, singularity = summary['setpoints'], summary['singularity']
+    if points['base_unknown']:
+        found.append(f'{BASE_NOT_KNOWN} in {plural(points["base_unknown"], "setpoint")}')
     if singularity['crossings']:
         found.append(f'{plural(singularity["crossings"], "crossing")} of det(J) = 0')
     if singularity['warnings']:
         found.append(plural(singularity['warnings'], 'singularity warning'))
-    if not summary['setpoints']['answered']:
+    if not points['answered']:
         most = sorted(summary['rejected'], key=lambda each: -each['count'])
         found += [f'{each["topic"]}: {each["count"]} {each["reason"]}' for each in most[:_LISTED]]
     return found

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""legs.csv and legs.parquet: one row per setpoint, with time, pose, legs and det(J)."""
+"""legs.csv and legs.parquet: one row per setpoint: time, pose, legs, det(J), base wrench."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ _ENDS = (b',0\n', b',1\n')
 class Table(Protocol):
     """A file with one row per setpoint."""
 
-    def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
+    def write(self, seconds: Array, motions: Array, outputs: Outputs,
+              base_wrenches: Array) -> None:
         """
         Write the rows of N setpoints.
 
@@ -49,6 +50,8 @@ class Table(Protocol):
             Their motions, laid out as ``inverse_dynamics`` says.
         outputs : Outputs
             Their outputs.
+        base_wrenches : (N, 6)
+            Their base wrenches [N, N m]; nan: not known.
 
         """
 
@@ -63,11 +66,14 @@ def column_names(legs: Sequence[str]) -> list[str]:
             *(f'orientation_{part}' for part in 'xyzw'),
             *(f'{leg}_{quantity}' for quantity in (
                 'length_m', 'rate_m_s', 'force_n', 'demanded_force_n') for leg in legs),
-            'determinant_m3', 'determinant_rate_m3_s', 'condition', 'warning']
+            'determinant_m3', 'determinant_rate_m3_s', 'condition',
+            *(f'base_force_{axis}_n' for axis in 'xyz'),
+            *(f'base_moment_{axis}_n_m' for axis in 'xyz'), 'warning']
 
 
-def _numbers(seconds: Array, motions: Array, outputs: Outputs, quasi_static: bool) -> Array:
-    """Return the columns between stamp and warning (N, 35); nan: not known."""
+def _numbers(seconds: Array, motions: Array, outputs: Outputs, base_wrenches: Array,
+             quasi_static: bool) -> Array:
+    """Return the columns between stamp and warning (N, 41); nan: not known."""
     rates, determinant_rates = outputs.rates, outputs.determinant_rates
     if quasi_static:
         rates = np.full_like(rates, np.nan)
@@ -75,7 +81,7 @@ def _numbers(seconds: Array, motions: Array, outputs: Outputs, quasi_static: boo
     return np.column_stack([
         seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
         outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
-        outputs.determinants, determinant_rates, outputs.conditions])
+        outputs.determinants, determinant_rates, outputs.conditions, base_wrenches])
 
 
 class CsvTable:
@@ -102,11 +108,12 @@ class CsvTable:
         names = [_quoted(harmless(name)) for name in column_names(legs)]
         self._file.write(','.join(names).encode() + b'\n')
 
-    def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
+    def write(self, seconds: Array, motions: Array, outputs: Outputs,
+              base_wrenches: Array) -> None:
         """Write the rows of N setpoints."""
         if not len(outputs.stamps):
             return
-        numbers = _numbers(seconds, motions, outputs, self._quasi_static)
+        numbers = _numbers(seconds, motions, outputs, base_wrenches, self._quasi_static)
         text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
         if not np.isfinite(numbers).all():
             text = text.replace(b'null', b'')
@@ -151,9 +158,10 @@ class ParquetTable:
         self._writer = pyarrow.parquet.ParquetWriter(folder / self.FILE, self._schema)
         self._waiting: list[Any] = []
 
-    def write(self, seconds: Array, motions: Array, outputs: Outputs) -> None:
+    def write(self, seconds: Array, motions: Array, outputs: Outputs,
+              base_wrenches: Array) -> None:
         """Write the rows of N setpoints."""
-        numbers = _numbers(seconds, motions, outputs, self._quasi_static)
+        numbers = _numbers(seconds, motions, outputs, base_wrenches, self._quasi_static)
         columns = [outputs.stamps, *numbers.T, outputs.warnings]
         self._waiting.append(self._arrow.record_batch(
             [self._arrow.array(column, type=field.type, from_pandas=True)

@@ -112,7 +112,7 @@ def replay(
         parameters = parameters.replaced({'setpoint.source': source})
     with closing(Recording(bag)) as recording:
         topics = find_topics(recording, parameters, options)
-        notices = notices_of(recording, topics, options)
+        notices = notices_of(recording, topics, parameters, options)
         with whole_folder(folder, options) as partial, ExitStack() as stack:
             run = _Run(recording, topics, parameters, options, partial, stack)
             run.notices += [*likely_mistakes(parameters), *notices]
@@ -217,6 +217,8 @@ class _Run:
         values = self._summary.values()
         if not values['setpoints']['answered']:
             missing.append('no setpoint could be answered')
+        elif values['setpoints']['base_unknown'] == values['setpoints']['answered']:
+            missing.append("the base's motion is not known at any setpoint: there are no forces")
         measured = None if self._comparison is None else self._comparison.values()
         if measured and not measured['setpoints_compared']:
             missing.append(f'nothing could be compared with {self._options.measured}: no '
@@ -292,12 +294,16 @@ class _Run:
         base_wrenches = self._base_wrench.many(setpoints)
         self._bag.write(setpoints.times, outputs, base_wrenches)
         seconds = self._seconds(setpoints.stamps)
-        self._table.write(seconds, setpoints.motions, outputs)
+        self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
         breakdown = None
         if self.report is not None and self._breakdown is not None:
-            breakdown = self._breakdown(setpoints.motions, setpoints.wrenches)
-            self.report.add(seconds, setpoints, outputs, breakdown)
-        self._summary.add(seconds, setpoints, outputs, breakdown)
+            breakdown = self._breakdown(
+                setpoints.motions, setpoints.wrenches, setpoints.bases)
+            if setpoints.bases is not None:
+                # it takes a base that is not known as a still one
+                breakdown[np.isnan(setpoints.bases[:, 0])] = np.nan
+            self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
+        self._summary.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(seconds, setpoints, outputs))
         return len(setpoints.stamps)

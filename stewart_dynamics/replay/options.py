@@ -32,7 +32,10 @@ class Options(NamedTuple):
     node: str = NODE
     """Node name: the prefix of the output topics, and of setpoint topics with usual names."""
     topics: Mapping[str, str] = MappingProxyType({})
-    """Topics in the bag to be read as pose, twist, accel, combined or wrench."""
+    """
+    Topics in the bag to be read as pose, twist, accel, combined or wrench, or as base_pose,
+    base_twist, base_accel or base_imu.
+    """
     cutoff: float | None = None
     """Cut-off frequency [Hz]: read only poses, and differentiate them by smoothing splines."""
     measured: str | None = None

@@ -42,9 +42,11 @@ from stewart_dynamics.replay import report_plots as channels
 from stewart_dynamics.replay.force_sources import sources_of
 from stewart_dynamics.replay.html_pages import page
 from stewart_dynamics.replay.plot_curves import Curves, Frames
-from stewart_dynamics.replay.report_plots import COLORS, measured_plots, motion_plots
+from stewart_dynamics.replay.report_plots import (
+    base_wrench_plots, COLORS, measured_plots, motion_plots, spectrum_plots)
 from stewart_dynamics.replay.report_verdicts import (
     date, exceeded_limits, rejections, smallest_margins, units, verdicts)
+from stewart_dynamics.replay.spectrum import drawn, Spectrum
 from stewart_dynamics.runtime.step import Batch, Outputs
 
 # A frame of the moving platform: position, rotation, lengths, forces.
@@ -70,13 +72,15 @@ class Report:
         self._parameters = parameters
         self._legs: tuple[str, ...] = parameters['joints']
         timeout = parameters['setpoint.timeout']
-        self._curves = Curves(channels.CHANNELS, timeout)
+        self._channels = channels.channels_of(parameters)
+        self._curves = Curves(self._channels, timeout)
+        self._spectrum = Spectrum(6, timeout)
         self._frames = Frames(_FRAME)
         self._compared = Curves(channels.COMPARED, timeout) if measured else None
         self._angles: Array = np.zeros((1, 3))
 
-    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, breakdown: Array,
-            ) -> None:
+    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
+            breakdown: Array) -> None:
         """
         Add setpoints and their outputs.
 
@@ -88,12 +92,14 @@ class Report:
             At least one.
         outputs : Outputs
             Of these setpoints.
+        base_wrenches : (N, 6)
+            What the hexapod puts on its base [N, N m]; nan: not known.
         breakdown : (N, 7, 6)
             The demanded forces by source: sample, source, leg [N].
 
         """
         motions, forces = setpoints.motions, outputs.demanded_forces
-        rows = np.empty((channels.CHANNELS, len(seconds)))
+        rows = np.empty((self._channels, len(seconds)))
         rows[channels.POSITION] = motions[:, 0:3].T
         rows[channels.ANGLES] = self._continued(_euler(motions[:, 3:12])).T
         rows[channels.VELOCITY] = motions[:, 12:15].T
@@ -107,8 +113,11 @@ class Report:
             rows[channels.POWERS] = (forces * outputs.rates).T
         rows[channels.DETERMINANT] = outputs.determinants
         rows[channels.CONDITION] = outputs.conditions
-        rows[channels.BREAKDOWN] = breakdown.reshape(len(seconds), -1).T
+        rows[channels.BASE_WRENCH] = base_wrenches.T
+        parts = rows[channels.BREAKDOWN]
+        parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
         self._curves.add(seconds, rows)
+        self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
         self._frames.add(seconds, np.concatenate(
             [motions[:, :12], outputs.lengths, forces], axis=1))
 
@@ -177,8 +186,12 @@ class Report:
         singularity = summary['singularity']
         p = self._parameters
         known = not summary['quasi_static']
-        curves = [_curve(self._curves, n) for n in range(channels.CHANNELS)]
-        plots = motion_plots(p, known) if self._curves.samples else []
+        curves = [_curve(self._curves, n) for n in range(self._channels)]
+        plots = [*motion_plots(p, known), *base_wrench_plots()] if self._curves.samples else []
+        density = self._spectrum.density()
+        if density is not None:
+            plots += spectrum_plots(density, len(curves))
+            curves += [_packed(*drawn(density.frequencies, each)) for each in density.amplitudes]
         if self._compared is not None and self._compared.samples:
             plots += measured_plots(p, len(curves))
             curves += [_curve(self._compared, n) for n in range(channels.COMPARED)]
@@ -213,7 +226,10 @@ def _euler(rotations: Array) -> Array:
 
 
 def _curve(curves: Curves, channel: int) -> dict[str, str]:
-    times, values = curves.drawn(channel)
+    return _packed(*curves.drawn(channel))
+
+
+def _packed(times: Array, values: Array) -> dict[str, str]:
     most = float(np.finfo(np.float32).max)
     return {'times': _base64(times, '<f8'), 'values': _base64(values.clip(-most, most), '<f4')}
 

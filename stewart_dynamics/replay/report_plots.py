@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The time plots of a report: channels, titles, notes and bounds."""
+"""The plots of a report over time and frequency: channels, titles, notes and bounds."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.force_sources import sources_of
+from stewart_dynamics.replay.spectrum import Density
 
 # Okabe and Ito's palette for the color-blind, without yellow, which is not visible on white.
 COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
@@ -38,12 +39,20 @@ POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
     slice(n, n + 3) for n in range(0, 18, 3))
 LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
 DETERMINANT, CONDITION = 42, 43
-BREAKDOWN = slice(44, 44 + 6 * len(SOURCES))
-CHANNELS = BREAKDOWN.stop
+BASE_WRENCH = slice(44, 50)
+# The last: how many there are depends on the sources.
+BREAKDOWN = slice(50, 50 + 6 * len(SOURCES))
+
+BASE_SECTION = 'base_wrench'
 
 # The channels of a comparison with measured forces, after those of the motion.
 MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
 COMPARED = 24
+
+
+def channels_of(parameters: Parameters) -> int:
+    """Return the number of channels of a sample."""
+    return BREAKDOWN.start + 6 * len(sources_of(parameters))
 
 
 class Curve(NamedTuple):
@@ -65,7 +74,7 @@ class Bound(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """A plot over time; the user selects one of its variants."""
+    """A plot over time, or over frequency; the user selects one of its variants."""
 
     key: str
     figure: str
@@ -79,6 +88,10 @@ class Plot(NamedTuple):
     """Shade the intervals with an external load."""
     spikes: bool = False
     """A few samples may be far larger than the others: they do not set the scale."""
+    section: str = 'plots'
+    """Where it is in the report."""
+    spectrum: bool = False
+    """Over frequency, both axes logarithmic."""
 
     def plain(self) -> dict[str, Any]:
         """Return the plot for JSON."""
@@ -135,6 +148,43 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
 
 
+def base_wrench_plots() -> list[Plot]:
+    """Return the plots of the base wrench over time."""
+    return [
+        Plot('base_force', '', 'Force on the base', 'N',
+             _all_or_one(_of_axes(_first(BASE_WRENCH), 'F x', 'F y', 'F z')),
+             'of the whole hexapod, base axes', spikes=True, section=BASE_SECTION),
+        Plot('base_moment', '', 'Moment on the base', 'N m',
+             _all_or_one(_of_axes(_last(BASE_WRENCH), 'M x', 'M y', 'M z')),
+             "about the base's origin, base axes", spikes=True, section=BASE_SECTION)]
+
+
+def spectrum_plots(density: Density, first: int) -> list[Plot]:
+    """Return the plots of the spectra of the base wrench, whose curves begin at a number."""
+    wrench = slice(first, first + 6)
+    note = (f'amplitude spectral density up to the Nyquist rate; {density.segments} Hann '
+            f'{"window" if density.segments == 1 else "windows"} of {density.seconds:.3g} s, '
+            'without their means')
+    if density.uneven:
+        note += (f'; {100.0 * density.uneven:.2g} % of the steps in time are uneven, values are '
+                 'interpolated: the upper half of the frequencies may be too low')
+    return [
+        Plot('base_force_spectrum', '', 'Spectrum of the force on the base', 'N/√Hz',
+             _of_axes(_first(wrench), 'F x', 'F y', 'F z'), note, log=True,
+             section=BASE_SECTION, spectrum=True),
+        Plot('base_moment_spectrum', '', 'Spectrum of the moment on the base', 'N m/√Hz',
+             _of_axes(_last(wrench), 'M x', 'M y', 'M z'), note, log=True,
+             section=BASE_SECTION, spectrum=True)]
+
+
+def _first(wrench: slice) -> slice:
+    return slice(wrench.start, wrench.start + 3)
+
+
+def _last(wrench: slice) -> slice:
+    return slice(wrench.start + 3, wrench.stop)
+
+
 def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
     """Return the plots of a comparison, whose channels begin at a number."""
     joints = parameters['joints']
@@ -154,7 +204,7 @@ def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
              'J_inv^T (computed − measured): the load that the model does not include, base axes',
              contacts=True, spikes=True),
         Plot('external_moment', '', 'External moment', 'N m',
-             _of_axes(slice(wrench.start + 3, wrench.stop), 'M x', 'M y', 'M z'),
+             _of_axes(_last(wrench), 'M x', 'M y', 'M z'),
              "about the platform's origin, base axes", contacts=True, spikes=True)]
 
 
@@ -166,6 +216,12 @@ def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:
 def _of_axes(channels: slice, *names: str) -> dict[str, list[Curve]]:
     return {'': [Curve(name, color, channels.start + n) for n, (name, color) in
                  enumerate(zip(names, _AXIS_COLORS, strict=True))]}
+
+
+def _all_or_one(variants: Mapping[str, list[Curve]]) -> dict[str, list[Curve]]:
+    """Return all curves as one variant, and each as one: the weight hides the others."""
+    curves = variants['']
+    return {'all': curves, **{curve.name: [curve] for curve in curves}}
 
 
 def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:

@@ -45,6 +45,8 @@ def _reading(summary: Summary) -> Verdict:
         return 'bad', 'No setpoint could be answered'
     if not summary['complete']:
         return 'bad', 'The bag could not be read completely'
+    if summary['setpoints']['base_unknown']:
+        return 'warn', "The base's motion is not always known"
     if summary['rejected']:
         return 'warn', 'Some messages were rejected'
     return 'good', 'The whole bag was read'

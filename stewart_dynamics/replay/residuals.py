@@ -35,6 +35,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.mechanics.friction import friction
+from stewart_dynamics.mechanics.rows import (
+    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY,
+    LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.contacts import WrenchBins
@@ -53,7 +56,7 @@ AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
 _UNITS = ('n',) * 3 + ('n_m',) * 3
 
 # Columns of the rows kept of setpoints.
-_SECONDS, _POSE, _ACCELERATION, _RATES, _FORCES = (
+_SECONDS, _POSE, _DRIVE, _RATES, _FORCES = (
     0, slice(1, 13), slice(13, 16), slice(16, 22), slice(22, 28))
 
 
@@ -90,6 +93,7 @@ class Comparison:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._platform = StewartPlatform(parameters)
+        self._gravity = parameters['gravity']
         gap = parameters['setpoint.timeout']
         self._gap = round(gap * 1e9)
         self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
@@ -101,7 +105,7 @@ class Comparison:
         self._fit = np.zeros((6, 3, 3))
         self._fitted = np.zeros((6, 3))
         self._wrench = _Statistics(6)
-        self._mass = np.zeros(3)  # sums of d.d, d.F and F.F, d = gravity - acceleration
+        self._mass = np.zeros(3)  # sums of d.d, d.F and F.F, d the drive
         self._bins = WrenchBins()
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
@@ -120,7 +124,8 @@ class Comparison:
         """
         motions = setpoints.motions
         self._setpoints.add(setpoints.stamps, np.column_stack([
-            seconds, motions[:, :12], motions[:, 18:21], outputs.rates, outputs.demanded_forces]))
+            seconds, motions[:, POSE], _drive(motions, setpoints.bases, self._gravity),
+            outputs.rates, outputs.demanded_forces]))
         return self._compared()
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
@@ -173,9 +178,9 @@ class Comparison:
         seconds, wrench = compared.seconds, compared.wrench
         self._bins.add(seconds, wrench)
         # legs and axes first: sums along contiguous memory are many times as fast
-        measured, computed, rates, loads, accelerations = map(np.ascontiguousarray, (
+        measured, computed, rates, loads, drive = map(np.ascontiguousarray, (
             compared.measured.T, compared.computed.T, rows[:, _RATES].T, wrench.T,
-            rows[:, _ACCELERATION].T))
+            rows[:, _DRIVE].T))
         residual = measured - computed
         self._legs.add(seconds, residual)
         self._wrench.add(seconds, loads)
@@ -191,7 +196,7 @@ class Comparison:
             for column, other in enumerate(terms):
                 self._fit[:, row, column] += np.sum(one * other, axis=1)
         # weight and inertia of an unmodelled mass
-        drive, force = self._parameters['gravity'][:, None] - accelerations, loads[:3]
+        force = loads[:3]
         # not vdot: BLAS threads that wait for a busy processor cost more than the sums
         self._mass += [np.sum(drive ** 2), np.sum(drive * force), np.sum(force ** 2)]
 
@@ -276,6 +281,19 @@ class Comparison:
                 {'from_s': each.begin, 'to_s': each.end, 'axis': AXES[each.axis],
                  'force_n': list(each.load[:3]), 'moment_n_m': list(each.load[3:])}
                 for each in strongest]}
+
+
+def _drive(motions: Array, bases: Array | None, gravity: Array) -> Array:
+    """Return gravity less the acceleration of the platform's origin in the world (N, 3)."""
+    relative: Array = motions[:, LINEAR_ACCELERATION]
+    if bases is None:
+        return gravity - relative
+    free_fall, acceleration, spin, spin_rate = (bases[:, part] for part in (
+        GRAVITY, BASE_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION))
+    position, velocity = motions[:, POSITION], motions[:, LINEAR_VELOCITY]
+    drive: Array = free_fall - acceleration - relative - 2.0 * np.cross(spin, velocity) - (
+        np.cross(spin_rate, position) + np.cross(spin, np.cross(spin, position)))
+    return drive
 
 
 class _Statistics:

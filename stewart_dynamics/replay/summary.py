@@ -30,7 +30,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.limits import (
     FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.base_wrench_summary import BaseWrenchSummary
 from stewart_dynamics.replay.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
 from stewart_dynamics.replay.force_sources import sources_of
@@ -40,13 +42,14 @@ from stewart_dynamics.runtime.step import Batch, Outputs
 _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
-_AT_REST = ('gravity', 'wrench')
+_AT_REST = ('gravity', 'wrench', 'base motion')
 
 
 class _Block(NamedTuple):
     seconds: Array
     setpoints: Batch
     outputs: Outputs
+    base_wrenches: Array
     breakdown: Array | None
 
 
@@ -88,6 +91,8 @@ class Summary:
         self._gap: float | None = None
         self._stamps: tuple[int, int] | None = None
         self._answered = self._restarts = self._gaps = self._unsolved = self._suppressed = 0
+        self._without_force = self._base_unknown = 0
+        self._base_unknown_at: float | None = None
         self._seconds = self._gap_seconds = 0.0
         self._shortest = Extreme(6, np.negative)
         self._longest = Extreme(6, np.positive)
@@ -101,13 +106,14 @@ class Summary:
         self._unit_load_force = Extreme(6, np.positive)
         self._crossings = Crossings()
         self._warnings = Warnings()
+        self._base_wrench = BaseWrenchSummary()
         self._sources = sources_of(parameters)
         # one source at a time: numpy is far slower along many columns at once
         self._source_peaks = [Extreme(6, np.abs) for _ in self._sources]
         self._source_squares = Integral(6 * len(self._sources))
         self._has_breakdown = False
 
-    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs,
+    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
             breakdown: Array | None = None) -> None:
         """
         Add a block of samples.
@@ -121,13 +127,15 @@ class Summary:
             The answered setpoints.
         outputs : Outputs
             Their outputs.
+        base_wrenches : (N, 6)
+            What the hexapod puts on its base [N, N m]; nan: not known.
         breakdown : (N, 7, 6), optional
             The demanded forces by source: sample, source, leg [N].
 
         """
         if not len(seconds):
             return
-        block = _Block(seconds, setpoints, outputs, breakdown)
+        block = _Block(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._gap is not None:
             self._add(block)
             return
@@ -146,12 +154,22 @@ class Summary:
             self._add(block)
 
     def _add(self, block: _Block) -> None:
-        seconds, setpoints, outputs, breakdown = block
+        seconds, setpoints, outputs, base_wrenches, breakdown = block
         steps = self._steps(seconds, setpoints)
         lengths, rates, demanded = outputs.lengths, outputs.rates, outputs.demanded_forces
-        unsolved = with_nan(demanded)
+        without = with_nan(demanded)
+        unsolved = without
+        if setpoints.bases is not None:
+            unknown = np.isnan(setpoints.bases[:, 0])
+            unsolved = without & ~(unknown & (outputs.conditions < UNSOLVABLE_CONDITION))
+            if unknown.any():
+                self._base_unknown += int(unknown.sum())
+                if self._base_unknown_at is None:
+                    self._base_unknown_at = float(seconds[unknown.argmax()])
+        self._without_force += int(without.sum())
         self._unsolved += int(unsolved.sum())
-        self._suppressed += int((with_nan(outputs.forces) & ~unsolved).sum())
+        self._suppressed += int((with_nan(outputs.forces) & ~without).sum())
+        self._base_wrench.add(seconds, steps, base_wrenches)
         with np.errstate(over='ignore', invalid='ignore'):
             power = demanded * rates
             self._means.add(steps, np.concatenate(
@@ -200,7 +218,7 @@ class Summary:
         self._release()
         limits = self._exceeded_limits()
         not_checked = [name for name in self._limits.bounds if name not in self._exceeded
-                       or name == FORCE_MAX and self._unsolved]
+                       or name == FORCE_MAX and self._without_force]
         return {
             'quasi_static': self._quasi_static,
             'setpoints': {
@@ -208,19 +226,22 @@ class Summary:
                 'first_stamp_ns': self._stamps[0] if self._stamps else None,
                 'last_stamp_ns': self._stamps[1] if self._stamps else None,
                 'duration_s': self._seconds, 'gaps': self._gaps, 'gaps_s': self._gap_seconds,
-                'restarts': self._restarts},
+                'restarts': self._restarts,
+                'base_unknown': self._base_unknown,
+                'base_unknown_first_at_s': self._base_unknown_at},
             'legs': {name: self._leg(n) for n, name in enumerate(self._legs)},
             'limits': limits,
             'limits_not_checked': not_checked,
             'singularity': self._singularity(),
             'force_breakdown': self._force_breakdown(),
+            'base_wrench': self._base_wrench.values(),
             'limit_met': bool(limits or not_checked) or self._warnings.count > 0,
         }
 
     def _leg(self, leg: int) -> dict[str, float | None]:
         squares, driving, braking = self._means.mean.reshape(3, 6)[:, leg].tolist()
         _, energy_driving, energy_braking = self._means.values.reshape(3, 6)[:, leg].tolist()
-        solved = self._unsolved < self._answered
+        solved = self._without_force < self._answered
         shortest, longest = self._shortest.values[leg], self._longest.values[leg]
         rate, force = self._rate.values[leg], self._force.values[leg]
         bounds = self._limits.bounds

@@ -24,7 +24,7 @@ from typing import Any
 from stewart_dynamics.mechanics.limits import FORCE_MAX
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.rejections import Rejection
+from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN, Rejection
 
 _LISTED = 5
 _WIDTH = 100
@@ -80,6 +80,7 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
                      'energy are not known')
     lines += _limit_lines(found, any(clipped), any(name.startswith('limits.') and bound is not None
                                                    for name, bound in parameters.items()))
+    lines += _base_lines(found)
     lines += ['', *_singularity_lines(found['singularity'])]
     return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
             for line in lines]
@@ -154,12 +155,33 @@ def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) ->
                      f'{each["first_at_s"]:.2f} s on: {each["worst"]:.6g} at worst')
     for name in found['limits_not_checked']:
         lines.append(f'{name} could not be checked' + (
-            f' in {plural(found["singularity"]["unsolved"], "setpoint")}: J_inv cannot be solved'
+            ' ' + '; '.join(f'in {plural(number, "setpoint")}: {why}' for number, why in (
+                (found['singularity']['unsolved'], 'J_inv cannot be solved'),
+                (found['setpoints']['base_unknown'], BASE_NOT_KNOWN)) if number)
             if name == FORCE_MAX else
             ': velocities are not known; --differentiate computes them from the poses'))
     if limits_given and not lines:
         lines.append('all limits held')
     return lines
+
+
+def _base_lines(found: Mapping[str, Any]) -> list[str]:
+    points, force, moment = (
+        found['setpoints'], found['base_wrench']['force'], found['base_wrench']['moment'])
+    lines = []
+    if force['peak_n'] is not None:
+        lines.append(f'base wrench: at most {force["peak_n"]:.1f} N at t = '
+                     f'{force["peak_at_s"]:.2f} s (RMS {_rounded(force["rms_n"])}) and '
+                     f'{moment["peak_n_m"]:.1f} N m at t = {moment["peak_at_s"]:.2f} s '
+                     f'(RMS {_rounded(moment["rms_n_m"])})')
+    if points['base_unknown']:
+        lines.append(f'{BASE_NOT_KNOWN} in {plural(points["base_unknown"], "setpoint")}, first at '
+                     f't = {points["base_unknown_first_at_s"]:.2f} s: they have no forces')
+    return lines
+
+
+def _rounded(value: float | None) -> str:
+    return '-' if value is None else f'{value:.1f}'
 
 
 def plural(number: int, what: str) -> str:

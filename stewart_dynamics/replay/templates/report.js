@@ -147,6 +147,9 @@ function watch(canvas, drawing) {
   watcher.observe(canvas);
 }
 
+const AXIS = {gridcolor: '#e7ebf0', zerolinecolor: '#b9c1cc', linecolor: '#8a93a1',
+  ticks: 'outside', tickcolor: '#8a93a1', ticklen: 4, showline: true, mirror: true};
+
 // ---- a plot over time
 
 class TimePlot {
@@ -161,7 +164,7 @@ class TimePlot {
     this.readout = element('aside', {className: 'readout'});
     this.tools = element('div', {className: 'tools'});
     if (spec.variants.length > 1) {
-      const choice = element('select', {ariaLabel: 'leg'},
+      const choice = element('select', {ariaLabel: 'curves'},
         ...spec.variants.map((each, n) => element('option', {value: n, textContent: each.name})));
       choice.addEventListener('change', () => this.choose(+choice.value));
       this.tools.append(choice);
@@ -183,8 +186,8 @@ class TimePlot {
 
   listValues() {
     const rows = element('tbody');
-    const head = element('tr', {}, element('th', {textContent: 'at the cursor'}),
-      element('th', {textContent: `[${this.spec.unit}]`}));
+    this.where = element('th', {textContent: 'at the cursor'});
+    const head = element('tr', {}, this.where, element('th', {textContent: `[${this.spec.unit}]`}));
     this.values = this.curves.map((each, n) => {
       const cell = element('td', {textContent: '–'});
       const swatch = element('i', {className: 'swatch'});
@@ -305,13 +308,11 @@ class TimePlot {
           font: {size: 11, color}, bgcolor: 'rgba(255, 255, 255, 0.7)', borderpad: 0});
       }
     }
-    const axis = {gridcolor: '#e7ebf0', zerolinecolor: '#b9c1cc', linecolor: '#8a93a1',
-      ticks: 'outside', tickcolor: '#8a93a1', ticklen: 4, showline: true, mirror: true};
     return {
       height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
       separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff', shapes, annotations: notes,
-      xaxis: {...axis, range: time.range.slice(), title: {text: 'time [s]', standoff: 6, font: {size: 12.5}}, zeroline: false},
-      yaxis: {...axis, range: this.yRange.slice(), type: this.spec.log ? 'log' : 'linear',
+      xaxis: {...AXIS, range: time.range.slice(), title: {text: 'time [s]', standoff: 6, font: {size: 12.5}}, zeroline: false},
+      yaxis: {...AXIS, range: this.yRange.slice(), type: this.spec.log ? 'log' : 'linear',
         title: {text: this.spec.log ? '' : `[${this.spec.unit}]`, standoff: 8, font: {size: 12.5}},
         exponentformat: this.spec.log ? 'power' : 'none', separatethousands: true,
         ...(this.spec.log ? {dtick: this.yRange[1] - this.yRange[0] > 1.2 ? 1 : 'D2'} : {})},
@@ -399,6 +400,95 @@ class TimePlot {
     this.cursor.classList.toggle('late', x > 0.8 * xaxis._length);
     this.cursor.firstChild.textContent = `${grouped(when, 3)} s`;
     this.curves.forEach((each, n) => { this.values[n].textContent = shown(valueAt(each.curve, when)); });
+  }
+}
+
+// ---- a plot over frequency
+
+const DECADES = 7;  // at most, below the highest value: noise of rounding is not shown
+const spectra = [];
+let pointedAt = null;  // frequency under the mouse [Hz]
+
+function pointAt(frequency) {
+  pointedAt = frequency;
+  for (const spectrum of spectra) spectrum.showCursor();
+}
+
+function highest({times, values}) {
+  let most = 0;
+  values.forEach((value, k) => { if (value > values[most]) most = k; });
+  return {time: times[most], value: values[most]};
+}
+
+// Three digits.
+function brief(value) { return shown(+value.toPrecision(3)).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, ''); }
+
+class SpectrumPlot extends TimePlot {
+  constructor(spec, place) {
+    super(spec, place);
+    this.canvas.className = 'canvas spectrum';
+    this.showCursor();
+  }
+
+  usualRange() {
+    let high = 0, low = Infinity;
+    for (const each of this.curves) {
+      for (const value of curve(each.curve).values) {
+        if (value > high) high = value;
+        if (value > 0 && value < low) low = value;
+      }
+    }
+    if (!(high > 0)) return [-1, 1];
+    const top = Math.log10(high) + 0.15;
+    return [Math.max(Math.log10(low) - 0.15, top - DECADES), top];
+  }
+
+  layout() {
+    const {times} = curve(this.curves[0].curve);
+    const ends = [Math.log10(times[0]), Math.log10(times[times.length - 1])];
+    const log = range => ({...AXIS, type: 'log', range, exponentformat: 'power', zeroline: false,
+      minor: {ticks: 'outside', ticklen: 2, tickcolor: '#8a93a1', showgrid: true, gridcolor: '#f3f5f8'}});
+    return {
+      height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
+      separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff',
+      xaxis: {...log(ends), dtick: ends[1] - ends[0] > 1.2 ? 1 : 'D2',
+        title: {text: 'frequency [Hz]', standoff: 6, font: {size: 12.5}}},
+      yaxis: {...log(this.yRange.slice()), dtick: 1,
+        title: {text: `[${this.spec.unit}]`, standoff: 8, font: {size: 12.5}}},
+    };
+  }
+
+  follow() {}
+
+  attach() {
+    this.canvas.append(this.cursor);
+    this.canvas.on('plotly_afterplot', () => this.showCursor());
+    for (const kind of ['pointermove', 'pointerdown']) {
+      this.canvas.addEventListener(kind, event => pointAt(this.timeAt(event)));
+    }
+    this.canvas.addEventListener('pointerleave', event => { if (event.pointerType === 'mouse') pointAt(null); });
+  }
+
+  // The values at the frequency under the mouse; without one, the highest values.
+  showCursor() {
+    const place = this.drawn && pointedAt !== null;
+    this.cursor.style.display = place ? 'block' : 'none';
+    this.where.textContent = place ? 'at the cursor' : 'highest';
+    const found = this.curves.map(each => highest(curve(each.curve)));
+    const least = Math.max(...found.map(each => each.value)) * 10 ** -DECADES;
+    this.curves.forEach((each, n) => {
+      const {value, time: frequency} = found[n];
+      this.values[n].textContent = place ? shown(valueAt(each.curve, pointedAt))
+        : value > least ? `${brief(value)} at ${brief(frequency)} Hz` : '0';
+    });
+    if (!place) return;
+    const {xaxis, yaxis} = this.canvas._fullLayout;
+    const x = xaxis.d2p(pointedAt);
+    this.cursor.style.left = `${xaxis._offset + x - 0.75}px`;
+    this.cursor.style.top = `${yaxis._offset}px`;
+    this.cursor.style.height = `${yaxis._length}px`;
+    this.cursor.classList.toggle('late', x > 0.8 * xaxis._length);
+    this.cursor.firstChild.textContent = `${shown(pointedAt)} Hz`;
   }
 }
 
@@ -747,7 +837,9 @@ function setUp() {
   place.append(legend);
   for (const spec of report.plots) {
     if (spec.key === 'determinant') new InitialAndFinal(place);
-    plots.push(new TimePlot(spec, place));
+    const section = document.getElementById(spec.section);
+    if (spec.spectrum) spectra.push(new SpectrumPlot(spec, section));
+    else plots.push(new TimePlot(spec, section));
   }
   moveCursor(report.begin);
 }

@@ -1,0 +1,382 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Replays of a base that moves: the numbers of the step, topics, and a base that is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import messages
+import numpy as np
+import pytest
+from referees import rotation_about
+from scipy.spatial.transform import Rotation
+
+from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
+from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.replay.command_line import main
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
+from stewart_dynamics.runtime.base_wrench import BaseWrench
+from stewart_dynamics.runtime.input_topics import (
+    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)
+from stewart_dynamics.runtime.output_messages import OutputMessages
+from stewart_dynamics.runtime.setpoint_joining import Setpoints
+from stewart_dynamics.runtime.step import Output, Setpoint, Step
+from test_replay import (
+    joint_state, motion, MS, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
+    six_of, write_bag)
+
+MOVING = ('pose', 'motion', 'imu')
+MOUNTING = {'base.imu.position': [0.4, -0.3, 0.2], 'base.imu.orientation': [0.5, 0.5, 0.5, 0.5]}
+TURN = rotation_about([0.6, 0.8, 0.0], 0.3)
+
+
+def parameters_of(source: str, **changes: Any) -> Parameters:
+    return PARAMETERS.replaced({'base.source': source, **MOUNTING, **changes})
+
+
+def deck(source: str, stamp: int) -> list[Recorded]:
+    """Return the messages of a ship's deck at a stamp, 2 ms after it."""
+    t = stamp * 1e-9
+    turn = rotation_about([1.0, 0.3, 0.1], 0.2 * math.sin(2.0 * t))
+    rate = [0.4 * math.cos(2.0 * t), 0.1, 0.02 * math.sin(t)]
+    accelerations = [0.3 * math.sin(t), 0.1, 2.0 * math.cos(3.0 * t),
+                     -0.8 * math.sin(2.0 * t), 0.05, 0.02 * math.cos(t)]
+    of = {
+        BASE_POSE: lambda: messages.pose(stamp, (t, 2.0, 3.0), Rotation.from_matrix(
+            turn).as_quat(), 'world'),
+        BASE_TWIST: lambda: messages.twist(stamp, (1.0, 2.0, 3.0, *rate), 'world'),
+        BASE_ACCEL: lambda: messages.accel(stamp, accelerations, 'world'),
+        BASE_IMU: lambda: messages.imu(stamp, rate, [0.3, 0.2 * t, 9.8 + math.sin(3.0 * t)])}
+    return [(topic, RECORDED + stamp + 2 * MS, of[topic]()) for topic in BASE_SOURCES[source]]
+
+
+def at_sea(source: str, number: int = 300) -> list[Recorded]:
+    """
+    Return setpoints at 100 Hz on a deck at 73 Hz, as they come.
+
+    The first 5 setpoints are before the first sample of the base; from 1.5 to 2 s there is none.
+    """
+    of = motion(number)
+    for n in range(4, int(number * 0.73)):
+        stamp = round(n * 1e9 / 73)
+        if not 1.5 < stamp * 1e-9 < 2.0:
+            of += deck(source, stamp)
+    return sorted(of, key=lambda each: each[1])
+
+
+def answers(parameters: Parameters, of: Iterable[Recorded],
+            ) -> list[tuple[Setpoint, Output]]:
+    """Return what the step gives message by message, as in the node."""
+    setpoints, step = Setpoints(parameters, print, print), Step(parameters)
+    found: list[tuple[Setpoint, Output]] = []
+    for topic, when, data in of:
+        if topic in setpoints.base.topics:
+            setpoints.base.take(topic, data, lambda: when)  # noqa: B023
+            continue
+        setpoint = setpoints.take(topic, data, lambda: when)  # noqa: B023
+        if setpoint is not None:
+            setpoint = setpoints.on_base(setpoint)
+            output = step(setpoint, found[-1][1].singularity if found else None)
+            assert output is not None
+            found.append((setpoint, output))
+    return found
+
+
+def run(bag: Path, parameters: Parameters, folder: Path, *options: str) -> int:
+    folder.mkdir(exist_ok=True)
+    parameters.to_yaml(folder / 'platform.yaml')
+    return main([str(bag), '--params', str(folder / 'platform.yaml'), '--output',
+                 str(folder / 'out'), *options])
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / 'out' / 'bag' / 'summary.json').read_text())
+    return found
+
+
+def replayed(of: list[Recorded], parameters: Parameters, folder: Path, *options: str) -> Outputs:
+    bag = write_bag(folder / 'bag', of, **TYPES)
+    assert run(bag, parameters, folder, *options) == DONE
+    return outputs_of(folder / 'out' / 'bag')
+
+
+# Of topics under other names; the usual ones have their types.
+TYPES = {'deck_pose': INPUT_TYPES[BASE_POSE], 'deck_twist': INPUT_TYPES[BASE_TWIST],
+         'deck_accel': INPUT_TYPES[BASE_ACCEL], 'deck_imu': INPUT_TYPES[BASE_IMU],
+         'pose': INPUT_TYPES[POSE], 'twist': INPUT_TYPES[TWIST], 'accel': INPUT_TYPES[ACCEL],
+         'imu': INPUT_TYPES[BASE_IMU], 'where': INPUT_TYPES[POSE],
+         'state': 'sensor_msgs/msg/JointState'}
+
+
+# The numbers
+
+@pytest.mark.parametrize('source', MOVING)
+def test_a_replay_gives_the_bits_of_the_step_message_by_message(
+        source: str, tmp_path: Path) -> None:
+    parameters, of = parameters_of(source), at_sea(source)
+    outputs = replayed(of, parameters, tmp_path)
+    expected = answers(parameters, of)
+    unknown = [n for n, (_, output) in enumerate(expected) if output.demanded_forces is None]
+    assert len(expected) == 300
+    assert unknown[:5] == [0, 1, 2, 3, 4]
+    assert 30 < len(unknown) < 60
+    load, written = BaseWrench(parameters), OutputMessages(parameters)
+    platform = StewartPlatform(parameters)
+    loads = {nanoseconds(each): each for _, each in outputs.messages[f'{NODE}/base_wrench']}
+    forces = {nanoseconds(state): list(state.effort)
+              for _, state in outputs.messages[f'{NODE}/leg_states']}
+    for n, (setpoint, output) in enumerate(expected):
+        row, base_wrench = outputs.rows[n], load(setpoint)
+        cells = [row[f'{leg}_demanded_force_n'] for leg in parameters['joints']]
+        of_base = [row[f'base_{part}'] for part in (
+            'force_x_n', 'force_y_n', 'force_z_n', 'moment_x_n_m', 'moment_y_n_m',
+            'moment_z_n_m')]
+        assert float(row['determinant_m3']) == output.determinant
+        if n in unknown:
+            assert base_wrench is None
+            assert set(cells) == set(of_base) == {''}
+            assert forces[setpoint.stamp] == []
+            assert setpoint.stamp not in loads
+            continue
+        assert base_wrench is not None
+        assert output.demanded_forces == tuple(map(float, cells))
+        assert list(output.forces or ()) == forces[setpoint.stamp]
+        assert list(base_wrench) == six_of(loads[setpoint.stamp]) == list(map(float, of_base))
+        # and the library's
+        m = setpoint.motion
+        given = Motion(m[0:3], np.reshape(m[3:12], (3, 3)), m[12:15], m[15:18], m[18:21], m[21:24])
+        base = BaseMotion.of_rows(np.array(setpoint.base))
+        result = platform.inverse_dynamics(given, base=base)
+        assert tuple(result.forces.tolist()) == output.demanded_forces
+        assert tuple(platform.base_wrench(given, base=base).tolist()) == base_wrench
+    # the very bytes of the node
+    with (tmp_path / 'out' / 'bag' / 'bag' / 'bag.mcap').open('rb') as file:
+        content = file.read()
+    for setpoint, _ in expected[5:20]:
+        base_wrench = load(setpoint)
+        assert base_wrench is not None
+        assert written.of_base_wrench(setpoint.stamp, base_wrench) in content
+
+
+@pytest.mark.parametrize('source', MOVING)
+def test_the_summary_states_where_the_base_is_not_known(
+        source: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    parameters = parameters_of(source)
+    of = at_sea(source)
+    outputs = replayed(of, parameters, tmp_path)
+    found, text = summary_of(tmp_path), ' '.join(capsys.readouterr().out.split())
+    lacking = [row['time_s'] for row in outputs.rows if not row['base_force_z_n']]
+    assert found['setpoints']['base_unknown'] == len(lacking)
+    assert found['setpoints']['base_unknown_first_at_s'] == 0.0
+    assert found['singularity']['unsolved'] == found['singularity']['suppressed'] == 0
+    assert found['limits_not_checked'] == ['limits.force_max']
+    assert (f"the base's motion is not known in {len(lacking)} setpoints, first at t = 0.00 s: "
+            'they have no forces') in text
+    assert set(found['inputs']['topics']) == {POSE, TWIST, ACCEL, *BASE_SOURCES[source]}
+    forces = np.array([[float(row[f'base_force_{axis}_n'] or 'nan') for axis in 'xyz']
+                       for row in outputs.rows])
+    sizes = np.linalg.norm(forces, axis=1)
+    assert found['base_wrench']['force']['peak_n'] == pytest.approx(np.nanmax(sizes))
+    assert found['base_wrench']['force']['peak_at_s'] == float(
+        outputs.rows[int(np.nanargmax(sizes))]['time_s'])
+    of_leg = found['force_breakdown']['leg_1']
+    assert list(of_leg) == list(SOURCES)
+    # the tilt alone is gravity
+    assert (of_leg['base motion']['peak_n'] == 0.0) is (source == 'pose')
+
+
+def test_a_fixed_base_has_a_base_wrench_and_no_source_of_its_own(tmp_path: Path) -> None:
+    outputs = replayed(motion(30), parameters_of('fixed'), tmp_path)
+    found = summary_of(tmp_path)
+    assert len(outputs.messages[f'{NODE}/base_wrench']) == 30
+    assert list(found['force_breakdown']['leg_1']) == list(SOURCES[:-1])
+    assert found['setpoints']['base_unknown'] == 0
+    assert found['setpoints']['base_unknown_first_at_s'] is None
+    p = PARAMETERS
+    weight = 9.80665 * (p['platform.mass'] + p['legs.cylinder.mass'].sum()
+                        + p['legs.piston.mass'].sum())
+    assert found['base_wrench']['force_z']['mean_n'] == pytest.approx(-weight, rel=0.01)
+
+
+def test_strict_rejects_forces_that_could_not_be_checked(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag', at_sea('imu', 50))
+    for name, limit, code in (('limited', 6000.0, LIMIT_MET), ('free', None, DONE)):
+        parameters = parameters_of('imu', **{'limits.force_max': limit})
+        assert run(bag, parameters, tmp_path / name, '--no-report') == DONE
+        assert run(bag, parameters, tmp_path / name, '--strict', '--no-report', '--force') == code
+    # the base is known at every setpoint
+    known = write_bag(tmp_path / 'known', [each for each in at_sea('imu', 50)
+                                           if each[1] > RECORDED + 80 * MS])
+    assert run(known, parameters_of('imu'), tmp_path / 'k', '--strict', '--no-report') == DONE
+
+
+def test_a_bag_without_any_known_base_is_incomplete(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    late = [*motion(20), *deck('pose', 900 * MS)]
+    bag = write_bag(tmp_path / 'bag', late)
+    assert run(bag, parameters_of('pose'), tmp_path / 'a') == PARTLY_READ
+    assert ("the base's motion is not known at any setpoint: there are no forces"
+            in capsys.readouterr().err)
+    assert summary_of(tmp_path / 'a')['base_wrench']['force']['peak_n'] is None
+
+
+# Topics
+
+@pytest.mark.parametrize('source', MOVING)
+def test_a_bag_without_the_base_is_an_error_in_one_line(
+        source: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_bag(tmp_path / 'bag', motion(5))
+    assert run(bag, parameters_of(source), tmp_path / 'a') == BAD_INPUT
+    text = capsys.readouterr().err
+    assert text.count('\n') == 1
+    assert (f'base.source is {source}, and the bag has no topic {NODE}/{BASE_SOURCES[source][0]}'
+            in text)
+    assert 'it contains' in text
+    assert not (tmp_path / 'a' / 'out' / 'bag').exists()
+
+
+@pytest.mark.parametrize(('source', 'option', 'words'), [
+    ('fixed', '--base-imu', '--base-imu: is not read where base.source is fixed'),
+    ('fixed', '--base-pose', '--base-pose: is not read where base.source is fixed'),
+    ('pose', '--base-twist', '--base-twist: is not read where base.source is pose'),
+    ('motion', '--base-imu', '--base-imu: is not read where base.source is motion'),
+    ('imu', '--base-accel', '--base-accel: is not read where base.source is imu'),
+    ('imu', '--combined', None)])
+def test_options_of_topics_that_are_not_read_are_errors(
+        source: str, option: str, words: str | None, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_bag(tmp_path / 'bag', at_sea(source, 20))
+    assert run(bag, parameters_of(source), tmp_path / 'a', option, '/x') == BAD_INPUT
+    assert (words or '/x') in capsys.readouterr().err
+
+
+def renamed(of: list[Recorded], **names: str) -> list[Recorded]:
+    """Return messages under other topics: base_imu='/deck_imu'."""
+    return [(names.get(topic.replace('/', '_'), topic), when, data) for topic, when, data in of]
+
+
+@pytest.mark.parametrize('source', MOVING)
+@pytest.mark.parametrize('way', ['ending', 'option'])
+def test_topics_of_other_names_are_found_by_their_end_or_option(
+        source: str, way: str, tmp_path: Path) -> None:
+    of, parameters = at_sea(source, 50), parameters_of(source)
+    expected = replayed(of, parameters, tmp_path / 'usual', '--no-report').rows
+    options, names = [], {}
+    for key in BASE_SOURCES[source]:
+        name = key.replace('/', '_')
+        names[name] = f'/ship/{key}' if way == 'ending' else f'/deck_{key.rpartition("/")[2]}'
+        if way == 'option':
+            options += [f'--{name.replace("_", "-")}', names[name]]
+    outputs = replayed(renamed(of, **names), parameters, tmp_path / 'other', '--no-report',
+                       *options)
+    assert outputs.rows == expected
+    topics = summary_of(tmp_path / 'other')['inputs']['topics']
+    assert [topics[key] for key in BASE_SOURCES[source]] == list(names.values())
+
+
+def test_a_setpoint_is_not_taken_from_what_is_named_as_the_base(tmp_path: Path) -> None:
+    of = renamed(at_sea('pose', 30), base_pose='/ship/base/pose', setpoint_pose='/cmd/where')
+    replayed(of, parameters_of('pose'), tmp_path, '--no-report')
+    found = summary_of(tmp_path)
+    assert found['inputs']['topics'][POSE] == '/cmd/where'
+    assert f'{POSE} is read from /cmd/where, the only topic that matches' in found['notices']
+
+
+def test_a_pose_is_not_guessed_to_be_the_bases(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_bag(tmp_path / 'bag', renamed(at_sea('pose', 30), base_pose='/deck_pose'), **TYPES)
+    assert run(bag, parameters_of('pose'), tmp_path / 'a') == BAD_INPUT
+    assert ('of its type, geometry_msgs/msg/PoseStamped, it has /deck_pose: --base-pose selects '
+            'one') in capsys.readouterr().err
+    assert run(bag, parameters_of('pose'), tmp_path / 'b', '--base-pose', '/deck_pose',
+               '--no-report') == DONE
+    # one topic cannot be both
+    assert run(bag, parameters_of('pose'), tmp_path / 'c', '--base-pose',
+               f'{NODE}/{POSE}') == BAD_INPUT
+    assert f'selected as {POSE} and {BASE_POSE}' in capsys.readouterr().err
+
+
+def test_the_only_imu_is_found_by_its_type_and_of_two_none(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    of = renamed(at_sea('imu', 30), base_imu='/deck_imu')
+    replayed(of, parameters_of('imu'), tmp_path, '--no-report')
+    assert (f'{BASE_IMU} is read from /deck_imu, the only topic that matches'
+            in summary_of(tmp_path)['notices'])
+    two = write_bag(tmp_path / 'two', [*of, ('/other/imu', RECORDED, messages.imu(0))],
+                    **TYPES)
+    assert run(two, parameters_of('imu'), tmp_path / 'b') == BAD_INPUT
+    assert 'it has /deck_imu, /other/imu: --base-imu selects one' in capsys.readouterr().err
+
+
+def test_topics_of_a_base_that_is_fixed_are_not_used_and_this_is_said(tmp_path: Path) -> None:
+    outputs = replayed(at_sea('imu', 30), parameters_of('fixed'), tmp_path, '--no-report')
+    assert f'{NODE}/{BASE_IMU}: not used: base.source is fixed' in summary_of(tmp_path)['notices']
+    still = replayed(motion(30), parameters_of('fixed'), tmp_path / 'still', '--no-report')
+    assert outputs.rows == still.rows
+
+
+# With the other ways of input
+
+def test_poses_are_differentiated_on_a_base_that_moves(tmp_path: Path) -> None:
+    """A base that is tilted for good is a hexapod whose gravity is turned."""
+    poses = [each for each in motion(200) if each[0] == POSE]
+    tilt = Rotation.from_matrix(TURN).as_quat()
+    tilted = sorted([*poses, *((BASE_POSE, when - MS, messages.pose(
+        nanoseconds_of(when), (0.0, 0.0, 0.0), tilt, 'world')) for _, when, _ in poses)],
+        key=lambda each: each[1])
+    outputs = replayed(tilted, parameters_of('pose'), tmp_path / 'tilted', '--differentiate',
+                       '--no-report')
+    turned = PARAMETERS.replaced({'gravity': (TURN.T @ PARAMETERS['gravity']).tolist()})
+    expected = replayed(poses, turned, tmp_path / 'turned', '--differentiate', '--no-report')
+    assert summary_of(tmp_path / 'tilted')['setpoints']['base_unknown'] == 0
+    for key in ('leg_3_force_n', 'base_moment_x_n_m', 'base_force_y_n', 'leg_3_rate_m_s'):
+        assert [float(row[key]) for row in outputs.rows] == pytest.approx(
+            [float(row[key]) for row in expected.rows], rel=1e-9, abs=1e-9)
+
+
+def nanoseconds_of(when: int) -> int:
+    """Return the stamp of a message that was recorded then."""
+    return when - RECORDED
+
+
+def test_measured_forces_on_a_base_that_moves_show_a_missing_mass_and_nothing_else(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    parameters = parameters_of('motion', **{'platform.center_of_mass': [0.0, 0.0, 0.0]})
+    of = [each for n in range(1, 201) for each in deck('motion', n * 10 * MS)]
+    # a base sample comes before its setpoint
+    of = sorted([*motion(200), *((topic, when - 3 * MS, data) for topic, when, data in of)],
+                key=lambda each: each[1])
+    for name, mass in (('as modelled', 0.0), ('loaded', 20.0)):
+        true = StewartPlatform(parameters.replaced(
+            {'platform.mass': parameters['platform.mass'] + mass}))
+        legs = []
+        for setpoint, _ in answers(parameters, of):
+            forces = true.solve(np.array([setpoint.motion]), None, np.array([setpoint.base]))
+            legs.append(('/hexapod/state', RECORDED + setpoint.stamp + 3, joint_state(
+                setpoint.stamp, parameters['joints'], forces[0, 12:18].tolist())))
+        replayed(sorted([*of, *legs], key=lambda each: each[1]), parameters, tmp_path / name,
+                 '--measured', '/hexapod/state')
+        found = summary_of(tmp_path / name)['measured']
+        assert found['setpoints_compared'] == 200
+        if mass:
+            assert found['mass']['unmodelled_kg'] == pytest.approx(20.0, rel=1e-6)
+            assert '20 kg in addition on the platform' in capsys.readouterr().out
+        else:
+            assert max(leg['residual_rms_n'] for leg in found['legs'].values()) == 0.0
