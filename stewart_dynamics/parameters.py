@@ -115,7 +115,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'a longer jump back in time is a restart', 's', 0.1, minimum=0.0, above=True,
               maximum=1e9),
     Parameter('setpoint.exclusive', 'bool',
-              'reject setpoints while a topic has more than one publisher', default=False),
+              'reject setpoints and base motion while a topic of them has more than one publisher',
+              default=False),
     Parameter('base.source', 'string', 'how the base moves: not at all, by its orientation in the '
               'world (~/base/pose, at rest), by its motion in the world (~/base/pose, twist and '
               'accel), or as an IMU on it measures (~/base/imu)', '', 'fixed',

@@ -264,6 +264,14 @@ def test_what_is_wrong_is_rejected_and_the_last_sample_holds(
     assert known(feed.row(SECOND + 3 * MS))
 
 
+def test_an_imu_whose_first_message_has_no_frame_may_have_one_later() -> None:
+    feed = Feed('imu')
+    for n, frame in enumerate(('', 'imu', '', 'imu', 'other')):
+        feed(BASE_IMU, messages.imu(SECOND + n * MS, frame=frame))
+    assert feed.reasons == {(BASE_IMU, WRONG_FRAME): 1}
+    assert feed.said[0][1] == "'other', must be 'imu' or empty"
+
+
 def test_an_imu_without_orientation_is_used_whatever_stands_there() -> None:
     feed = Feed('imu')
     feed(BASE_IMU, messages.imu(SECOND, orientation=(math.nan,) * 4))

@@ -32,7 +32,7 @@ from stewart_dynamics.runtime.base_input import BaseInput
 from stewart_dynamics.runtime.input_topics import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST)
 from stewart_dynamics.runtime.rejections import (
-    MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, Rejections, WRONG_FRAME)
+    MALFORMED, NOT_EXCLUSIVE, NOT_FINITE, NOT_MEASURED, NOT_UNIT, Rejections, WRONG_FRAME)
 from test_base_input import BAD, sample
 
 Start = Callable[..., DynamicsNode]
@@ -48,8 +48,8 @@ MOVING = Sample((0.1, -0.05, 1.15), (0.0, 0.0, 0.06, 0.9981983770774224),
 class OnBase:
     """A node whose base moves, and the same messages taken here."""
 
-    def __init__(self, begin: Start, source: str, timeout: float = 0.1) -> None:
-        self.node = begin(f'base.source:={source}', f'base.timeout:={timeout}')
+    def __init__(self, begin: Start, source: str, timeout: float = 0.1, *others: str) -> None:
+        self.node = begin(f'base.source:={source}', f'base.timeout:={timeout}', *others)
         self.topics = BASE_SOURCES[source]
         self._writers = {topic: self.node.peer.writer(f'{NODE}/{topic}', KINDS[topic])
                          for topic in self.topics}
@@ -182,6 +182,19 @@ def test_what_is_wrong_is_rejected_and_counted(fresh: Start) -> None:
         on.node.check_finite()
         assert {NOT_FINITE, WRONG_FRAME} < {reason for _, _, reason in bad}
         assert (NOT_MEASURED if source == 'imu' else NOT_UNIT) in {why for _, _, why in bad}
+
+
+def test_with_exclusive_setpoints_a_second_writer_of_the_base_is_rejected(fresh: Start) -> None:
+    on = OnBase(fresh, 'imu', 100.0, 'setpoint.exclusive:=true')
+    stamp = on.node.stamp()
+    on.send(stamp)
+    on.answer(stamp)
+    intruder = on.node.peer.writer(f'{NODE}/{BASE_IMU}', Imu)
+    on.node.until(lambda: on.node.values('setpoints').get(f'{BASE_IMU}: writers') == '2',
+                  'the second writer is known')
+    intruder.publish(messages.imu(stamp + MS, (9.0, 9.0, 9.0)))
+    on.until_counted(f'rejected, {BASE_IMU}: {NOT_EXCLUSIVE}')
+    on.answer(stamp + 2 * MS)
 
 
 def test_a_base_that_starts_again_is_followed(fresh: Start) -> None:

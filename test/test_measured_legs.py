@@ -22,17 +22,19 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from messages import STORE
+from messages import imu, STORE
 import numpy as np
 import pytest
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
+from stewart_dynamics.runtime.base_input import BaseInput
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.runtime.input_topics import BASE_IMU
 from stewart_dynamics.runtime.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
 from stewart_dynamics.runtime.rejections import (
-    MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
+    BASE_NOT_KNOWN, MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, Rejections, TOO_OLD, TWICE)
 from test_external_wrench import (
     BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, six, swing)
 
@@ -63,13 +65,14 @@ class Followed:
     def __init__(self, parameters: Parameters = HEXAPOD) -> None:
         self.rejected: list[tuple[Rejection, str]] = []
         self.noticed: list[str] = []
+        self.base: BaseInput | None = None
         self._legs = MeasuredLegs(
             parameters, ExternalWrench(parameters),
             lambda rejection, details: self.rejected.append((rejection, details)),
             self.noticed.append)
 
     def take(self, data: bytes) -> Estimate | None:
-        return self._legs.take(data, NO_WRENCH, TARGET)
+        return self._legs.take(data, NO_WRENCH, TARGET, self.base)
 
     def rejects(self, data: bytes, reason: str, details: str) -> None:
         """Check that a message is rejected, for which reason and with which details."""
@@ -93,6 +96,20 @@ def test_messages_give_what_the_step_gives_for_their_numbers() -> None:
     assert [followed.take(message_of(each)) for each in REST] == EXPECTED
     assert not followed.rejected
     assert not followed.noticed
+
+
+def test_where_the_base_is_not_known_they_are_rejected_and_go_on_with_it() -> None:
+    parameters = HEXAPOD.replaced({'base.source': 'imu'})
+    base = BaseInput(parameters, Rejections(lambda *why: None), lambda text: None)
+    followed = Followed(parameters)
+    followed.base = base
+    followed.rejects(message_of(REST[0]), BASE_NOT_KNOWN, f'stamp {BEGIN} ns')
+    base.take(BASE_IMU, imu(BEGIN, force=(0.0, 0.0, 9.80665)), lambda: 0)
+    found = [followed.take(message_of(each)) for each in REST]
+    assert len(followed.rejected) == 1
+    last = found[-1]
+    assert last is not None
+    assert last.wrench == pytest.approx(EXPECTED[-1].wrench, rel=1e-9)
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)

@@ -204,16 +204,20 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         self._rested = self._rested or now - self._handled > _REST
         self._diagnostics.setpoints.heard(topic, now)
-        if self._exclusive:
-            writers = self._topics.writers_of(topic)
-            self._diagnostics.setpoints.found_writers(topic, writers)
-            if writers > 1:
-                self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
-                return
+        if self._exclusive and self._has_writers(topic):
+            return
         setpoint = self._setpoints.take(topic, data, self._ros_time)
         if setpoint is not None:
             self._queue.add(setpoint, now)
         self._handled = time.monotonic()
+
+    def _has_writers(self, topic: str) -> bool:
+        """Return whether a topic has more than one writer, and reject a message on it."""
+        writers = self._topics.writers_of(topic)
+        self._diagnostics.setpoints.found_writers(topic, writers)
+        if writers > 1:
+            self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
+        return writers > 1
 
     def _ros_time(self) -> int:
         now: int = self.get_clock().now().nanoseconds
@@ -263,6 +267,8 @@ class DynamicsNode(LifecycleNode):
         if self._active:
             now = time.monotonic()
             self._diagnostics.base.heard(topic, now)
+            if self._exclusive and self._has_writers(topic):
+                return
             if self._setpoints.base.take(topic, data, self._ros_time):
                 self._diagnostics.base.sampled(self._setpoints.base, now)
 

@@ -57,7 +57,7 @@ class SampleReader:
     topic : str
         One of ``input_topics``.
     frame : str or None
-        The frame that messages must have, or none; None: that of the first message.
+        The frame that messages must have, or none; None: that of the first message with one.
     rejections : Rejections
         Counts what is rejected.
 
@@ -80,11 +80,11 @@ class SampleReader:
             except MalformedError as exc:
                 self._rejections.reject(self._topic, MALFORMED, str(exc))
                 return None
-            if self._frame is None:
+            if self._frame is None and frame:
                 self._frame = frame
             if frame not in (b'', self._frame):
                 self._rejections.reject(
-                    self._topic, WRONG_FRAME, frame_details(frame, self._frame))
+                    self._topic, WRONG_FRAME, frame_details(frame, self._frame or b''))
                 return None
             self._layout = self._layout or layout_of(self._reader, data)
         else:
@@ -152,7 +152,7 @@ class SampleReader:
             frame = self._reader(data).frame
         except MalformedError:
             return
-        if self._frame is None:
+        if self._frame is None and frame:
             self._frame = frame
         if frame in (b'', self._frame):
             self._layout = layout_of(self._reader, data)
