@@ -39,8 +39,8 @@ from stewart_dynamics.runtime.input_topics import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
 from stewart_dynamics.runtime.recorded_messages import Messages
 from stewart_dynamics.runtime.rejections import (
-    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, Rejection, Rejections, TOO_OLD,
-    TWICE, WRONG_FRAME)
+    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, Rejection,
+    Rejections, TOO_OLD, TWICE, WRONG_FRAME)
 from stewart_dynamics.runtime.setpoint_joining import Setpoints
 from stewart_dynamics.runtime.step import Setpoint
 
@@ -185,6 +185,8 @@ def oracle(samples: Sequence[tuple[int, Any]], stamp: int, timeout: int = SECOND
     if not n:
         return row
     before, row_before = samples[n - 1]
+    if at > stamp and stamp - before > timeout:
+        return np.full(12, np.nan)
     part = min((stamp - at) / (at - before), 1.0)
     return np.asarray(row) + (np.asarray(row) - row_before) * part
 
@@ -248,6 +250,7 @@ BAD: Sequence[tuple[str, Callable[[int], bytes], str]] = (
     (BASE_IMU, lambda t: messages.imu(t, frame='other'), WRONG_FRAME),
     (BASE_IMU, lambda t: messages.imu(t, covariances=(0.0, -1.0, 0.0)), NOT_MEASURED),
     (BASE_IMU, lambda t: messages.imu(t, covariances=(0.0, 0.0, -1.0)), NOT_MEASURED),
+    (BASE_TWIST, lambda t: messages.twist(t, (1e10,) * 6, 'world'), OUT_OF_RANGE),
     (BASE_IMU, lambda t: b'', MALFORMED))
 
 
@@ -262,6 +265,62 @@ def test_what_is_wrong_is_rejected_and_the_last_sample_holds(
     assert feed.row(SECOND + 2 * MS) == before
     feed.sample(SECOND + 3 * MS)
     assert known(feed.row(SECOND + 3 * MS))
+
+
+def test_an_imu_whose_first_message_is_rejected_does_not_set_the_frame() -> None:
+    feed = Feed('imu')
+    feed(BASE_IMU, messages.imu(SECOND, frame='camera', covariances=(0.0, -1.0, 0.0)))
+    feed(BASE_IMU, messages.imu(SECOND, frame='imu'))
+    assert known(feed.row(SECOND))
+    assert feed.reasons == {(BASE_IMU, NOT_MEASURED): 1}
+
+
+def test_huge_numbers_are_rejected_and_leave_nothing() -> None:
+    for source, bad in (('imu', messages.imu(SECOND + MS, (1e10, 0.0, 0.0))),
+                        ('imu', messages.imu(SECOND + MS, force=(0.0, -1e308, 0.0)))):
+        feed = Feed(source)
+        feed.sample(SECOND)
+        before = feed.row(SECOND)
+        feed(BASE_IMU, bad)
+        assert feed.reasons == {(BASE_IMU, OUT_OF_RANGE): 1}
+        feed.sample(SECOND + 2 * MS)
+        assert feed.row(SECOND + 2 * MS) == pytest.approx(before, rel=1e-12, abs=1e-12)
+
+
+def test_no_line_is_drawn_from_an_old_sample_over_a_gap() -> None:
+    """As where the base's clock jumps ahead: what the setpoint needs lies in between."""
+    for source in SOURCES:
+        feed = Feed(source)
+        feed.sample(SECOND, 0.1)
+        feed.sample(4 * SECOND, 0.2)
+        assert known(feed.row(SECOND + 50 * MS))
+        assert not known(feed.row(SECOND + 101 * MS))
+        assert not known(feed.row(2 * SECOND))
+        assert known(feed.row(4 * SECOND))
+
+
+def test_what_is_joined_within_a_tolerance_is_not_dropped_by_a_restart() -> None:
+    feed = Feed('motion', setpoint__sync_tolerance=0.02, base__timeout=0.01)
+    start = 1000 * SECOND
+    feed.sample(start)
+    for topic, data in ((BASE_TWIST, messages.twist(start + MS, frame='world')),
+                        (BASE_TWIST, messages.twist(start + 2 * MS, frame='world')),
+                        (BASE_ACCEL, messages.accel(start + 2 * MS, frame='world')),
+                        (BASE_POSE, messages.pose(start - 11 * MS, frame='world'))):
+        feed(topic, data)
+    assert feed.notices == ['base: stamps jumped back by 0.011 s: followed as a restart']
+    assert known(feed.setpoints.base.at(start - 11 * MS))
+
+
+def test_a_base_that_restarts_with_setpoints_is_followed_whatever_its_timeout() -> None:
+    feed = Feed('pose', base__timeout=1000.0)
+    for n in range(60):
+        feed.sample(SECOND * (n + 1))
+    feed.row(60 * SECOND)
+    assert not known(feed.row(SECOND))
+    feed.sample(SECOND)
+    assert known(feed.row(SECOND + MS))
+    assert not feed.reasons
 
 
 def test_an_imu_whose_first_message_has_no_frame_may_have_one_later() -> None:
@@ -342,7 +401,7 @@ def together(given: Sequence[tuple[str, bytes]]) -> Messages:
         1 + np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64), sizes)
 
 
-FATES = ['good'] * 20 + ['lost', 'late', 'nan', 'twice', 'zero', 'back', 'frame']
+FATES = ['good'] * 20 + ['lost', 'late', 'nan', 'twice', 'zero', 'back', 'frame', 'huge', 'ahead']
 
 
 def recorded(source: str, fates: Sequence[str], period: int) -> list[tuple[str, bytes]]:
@@ -354,11 +413,15 @@ def recorded(source: str, fates: Sequence[str], period: int) -> list[tuple[str, 
         stamp += 4 * MS
         if fate == 'back':
             stamp -= 500 * MS
+        if fate == 'ahead':
+            stamp += 300 * MS
         of_base = sample(BASE_SOURCES[source], stamp, random.normal())
         if fate == 'lost':
             of_base = of_base[1:]
         elif fate == 'nan':
             of_base[0] = of_base[0][0], of_base[0][1][:-8] + b'\xff' * 8
+        elif fate == 'huge':
+            of_base = sample(BASE_SOURCES[source], stamp, 1e308)
         elif fate == 'twice':
             of_base = of_base * 2
         elif fate == 'zero':

@@ -375,6 +375,23 @@ def test_wrong_arguments_are_rejected(make: Any, text: str) -> None:
     assert text in str(error.value)
 
 
+def test_numbers_that_overflow_are_no_still_base() -> None:
+    platform, motion, _, _ = case(18, 1)
+    for make in (lambda: BaseMotion.from_imu([0.0, 0.0, 9.8], [1e200] * 3, None, [0.0, 1.0, -1.0]),
+                 lambda: BaseMotion.from_pose(
+                     Pose(np.zeros(3), rotation_about([0.6, 0.0, 0.8], 0.7)), [1.7e308] * 3)):
+        with pytest.raises(MotionError) as error:
+            make()
+        assert 'base motion: out of range: numbers overflow' in str(error.value)
+    spoilt = BaseMotion([0.0, 0.0, -9.8])
+    spoilt.rows[0] = np.nan
+    for some in (motion, motion[0]):
+        for call in (lambda m: platform.inverse_dynamics(m, base=spoilt),
+                     lambda m: platform.forward_dynamics(m, np.zeros(6), base=spoilt)):
+            with pytest.raises(MotionError):
+                call(some)
+
+
 @pytest.mark.parametrize('call', ['inverse_dynamics', 'base_wrench', 'force_breakdown'])
 def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
     platform, motion, wrench, base = case(15, 3)

@@ -158,8 +158,10 @@ def test_without_the_base_it_is_at_rest_under_the_gravity_of_now() -> None:
 def test_a_base_that_is_wrong_is_rejected() -> None:
     times, rows = some(3)
     others, _ = on_base(3)
-    for names, text in ((('platform', 'ship'), "joint_names[1]: 'ship': the second joint is the "
-                         "base, 'base'"), (('a', 'b', 'base'), '3 joint_names: must be at most')):
+    rule = "the first joint is the platform, the second the base, 'base'"
+    for names, text in ((('platform', 'ship'), f"joint_names: ['platform', 'ship']: {rule}"),
+                        (('base', 'base'), f"joint_names: ['base', 'base']: {rule}"),
+                        (('a', 'b', 'base'), '3 joint_names: must be at most')):
         outcome = outcome_of(messages.trajectory(STAMP, times, rows, names=names, others=others))
         assert text in outcome.message
     for n, number, reason in ((1, math.nan, NOT_FINITE), (2, 9.0, NOT_UNIT)):
@@ -307,7 +309,7 @@ BAD: dict[str, tuple[bytes, str, str]] = {
     'cut short by a time': (WHOLE[:-8], 'malformed', 'points[3] is cut short'),
     'no points': (messages.trajectory(STAMP, [], []), 'malformed',
                   '0 points: must be 1 to 100000'),
-    'two joints': (spoilt(names=('a', 'b')), 'malformed', 'the second joint is the base'),
+    'two joints': (spoilt(names=('a', 'b')), 'malformed', 'the second the base'),
     'no transform': (spoilt(parts=[(1, 1, 1), (0, 1, 1), (1, 1, 1), (1, 1, 1)]), 'malformed',
                      'points[1]: 0 transforms: each point has one'),
     'no velocity': (spoilt(parts=[(1, 1, 1), (1, 1, 1), (1, 0, 1), (1, 1, 1)]), 'malformed',

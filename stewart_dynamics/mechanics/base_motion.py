@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.arguments import (
-    as_array, common_shape, optional_array, wrong_type)
+    as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.base_load import carried
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import as_rotation, Pose
@@ -101,8 +101,9 @@ class BaseMotion(Samples):
             raise wrong_type('pose', pose, 'a Pose or a Motion')
         free_fall = as_array('gravity', gravity, (3,))
         common_shape(pose=pose.shape, gravity=free_fall.shape[:-1])
-        return cls.of_rows(_stacked(row_of_pose(
-            _columns(pose.rows[..., ROTATION]), _columns(free_fall))))
+        with np.errstate(all='ignore'):
+            return cls.of_rows(_stacked(row_of_pose(
+                _columns(pose.rows[..., ROTATION]), _columns(free_fall))))
 
     @classmethod
     def from_motion(cls, motion: Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
@@ -124,8 +125,9 @@ class BaseMotion(Samples):
         rotation, acceleration, spin, spin_rate = (
             _columns(motion.rows[..., part]) for part in (
                 ROTATION, LINEAR_ACCELERATION, ANGULAR_VELOCITY, ANGULAR_ACCELERATION))
-        return cls.of_rows(_stacked(
-            row_of_motion(rotation, acceleration, spin, spin_rate, _columns(free_fall))))
+        with np.errstate(all='ignore'):
+            return cls.of_rows(_stacked(
+                row_of_motion(rotation, acceleration, spin, spin_rate, _columns(free_fall))))
 
     @classmethod
     def from_imu(
@@ -161,9 +163,10 @@ class BaseMotion(Samples):
         common_shape(specific_force=force.shape[:-1], angular_velocity=spin.shape[:-1],
                      angular_acceleration=spin_rate.shape[:-1], position=arm.shape[:-1],
                      rotation=turn.shape[:-2])
-        return cls.of_rows(_stacked(row_of_imu(
-            _columns(force), _columns(spin), _columns(spin_rate), _columns(arm),
-            _columns(turn.reshape(*turn.shape[:-2], 9)))))
+        with np.errstate(all='ignore'):
+            return cls.of_rows(_stacked(row_of_imu(
+                _columns(force), _columns(spin), _columns(spin_rate), _columns(arm),
+                _columns(turn.reshape(*turn.shape[:-2], 9)))))
 
     @property
     def gravity(self) -> Array:
@@ -223,4 +226,5 @@ def _columns(array: Array) -> Any:
 
 
 def _stacked(row: tuple[Any, ...]) -> Array:
-    return np.stack(np.broadcast_arrays(*row), axis=-1)
+    rows = np.stack(np.broadcast_arrays(*row), axis=-1)
+    return check_finite('base motion', rows, rows.ndim - 1)

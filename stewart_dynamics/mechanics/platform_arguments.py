@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.errors import MotionError, SingularityError
 from stewart_dynamics.mechanics.arguments import (
-    as_array, common_shape, optional_array, wrong_type)
+    as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.pose import Pose
@@ -60,8 +60,8 @@ def base_rows(base: BaseMotion | None) -> Array:
         return np.array(NO_BASE)
     if not isinstance(base, BaseMotion):
         raise wrong_type('base', base, 'a BaseMotion')
-    rows: Array = base.rows
-    return rows
+    # A row of nan would stand for a still base.
+    return check_finite('base', base.rows, len(base.shape))
 
 
 def motion_rows(pose: Pose | Motion, shape: tuple[int, ...] | None = None) -> Array:

@@ -166,11 +166,10 @@ class SingleSample:
 
 
 def _base_row(base: Any) -> Array:
-    """Return the row of one base motion; TypeError for anything else."""
-    if type(base) is not BaseMotion:
+    """Return the row of one base motion; TypeError for anything else, nan among it."""
+    if type(base) is not BaseMotion or base.shape or math.isnan(base.rows[0]):
         raise TypeError
-    row: Array = base.rows
-    return row
+    return base.rows
 
 
 class _Memories:

@@ -305,8 +305,9 @@ class DynamicsNode(LifecycleNode):
                 planned.rejected(planned.QUEUE_FULL, f'{LENGTH} are in work or wait'), now)
             return
         # Parameters, load and gravity are those of now, whatever changes meanwhile.
-        self._planned.add(planned.answer(
-            self._settings, self._setpoints.wrench, data, self._setpoints.base.gravity), now)
+        base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
+        self._planned.add(
+            planned.answer(self._settings, self._setpoints.wrench, data, base), now)
 
     def _on_outcome(self, outcome: planned.Outcome, came: float) -> None:
         if outcome.answer:

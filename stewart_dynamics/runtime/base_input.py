@@ -19,7 +19,8 @@ Base samples come at their own rate. Of those that have come, a setpoint takes t
 is not newer than the setpoint by more than the time from the sample before it, and goes from it
 along the straight line through both, forward by at most that time again: between two samples that
 is linear interpolation, behind the last one linear extrapolation, each number of the row by
-itself. A sample older than ``base.timeout`` is not used: the base's motion is not known then.
+itself. A sample older than ``base.timeout`` is not used, nor a line from it to one that is newer
+than the setpoint: the base's motion is not known then.
 """
 
 from __future__ import annotations
@@ -76,6 +77,7 @@ class BaseInput:
             parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
             lambda text: noticed(f'base: {text}'))
         self._timeout = round(parameters['base.timeout'] * 1e9)
+        self._restart = round(parameters['setpoint.timeout'] * 1e9)
         self._row_of: Callable[[int, _Row], _Row] = (
             _OfImu(parameters) if source == 'imu' else
             _OfMotion(parameters) if source == 'motion' else _OfPose(parameters))
@@ -86,13 +88,12 @@ class BaseInput:
         """Return stamp [ns] and row (BASE,) of the last sample."""
         return self._samples[-1] if self._samples else None
 
-    @property
-    def gravity(self) -> Array | None:
-        """Return the row (BASE,) of a base at rest under the gravity of now; None: still."""
+    def at_rest(self, known: bool) -> Array | None:
+        """Return the row (BASE,) at rest under the last gravity, nan if not known; None: still."""
         if not self.topics:
             return None
         row = np.zeros(BASE)
-        row[GRAVITY] = self._samples[-1][1][GRAVITY] if self._samples else np.nan
+        row[GRAVITY] = self._samples[-1][1][GRAVITY] if self._samples and known else np.nan
         return row
 
     def take(self, topic: str, data: bytes, now: Callable[[], int]) -> bool:
@@ -121,14 +122,17 @@ class BaseInput:
         if n == 0:
             return row if at <= stamp else NO_BASE
         before, row_before = samples[n - 1]
+        if at > stamp and stamp - before > self._timeout:
+            return NO_BASE
         part = min(float(stamp - at) / float(at - before), 1.0)
         return tuple([now + (now - then) * part
                       for now, then in zip(row, row_before, strict=True)])
 
-    def forget_future(self, stamp: int) -> None:
-        """Forget samples newer than a setpoint [ns] before which time has jumped back."""
-        if self._samples and self._samples[-1][0] > stamp + self._timeout:
+    def restarted(self, stamp: int) -> None:
+        """Forget samples of the future of a setpoint [ns] before which time has jumped back."""
+        if self._samples and self._samples[-1][0] > stamp + self._restart:
             self._samples.clear()
+            self._joining.restart('before setpoints restarted')
 
     def forget_layouts(self) -> None:
         """Take the layout of the next sound message of each topic."""
@@ -181,14 +185,15 @@ class BaseInput:
         newest = np.maximum(newest, oldest)
         known = (come > 0) & (stamps - at[newest] <= self._timeout) & (
             (newest > oldest) | (at[newest] <= stamps))
-        sample = newest[known]
-        before = np.maximum(sample - 1, oldest[known])
+        before = np.maximum(newest - 1, oldest)
+        known &= (at[newest] <= stamps) | (stamps - at[before] <= self._timeout)
+        sample, before = newest[known], before[known]
         step = (at[sample] - at[before]).astype(float)
         part = np.minimum(np.divide(
             (stamps[known] - at[sample]).astype(float), step, out=np.zeros(len(step)),
             where=step > 0.0), 1.0)
         now, then = values[sample], values[before]
-        rows[known] = now + (now - then) * part[:, None]
+        rows[known] = np.where(step[:, None] > 0.0, now + (now - then) * part[:, None], now)
         return rows
 
 

@@ -135,10 +135,12 @@ def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
         raise _RejectedError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
     if not 1 <= message.size <= MOST_POINTS:
         raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
-    if message.joints == 2 and message.names[1] != base_frame.encode():
-        name = message.names[1][:60].decode(errors='replace')
+    if message.joints == 2 and (message.names[1] != base_frame.encode()
+                                or message.names[0] == message.names[1]):
+        names = [name[:60].decode(errors='replace') for name in message.names]
         raise MalformedError(
-            f'joint_names[1]: {name!r}: the second joint is the base, {base_frame!r}')
+            f'joint_names: {names}: the first joint is the platform, the second the base, '
+            f'{base_frame!r}')
     return message
 
 

@@ -133,6 +133,11 @@ class SampleJoining:
             waiting.clear()
         self._drop_unstamped()
 
+    def restart(self, why: str) -> None:
+        """Take samples of any time from now on; drop and count what waits."""
+        self.end(why)
+        self._last = {}
+
     def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
         """
         Join messages of which none is out of the ordinary; None if one is. Nothing is changed.
@@ -229,7 +234,8 @@ class SampleJoining:
                 # After a restart, what is left of the time before it lies in the future.
                 future = (self._last[topic] - self._timeout if jump > self._timeout
                           else math.inf)
-                for other in [other for other in waiting if other < stamp or other > future]:
+                for other in [other for other in waiting if other != stamp and (
+                        other < stamp or other > future)]:
                     del waiting[other]
                     self._reject(topic, NOT_JOINED, f'stamp {other} ns')
         self._last = stamps

@@ -33,8 +33,8 @@ from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, t
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST, COMBINED, POSE, TWIST, WRENCH)
 from stewart_dynamics.runtime.rejections import (
-    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, Rejections,
-    WRONG_FRAME)
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
+    Rejections, WRONG_FRAME)
 
 _READERS: dict[str, Callable[[bytes], Stamped]] = {
     POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench,
@@ -44,6 +44,8 @@ _READERS: dict[str, Callable[[bytes], Stamped]] = {
 # covariances, which are -1 where a quantity is not measured. Its orientation is not used.
 _OF_IMU = (13, 14, 15, 25, 26, 27)
 _COVARIANCES = {16: 'angular_velocity_covariance', 28: 'linear_acceleration_covariance'}
+# Larger numbers are no motion of a base [SI units]: a filter would keep what they leave for long.
+LARGEST = 1e9
 
 
 class SampleReader:
@@ -67,26 +69,26 @@ class SampleReader:
         self._topic = topic
         self._reader = _READERS[topic]
         self._has_pose = topic in (POSE, COMBINED, BASE_POSE)
+        self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
         self._frame = None if frame is None else frame.encode()
         self._rejections = rejections
         self._layout: Layout | None = None
+        self._frame_of_layout = b''
 
     def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
         """Return a message's stamp [ns] and values, or reject it."""
         read = self._layout.read_one(data) if self._layout else None
+        frame = None
         if read is None:
             try:
                 stamp, frame, values = self._reader(data)
             except MalformedError as exc:
                 self._rejections.reject(self._topic, MALFORMED, str(exc))
                 return None
-            if self._frame is None and frame:
-                self._frame = frame
-            if frame not in (b'', self._frame):
+            if self._is_other(frame):
                 self._rejections.reject(
                     self._topic, WRONG_FRAME, frame_details(frame, self._frame or b''))
                 return None
-            self._layout = self._layout or layout_of(self._reader, data)
         else:
             stamp, values = read
         if self._topic == BASE_IMU:
@@ -98,6 +100,10 @@ class SampleReader:
         if not finite(values):
             self._rejections.reject(self._topic, NOT_FINITE, str(values))
             return None
+        if self._bounded and max(map(abs, values)) > LARGEST:
+            self._rejections.reject(
+                self._topic, OUT_OF_RANGE, f'{values}: must be at most {LARGEST:g}')
+            return None
         if self._has_pose:
             x, y, z, w = values[3:7]
             length = quaternion_length(x, y, z, w)
@@ -106,6 +112,10 @@ class SampleReader:
                 return None
             values = values[:3] + from_quaternion(
                 x / length, y / length, z / length, w / length) + values[7:]
+        if frame is not None:
+            if self._layout is None:
+                self._layout, self._frame_of_layout = layout_of(self._reader, data), frame
+            self._keep_frame(frame)
         return stamp, values
 
     def read_many(self, data: Bytes, starts: Integers, sizes: Integers,
@@ -132,19 +142,26 @@ class SampleReader:
             if (values[:, list(_COVARIANCES)] == -1.0).any():
                 return None
             values = np.ascontiguousarray(values[:, _OF_IMU])
-        if not alike.all() or not np.isfinite(values).all():
+        if not alike.all() or not np.isfinite(values).all() or (
+                self._bounded and np.max(np.abs(values)) > LARGEST):
             return None
-        if not self._has_pose:
-            return stamps, values
-        quaternions, _, unit = unit_quaternions(values[:, 3:7])
-        if not unit.all():
-            return None
-        return stamps, np.column_stack(
-            [values[:, :3], *from_quaternion(*quaternions), values[:, 7:]])
+        if self._has_pose:
+            quaternions, _, unit = unit_quaternions(values[:, 3:7])
+            if not unit.all():
+                return None
+            values = np.column_stack(
+                [values[:, :3], *from_quaternion(*quaternions), values[:, 7:]])
+        self._keep_frame(self._frame_of_layout)
+        return stamps, values
 
     def forget_layout(self) -> None:
         """Take the layout of the next sound message."""
         self._layout = None
+
+    def _keep_frame(self, frame: bytes) -> None:
+        """Expect the frame of this sound message from now on, if none was given."""
+        if self._frame is None:
+            self._frame = frame or None
 
     def _learn(self, data: bytes) -> None:
         """Take the layout of a message if it can be read and its frame is right."""
@@ -152,10 +169,12 @@ class SampleReader:
             frame = self._reader(data).frame
         except MalformedError:
             return
-        if self._frame is None and frame:
-            self._frame = frame
-        if frame in (b'', self._frame):
-            self._layout = layout_of(self._reader, data)
+        if not self._is_other(frame):
+            self._layout, self._frame_of_layout = layout_of(self._reader, data), frame
+
+    def _is_other(self, frame: bytes) -> bool:
+        """Return whether a message has a frame that it must not have."""
+        return bool(frame) and self._frame is not None and frame != self._frame
 
 
 def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:

@@ -109,7 +109,7 @@ class Setpoints:
         # Zeros for what the topics do not give.
         motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
         if restart:
-            self.base.forget_future(stamp)
+            self.base.restarted(stamp)
         return Setpoint(stamp, motion, self.wrench, restart)
 
     def on_base(self, setpoint: Setpoint) -> Setpoint:

@@ -72,6 +72,10 @@ class BaseDiagnostics:
         if base.last:
             self._row = base.last[1]
 
+    def stale(self, now: float) -> bool:
+        """Return whether there is no sample, or only an old one."""
+        return now - self._sampled_at > self._timeout
+
     def answered(self, setpoint: Setpoint, now: float) -> None:
         """Note a setpoint that was answered."""
         assert setpoint.base is not None
@@ -118,7 +122,7 @@ class BaseDiagnostics:
 
     def _lack(self, now: float) -> Level:
         """Return whether the base's motion lacks."""
-        if now - self._sampled_at > self._timeout:
+        if self.stale(now):
             return Level(ERROR, f'no forces: {self._why(now)}')
         unknown = self._unknown_held.at(now)
         return (Level(unknown.level, f'no forces: {unknown.message}') if unknown.level
@@ -129,7 +133,7 @@ class BaseDiagnostics:
         silent = ', '.join(
             f'{topic} never came' if at == _NEVER else f'{topic} silent for {now - at:.1f} s'
             for topic, at in self._heard.items() if now - at > self._timeout)
-        if silent or now - self._sampled_at > self._timeout:
+        if silent or self.stale(now):
             return silent or self._held.at(now).message or (
                 'its topics arrive, but are not joined: their stamps differ')
         return ('the stamps of the base and of setpoints differ by more than base.timeout, '
