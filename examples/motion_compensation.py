@@ -154,7 +154,10 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: signals.append(number))
     # The handlers of rclpy would shut ROS down in the middle of a callback.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as exc:  # bad ROS arguments
+        sys.exit(f'motion_compensation: {exc}')
     executor = EventsExecutor()
     try:
         node = MotionCompensation()
