@@ -86,13 +86,13 @@ class SingleSample:
             of_motion[:] = motion.rows
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
             if base is not None:
-                of_base[:] = _base_row(base)
+                _put_base(of_base, base)
         except _NO_FLOATS:
             self._inverse_dynamics.free(memory)
             return None
         solve()
         if base is not None:
-            of_base[:] = _NO_BASE
+            of_base[0] = math.nan  # the next one is still
         result = arrays[3].copy() if sound[0] else None
         self._inverse_dynamics.free(memory)
         return result
@@ -136,13 +136,13 @@ class SingleSample:
             of_forces[:] = forces
             of_wrench[:] = _NO_WRENCH if wrench is None else wrench
             if base is not None:
-                of_base[:] = _base_row(base)
+                _put_base(of_base, base)
         except _NO_FLOATS:
             self._forward_dynamics.free(memory)
             return None
         solve()
         if base is not None:
-            of_base[:] = _NO_BASE
+            of_base[0] = math.nan  # the next one is still
         result = arrays[0][0].copy()
         self._forward_dynamics.free(memory)
         return result if math.isfinite(sum(result[ACCELERATION].tolist())) else None
@@ -165,11 +165,13 @@ class SingleSample:
         return result
 
 
-def _base_row(base: Any) -> Array:
-    """Return the row of one base motion; TypeError for anything else, nan among it."""
-    if type(base) is not BaseMotion or base.shape or math.isnan(base.rows[0]):
-        raise TypeError
-    return base.rows
+def _put_base(of_base: Any, base: Any) -> None:
+    """Write the row of one base motion; TypeError for anything else, and for one of nan."""
+    if type(base) is BaseMotion:
+        of_base[:] = base.rows
+        if of_base[0] == of_base[0]:
+            return
+    raise TypeError
 
 
 class _Memories:
