@@ -148,7 +148,7 @@ def report(demo: Demo, parameters: Parameters) -> str:
         (stamps - stamps[0]) * 1e-9,
         Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
               stamps),
-        Outputs(every, stamps, results, forces, states, none, none))
+        Outputs(every, stamps, results, forces, states, none, none), np.full((many, 6), np.nan))
     return '\n'.join(summary_lines(summary.values(), parameters))
 
 

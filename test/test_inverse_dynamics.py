@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 import pytest
 from referees import (
     derivative, each_relative, energies, friction, moved, PinocchioReferee, QUARTER_TURN,
-    random_motion, random_parameters, random_wrench, relative, rng, rotation_about, smooth_motion,
-    symmetric_parameters)
+    random_base_motion, random_motion, random_parameters, random_wrench, relative, rng,
+    rotation_about, smooth_motion, symmetric_parameters)
 
 import stewart_dynamics
 from stewart_dynamics import (
@@ -548,8 +548,8 @@ assert not COMPILED
 given = np.load({source!r})
 results = np.empty((len(given['rows']), RESULT))
 with np.errstate(all='ignore'):
-    inverse_dynamics.solve(given['constants'], given['rows'], given['wrenches'], results,
-                           np.empty(inverse_dynamics.TILE))
+    inverse_dynamics.solve(given['constants'], given['rows'], given['wrenches'], given['bases'],
+                           results, np.empty(inverse_dynamics.TILE))
 np.save({target!r}, results)
 """
 
@@ -563,14 +563,16 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit(
     other = StewartPlatform(random_parameters(rng()))
     for n, hexapod in enumerate((platform, other)):
         wrenches = random_wrench(hexapod.parameters, rng(), len(rows))
+        bases = random_base_motion(hexapod.parameters, rng(), len(rows)).rows
+        bases[::3] = np.nan
         source, target = str(tmp_path / f'{n}.npz'), str(tmp_path / f'{n}.npy')
-        np.savez(source, constants=hexapod.constants, rows=rows, wrenches=wrenches)
+        np.savez(source, constants=hexapod.constants, rows=rows, wrenches=wrenches, bases=bases)
         code = UNCOMPILED.format(source=source, target=target)
         if without == 'jit':
             run(code, NUMBA_DISABLE_JIT='1')
         else:
             run(f"import sys\nsys.modules['numba'] = None\n{code}")
-        assert np.array_equal(np.load(target), hexapod.solve(rows, wrenches))
+        assert np.array_equal(np.load(target), hexapod.solve(rows, wrenches, bases))
 
 
 def test_the_package_needs_neither_ros_nor_bags() -> None:

@@ -32,8 +32,8 @@ from referees import (
     ROOT, rotation_about, symmetric_parameters)
 
 from stewart_dynamics import (
-    check_planned_trajectory, ForceBreakdown, Motion, MotionError, ParameterError, Parameters,
-    Pose, SingularityError, StewartError, StewartPlatform)
+    BaseMotion, check_planned_trajectory, ForceBreakdown, Motion, MotionError, ParameterError,
+    Parameters, Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 
@@ -274,7 +274,8 @@ def test_a_platform_that_was_used_can_be_copied_and_pickled(platform: StewartPla
 # Arbitrary input
 
 CALLS = {name: call for name, call in inspect.getmembers(StewartPlatform, inspect.isfunction)
-         if not name.startswith('_') and name not in ('solve', 'check', 'home_pose')}
+         if not name.startswith('_') and name not in (
+             'solve', 'base_wrenches', 'check', 'home_pose')}
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(), st.sampled_from(
     [0.0, 1e-300, 1e155, 1e300, -1e308, 5e-324]))
 ARRAYS = st.sampled_from([(), (3,), (6,), (2, 6), (3, 6), (0, 6), (5,)]).flatmap(
@@ -300,6 +301,18 @@ def motions() -> st.SearchStrategy[Any]:
                      st.sampled_from([(), (2,), (0,), (3, 1)]), st.booleans())
 
 
+def base_motions() -> st.SearchStrategy[Any]:
+    """Return base motions of any finite numbers, of one sample, two or none."""
+    finite = st.one_of(st.floats(-9.0, 9.0), st.floats(allow_nan=False, allow_infinity=False))
+
+    def made(numbers: list[float], shape: Any) -> BaseMotion:
+        return BaseMotion(*(np.broadcast_to(part, (*shape, 3))
+                            for part in np.reshape(numbers, (4, 3))))
+
+    return st.builds(made, st.lists(finite, min_size=12, max_size=12),
+                     st.sampled_from([(), (2,), (0,), (3, 1)]))
+
+
 @pytest.mark.parametrize('name', CALLS)
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(st.data())
@@ -307,12 +320,12 @@ def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataO
     platform = StewartPlatform(symmetric_parameters())
     names = [p.name for p in inspect.signature(CALLS[name]).parameters.values()
              if p.name not in ('self', 'singular', 'christoffel')]
-    arguments = [data.draw(st.one_of(
-        motions() if each in ('motion', 'pose', 'guess') else ARRAYS, ARRAYS, ODD))
-        for each in names]
+    arguments = {each: data.draw(st.one_of(
+        motions() if each in ('motion', 'pose', 'guess') else
+        base_motions() if each == 'base' else ARRAYS, ARRAYS, ODD)) for each in names}
     with np.errstate(all='raise', under='ignore'):
         try:
-            result = CALLS[name](platform, *arguments)
+            result = CALLS[name](platform, **arguments)
         except StewartError as exc:
             assert '\n' not in str(exc)
             assert 10 < len(str(exc)) < 1000
