@@ -106,6 +106,16 @@ def test_stamps_that_do_not_fit_those_of_setpoints_are_told() -> None:
         'setpoints without forces, as the base was not known'] == '1'
 
 
+def test_a_base_that_comes_after_the_last_setpoint_is_known_within_a_second() -> None:
+    of = diagnostics(BASE_IMU)
+    of.base.answered(setpoint(known=False), BEGIN)
+    assert state(of, BEGIN + 0.01) == (ERROR, 'no forces: base/imu never came')
+    for n in range(120):
+        of.base.heard(BASE_IMU, BEGIN + 0.01 * n)
+        of.base.sampled(base_with_a_sample(), BEGIN + 0.01 * n)
+    assert state(of, BEGIN + 1.2) == (OK, 'its motion is known')
+
+
 def test_before_anything_has_come_nothing_is_logged() -> None:
     of = diagnostics(BASE_IMU)
     assert of.base.log_lines(BEGIN + 10.0) == []

@@ -330,6 +330,11 @@ def test_topics_of_a_base_that_is_fixed_are_not_used_and_this_is_said(tmp_path: 
     assert f'{NODE}/{BASE_IMU}: not used: base.source is fixed' in summary_of(tmp_path)['notices']
     still = replayed(motion(30), parameters_of('fixed'), tmp_path / 'still', '--no-report')
     assert outputs.rows == still.rows
+    assert not any('base.source' in each for each in summary_of(tmp_path / 'still')['notices'])
+    # An IMU is likely to be one, whatever its name.
+    replayed(renamed(at_sea('imu', 30), base_imu='/deck_imu'), parameters_of('fixed'),
+             tmp_path / 'deck', '--no-report')
+    assert '/deck_imu: not used: base.source is fixed' in summary_of(tmp_path / 'deck')['notices']
 
 
 # With the other ways of input

@@ -88,9 +88,13 @@ class StewartPlatform:
         return type(self), (self.parameters,)
 
     @classmethod
-    def from_yaml(cls, path: str | Path) -> StewartPlatform:
-        """Return the hexapod of a parameter file; ParameterError names what is wrong in it."""
-        return cls(Parameters.from_yaml(path))
+    def from_yaml(cls, path: str | Path, node: str = '') -> StewartPlatform:
+        """
+        Return the hexapod of a parameter file; ParameterError names what is wrong in it.
+
+        A file with several nodes needs the node's name, with its namespace.
+        """
+        return cls(Parameters.from_yaml(path, node))
 
     def __repr__(self) -> str:
         """Return mass and sizes."""

@@ -77,8 +77,11 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
                    and name != f'{options.node}/{BASE_WRENCH}')
     if loads and inputs.WRENCH not in topics:
         notices.append(f'{", ".join(loads)}: not used as external wrench; --wrench selects one')
-    base = sorted(name for name in recording.topics if name not in topics.values()
-                  and name in [f'{options.node}/{key}' for key in _OF_BASE])
+    base = sorted(
+        name for name, kind in recording.topics.items() if name not in topics.values()
+        and (name in [f'{options.node}/{key}' for key in _OF_BASE]
+             or kind == inputs.INPUT_TYPES[inputs.BASE_IMU]
+             or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
         notices.append(f'{", ".join(base)}: not used: base.source is {parameters["base.source"]}')
     return notices
@@ -132,7 +135,8 @@ def _base_by_type(recording: Recording, key: str, options: Options, source: str,
     if candidates:
         raise BagError(f'{text}; of its type, {kind}, it has {", ".join(candidates)}: '
                        f'{_option(key)} selects one')
-    raise BagError(f'{text}, nor another of its type, {kind}; it contains {_held(recording)}')
+    raise BagError(f'{text}, nor another of its type, {kind}, that is no setpoint; it contains '
+                   f'{_held(recording)}')
 
 
 def _candidates(recording: Recording, key: str, options: Options, taken: Container[str],

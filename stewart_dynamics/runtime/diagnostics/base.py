@@ -25,7 +25,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.base_input import BaseInput
 from stewart_dynamics.runtime.diagnostics.periodic_report import (
-    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status, WARN)
+    ERROR, Held, Level, LevelLog, LogLine, OK, Status, WARN)
 from stewart_dynamics.runtime.rejections import Rejection
 from stewart_dynamics.runtime.step import Setpoint
 
@@ -79,11 +79,9 @@ class BaseDiagnostics:
     def answered(self, setpoint: Setpoint, now: float) -> None:
         """Note a setpoint that was answered."""
         assert setpoint.base is not None
-        if setpoint.base[0] == setpoint.base[0]:
-            self._unknown_held.see(FINE, now)
-            return
-        self._unknown += 1
-        self._unknown_held.see(Level(ERROR, self._why(now)), now)
+        if setpoint.base[0] != setpoint.base[0]:
+            self._unknown += 1
+            self._unknown_held.happened(Level(ERROR, self._why(now)), now)
 
     def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection."""
