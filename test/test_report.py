@@ -448,10 +448,10 @@ class Opened:
             self.page.wait_for_timeout(20)
 
     def see(self, plot: str) -> None:
-        """Scroll to a plot, and wait until it is drawn."""
-        self.page.evaluate(f'document.getElementById({plot!r}).scrollIntoView('
-                           "{behavior: 'instant', block: 'center'})")
-        self.until(f'Boolean(document.getElementById({plot!r})._fullLayout)')
+        """Scroll to a plot until it is drawn: others that are drawn meanwhile may move it away."""
+        found = f'document.getElementById({plot!r})'
+        self.until(f"({found}.scrollIntoView({{behavior: 'instant', block: 'center'}}), "
+                   f'Boolean({found}._fullLayout))')
 
     def see_everything(self) -> None:
         for plot in self.page.evaluate('[...byCanvas.keys()].map(canvas => canvas.id)'):
