@@ -15,11 +15,12 @@
 """
 Example: print /diagnostics readably, where there is no rqt_runtime_monitor. Copy what you need.
 
-Each status is printed when its level or its message changes; with --values the numbers as well,
-once in a second.
+Each status is printed when its level or its message changes, but for the numbers in it: many are
+ages. With --values it is printed with all numbers, once in a second.
 """
 
 import argparse
+import re
 import sys
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -42,7 +43,7 @@ class Monitor(Node):
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            state = status.level, status.message
+            state = status.level, re.sub(r'[\d.]+', '', status.message)
             if self.values or self.last.get(status.name) != state:
                 print(f'{LEVELS.get(status.level, "?"):5}  {status.name}: {status.message}')
             self.last[status.name] = state
