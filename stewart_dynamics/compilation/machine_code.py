@@ -23,6 +23,7 @@ RuntimeWarning.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import suppress
 from functools import cache
 import hashlib
@@ -34,7 +35,8 @@ from pathlib import Path
 import subprocess
 import sys
 from tempfile import TemporaryDirectory
-from typing import Any
+from threading import Thread
+from typing import Any, TypeVar
 from uuid import uuid4
 import warnings
 
@@ -42,6 +44,8 @@ NOT_KEPT = ('the compiled dynamics cannot be kept on disk{reason}: every start t
             'STEWART_DYNAMICS_CACHE_DIR name a folder that can be written to')
 _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a thousand times '
                'slower, a millisecond or more for each setpoint')
+
+Result = TypeVar('Result')
 
 _PACKAGE = Path(__file__).parents[1]
 _COMPILER = """
@@ -88,10 +92,33 @@ def kept_address(module: str, name: str) -> int | None:
     """
     if not COMPILED:
         return 0
-    for folder in _folders():
-        if code := _kept(folder, module, name):
-            return _load(code, f'{module}.{name}')
-    return None
+
+    def loaded() -> int | None:
+        for folder in _folders():
+            if code := _kept(folder, module, name):
+                return _load(code, f'{module}.{name}')
+        return None
+
+    return _uninterrupted(loaded)
+
+
+def _uninterrupted(function: Callable[[], Result]) -> Result:
+    """
+    Return what a function returns, called in a thread of its own.
+
+    What a handler of signals raises comes in the main thread: within llvmlite it would leave
+    objects half made, which Python reports when it deletes them.
+    """
+    result: Future[Result] = Future()
+
+    def call() -> None:
+        try:
+            result.set_result(function())
+        except BaseException as exc:
+            result.set_exception(exc)
+
+    Thread(target=call, daemon=True).start()
+    return result.result()
 
 
 def compiled_address(module: str, name: str) -> int:
@@ -102,7 +129,7 @@ def compiled_address(module: str, name: str) -> int:
     except CompilationError as exc:
         warnings.warn(f'{exc}: {_UNCOMPILED}', RuntimeWarning, stacklevel=2)
         return 0
-    address = _load(answer, f'{module}.{name}')
+    address = _uninterrupted(lambda: _load(answer, f'{module}.{name}'))
     _keep(module, name, answer)
     return address
 
