@@ -105,7 +105,7 @@ class TreeJoints:
 
     def positions(self, position: ArrayLike, rotation: ArrayLike) -> Array:
         """
-        Return positions (..., 24) [m, rad], in the order of ``names``.
+        Return the position of each joint, in the order of ``names``, (..., 24) [m, rad].
 
         Parameters
         ----------
