@@ -54,7 +54,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope='session')
 def ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep ROS on this machine, its logs out of the home folder; let nodes find each other soon."""
+    """Keep ROS on this machine and its logs out of the home folder; announce nodes often."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         patch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(
