@@ -49,7 +49,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
-from stewart_dynamics import BagError, Motion, Parameters, StewartPlatform
+from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rotation import from_quaternion
 from stewart_dynamics.replay import main
@@ -1006,6 +1006,39 @@ def test_exceeded_limits_are_named(
         assert main([str(ROOT / 'bags' / 'clear'), '--params', str(params),
                      '--output', str(tmp_path / params.stem)]) == 0
         assert text in capsys.readouterr().out
+
+
+def test_angles_of_joints_are_in_the_results_where_they_have_limits(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    platform = StewartPlatform(PARAMETERS.replaced({'limits.base_joint_angle_max': 0.5}))
+    file = tmp_path / 'hexapod.yaml'
+    platform.parameters.to_yaml(file)
+    code = main([str(ROOT / 'bags' / 'clear'), '--params', str(file), '--strict',
+                 '--output', str(tmp_path / 'out')])
+    assert code == LIMIT_MET
+    folder = tmp_path / 'out' / 'clear'
+    rows = rows_of(folder)
+    poses = Pose.from_quaternion(*(np.array(
+        [[float(row[f'{name}_{axis}{unit}']) for axis in axes] for row in rows])
+        for name, axes, unit in (('position', 'xyz', '_m'), ('orientation', 'xyzw', ''))))
+    angles, _ = platform.joint_angles(poses)
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    text = capsys.readouterr().out
+    for leg, name in enumerate(PARAMETERS['joints']):
+        of_leg = [float(row[f'{name}_base_joint_angle_rad']) for row in rows]
+        np.testing.assert_allclose(of_leg, angles[:, leg], rtol=0.0, atol=1e-14)
+        assert {row[f'{name}_platform_joint_angle_rad'] for row in rows} == {''}
+        found = summary['legs'][name]
+        assert found['base_joint_angle_max_rad'] == max(of_leg)
+        assert found['base_joint_angle_margin_rad'] == 0.5 - max(of_leg)
+        assert found['platform_joint_angle_max_rad'] is None
+        exceeded = f'limits.base_joint_angle_max, 0.5, exceeded by {name} in ' in text
+        assert exceeded is (max(of_leg) > 0.5)
+    assert 'base joints: 0.5846 rad (33.5 deg) at most, leg_4 at t = 10.00 s; margin' in text
+    assert 'platform joints:' not in text
+    report = (folder / 'report.html').read_text(encoding='utf-8')
+    assert 'Angles of the base joints' in report
+    assert 'Angles of the platform joints' not in report
 
 
 # Topics under other names

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import math
 import textwrap
 from typing import Any
 
@@ -80,7 +81,7 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
                      'energy are not known')
     lines += _limit_lines(found, any(clipped), any(name.startswith('limits.') and bound is not None
                                                    for name, bound in parameters.items()))
-    lines += _base_lines(found)
+    lines += [*_joint_lines(found['legs']), *_base_lines(found)]
     lines += ['', *_singularity_lines(found['singularity'])]
     return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
             for line in lines]
@@ -142,6 +143,28 @@ def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) ->
     if limits_given and not lines:
         lines.append('all limits held')
     return lines
+
+
+def _joint_lines(legs: Mapping[str, Mapping[str, float | None]]) -> list[str]:
+    """Return the largest angle of a joint at either end, and the smallest margin."""
+    lines = []
+    for joint in ('base', 'platform'):
+        angle, at, margin = (
+            f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
+        found = {name: leg[angle] for name, leg in legs.items() if leg[angle] is not None}
+        margins = {name: leg[margin] for name, leg in legs.items() if leg[margin] is not None}
+        if found and margins:
+            most = max(found, key=lambda name: found[name] or 0.0)
+            least = min(margins, key=lambda name: margins[name] or 0.0)
+            lines.append(f'{joint} joints: {_angle(found[most])} at most, {most} at t = '
+                         f'{legs[most][at]:.2f} s; margin {_angle(margins[least])}'
+                         + (f', {least}' if least != most else ''))
+    return lines
+
+
+def _angle(radians: float | None) -> str:
+    assert radians is not None
+    return f'{radians:.4g} rad ({math.degrees(radians):.1f} deg)'
 
 
 def _base_lines(found: Mapping[str, Any]) -> list[str]:
