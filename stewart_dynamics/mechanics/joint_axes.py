@@ -31,6 +31,7 @@ from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.home_pose import home_pose
 from stewart_dynamics.mechanics.joint_angles import joint_angles, joint_haversines
+from stewart_dynamics.mechanics.leg_joints import home_directions, HomeDirections
 from stewart_dynamics.mechanics.limits import ANGLES, OF_JOINTS
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.rows import JOINT_ANGLES
@@ -140,17 +141,13 @@ def _axes(p: Parameters, needed: Sequence[str]) -> list[Array]:
     return found
 
 
-def _at_home(p: Parameters, missing: Sequence[str]) -> tuple[Array, Array]:
-    """Return the directions of the legs at the home pose, base axes and platform axes."""
-    if not missing:
-        return np.full((6, 3), np.nan), np.full((6, 3), np.nan)
-    try:
-        home = home_pose(p)
-    except ParameterError as exc:
-        raise ParameterError(f'{missing[0]}: missing, and {exc}') from exc
-    directions = _unit(home.position + p['geometry.platform_joints'] @ home.rotation.T
-                       - p['geometry.base_joints'])
-    return directions, directions @ home.rotation
+def _at_home(p: Parameters, missing: Sequence[str]) -> HomeDirections:
+    if missing:
+        try:
+            home_pose(p)
+        except ParameterError as exc:
+            raise ParameterError(f'{missing[0]}: missing, and {exc}') from exc
+    return home_directions(p)
 
 
 def _unit(vectors: Array) -> Array:
