@@ -26,26 +26,23 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 import json
-import os
 from pathlib import Path
 import sys
 import time
 from typing import Any, NamedTuple
 
-from loop import (
-    Errors, Failure, leg_mass, Recorder, ROOT, simulate, SIMULATOR, UNITS)
+from closed_loop import (
+    BANDWIDTH, demonstration, Errors, Failure, leg_mass, progress_bar, Recorder, ROOT, simulate,
+    SIMULATOR, UNITS)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
-from stewart_dynamics.errors import StewartError
 from stewart_dynamics.executables import executable
 from stewart_dynamics.parameter_files import read_yaml
 from stewart_dynamics.runtime.generated_base_motion import GeneratedBaseMotion
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
-from tqdm import tqdm
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -56,7 +53,6 @@ from motion_compensation import seen_from  # noqa: E402, I100, I202
 Array = NDArray[np.float64]
 
 RATE = 500.0  # of states, setpoints and commands [Hz]
-BANDWIDTH = 8.0  # of the leg controller, as in demo/loop.py [Hz]
 # Started in this order; the last one, which publishes the first setpoint, when the others are
 # connected.
 PROGRAMS: dict[str, list[str | Path]] = {
@@ -81,16 +77,6 @@ class Run(NamedTuple):
 
     name: str
     errors: Errors
-
-    @property
-    def rms(self) -> dict[str, float]:
-        """Root of the mean square of each series of errors."""
-        return self.errors.figures(lambda each: np.sqrt(np.mean(np.square(each))))
-
-    @property
-    def peak(self) -> dict[str, float]:
-        """Largest of each."""
-        return self.errors.figures(lambda each: np.abs(each).max())
 
 
 class ShipRecorder(Recorder):
@@ -181,9 +167,10 @@ def table(runs: Sequence[Run]) -> str:
     for run in runs:
         line = f'{run.name:28}'
         for name in ('all legs', 'position', 'rotation'):
-            line += f'{run.rms[name]:10.2f} {f"({run.peak[name]:.0f})":>6}'
+            line += f'{run.errors.rms[name]:10.2f} {f"({run.errors.peak[name]:.0f})":>6}'
         if RUNS[run.name] not in (None, 'fixed'):
-            line += f'   1/{without.rms["position"] / run.rms["position"]:.0f} of a fixed base'
+            gain = without.errors.rms['position'] / run.errors.rms['position']
+            line += f'   1/{gain:.0f} of a fixed base'
         lines.append(line)
     return '\n'.join(lines)
 
@@ -227,8 +214,8 @@ def summary(ship: Ship, runs: Sequence[Run]) -> dict[str, Any]:
     """Return the figures of all runs."""
     return {'setpoints': len(ship.times), 'rate [Hz]': RATE, 'bandwidth [Hz]': BANDWIDTH,
             'units': UNITS, 'runs': [{
-                'name': run.name, 'base.source': RUNS[run.name], 'rms': run.rms,
-                'peak': run.peak} for run in runs]}
+                'name': run.name, 'base.source': RUNS[run.name], 'rms': run.errors.rms,
+                'peak': run.errors.peak} for run in runs]}
 
 
 def main() -> None:
@@ -242,17 +229,13 @@ def main() -> None:
     parser.add_argument('--output', type=Path, default=ROOT / 'shipped',
                         help='folder for ship.json and ship.png')
     options = parser.parse_args()
-    # Isolated from other ROS programs on this computer and its network.
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(os.getpid() % 100 + 1))
     runs: list[Run] = []
-    try:
+    with demonstration('demo-ship'):
         ship = Ship(options.params, options.ship, options.seconds)
         options.output.mkdir(parents=True, exist_ok=True)
         rclpy.init()
         begun = time.monotonic()
-        with tqdm(total=len(RUNS) * options.seconds, unit='s', ncols=79, mininterval=0.5,
-                  bar_format='{desc} {bar} {n:.1f} of {total:.1f} s') as progress:
+        with progress_bar(len(RUNS) * options.seconds) as progress:
             for name in RUNS:
                 progress.set_description_str(name)
                 before = len(runs) * options.seconds
@@ -263,12 +246,6 @@ def main() -> None:
         (options.output / 'ship.json').write_text(
             json.dumps(summary(ship, runs), indent=1) + '\n', encoding='utf-8')
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: ship.png, ship.json')
-    except (Failure, StewartError, OSError) as exc:
-        raise SystemExit(f'demo-ship: {exc}') from None
-    except (KeyboardInterrupt, ExternalShutdownException):
-        raise SystemExit(130) from None
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

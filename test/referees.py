@@ -21,7 +21,7 @@ Nothing here uses the package's equations; only Parameters and Motion, which car
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
 from functools import cache
 from io import StringIO
@@ -205,6 +205,19 @@ def each_relative(value: Any, truth: Any) -> float:
     return max(relative(v, t) for v, t in zip(value, truth, strict=True))
 
 
+def _of_platform(p: Parameters, motion: Motion, gravity: Array) -> tuple[Array, Array]:
+    """Return kinetic and potential energy of the platform in a batch (..., ) [J]."""
+    r, w = motion.rotation, motion.angular_velocity
+    arm = np.einsum('...ij,j->...i', r, p['platform.center_of_mass'])
+    velocity = motion.linear_velocity + np.cross(w, arm)
+    xx, xy, xz, yy, yz, zz = p['platform.inertia']
+    w_p = np.einsum('...ji,...j->...i', r, w)
+    turning = np.einsum('...i,ij,...j->...', w_p,
+                        np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), w_p)
+    return (0.5 * p['platform.mass'] * np.sum(velocity ** 2, axis=-1) + 0.5 * turning,
+            -p['platform.mass'] * (motion.position + arm) @ gravity)
+
+
 def energies(p: Parameters, motion: Motion) -> tuple[Array, Array]:
     """
     Return kinetic and potential energy of all moving parts in a batch (..., ) [J].
@@ -212,14 +225,7 @@ def energies(p: Parameters, motion: Motion) -> tuple[Array, Array]:
     Part by part: the speed of its center of mass, its turning, its height against gravity.
     """
     r, v, w = motion.rotation, motion.linear_velocity, motion.angular_velocity
-    arm = np.einsum('...ij,j->...i', r, p['platform.center_of_mass'])
-    com_velocity = v + np.cross(w, arm)
-    xx, xy, xz, yy, yz, zz = p['platform.inertia']
-    w_p = np.einsum('...ji,...j->...i', r, w)
-    turning = np.einsum('...i,ij,...j->...', w_p,
-                        np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), w_p)
-    kinetic = 0.5 * p['platform.mass'] * np.sum(com_velocity ** 2, axis=-1) + 0.5 * turning
-    potential = -p['platform.mass'] * (motion.position + arm) @ p['gravity']
+    kinetic, potential = _of_platform(p, motion, p['gravity'])
     for i in range(6):
         a = np.einsum('...ij,j->...i', r, p['geometry.platform_joints'][i])
         leg = motion.position + a - p['geometry.base_joints'][i]
@@ -242,6 +248,63 @@ def energies(p: Parameters, motion: Motion) -> tuple[Array, Array]:
         potential = potential - (m1 * (base + s1 * s) + m2 * (base + (length - s2) * s)
                                  ) @ p['gravity']
     return kinetic, potential
+
+
+def in_world(base: Motion, motion: Motion) -> Motion:
+    """Return the motion of the platform in the world (...), without accelerations."""
+    r = base.rotation
+
+    def turned(vector: Array) -> Array:
+        result: Array = np.einsum('...ij,...j->...i', r, vector)
+        return result
+
+    arm = turned(motion.position)
+    return Motion(
+        base.position + arm, r @ motion.rotation,
+        base.linear_velocity + np.cross(base.angular_velocity, arm)
+        + turned(motion.linear_velocity),
+        base.angular_velocity + turned(motion.angular_velocity))
+
+
+def energy_in_world(p: Parameters, base: Motion, motion: Motion, gravity: Array) -> Array:
+    """
+    Return kinetic and potential energy of all moving parts in the world, a batch (N,) [J].
+
+    The base's motion and gravity are those in the world. The platform as ``energies`` has it,
+    without its legs; each leg from the velocities of its two joints in the world.
+    """
+    platform = in_world(base, motion)
+    total: Array = sum(_of_platform(p, platform, gravity))
+    r, r_platform = base.rotation, platform.rotation
+    for i in range(6):
+        lower_arm = r @ p['geometry.base_joints'][i]
+        upper_arm = r_platform @ p['geometry.platform_joints'][i]
+        lower, upper = base.position + lower_arm, platform.position + upper_arm
+        lower_velocity = base.linear_velocity + np.cross(base.angular_velocity, lower_arm)
+        upper_velocity = platform.linear_velocity + np.cross(platform.angular_velocity, upper_arm)
+        leg, leg_velocity = upper - lower, upper_velocity - lower_velocity
+        length = np.linalg.norm(leg, axis=-1, keepdims=True)
+        s = leg / length
+        rate = np.sum(s * leg_velocity, axis=-1, keepdims=True)
+        s_rate = (leg_velocity - s * rate) / length
+        s1, s2 = p['legs.cylinder.center_of_mass'][i], p['legs.piston.center_of_mass'][i]
+        for mass, center, velocity in (
+                (p['legs.cylinder.mass'][i], lower + s1 * s, lower_velocity + s1 * s_rate),
+                (p['legs.piston.mass'][i], upper - s2 * s, upper_velocity - s2 * s_rate)):
+            total = total + mass * (0.5 * np.sum(velocity ** 2, axis=-1) - center @ gravity)
+        inertia = p['legs.cylinder.inertia'][i] + p['legs.piston.inertia'][i]
+        total = total + 0.5 * (inertia * np.sum(s_rate ** 2, axis=-1)
+                               + p['actuator.reflected_mass'][i] * rate[..., 0] ** 2)
+    return total
+
+
+def assert_order(order: float, ends: Sequence[Array]) -> None:
+    """Check the order of convergence of results of steps that are halved each time."""
+    errors = [float(np.linalg.norm(one - finer))
+              for one, finer in zip(ends, ends[1:], strict=False)]
+    assert errors[0] > 1e-9  # else it is rounding that is compared
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert np.all(np.abs(orders - order) < 0.3)
 
 
 def friction(p: Parameters, rates: Array) -> Array:

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    derivative, each_relative, energies, friction, PinocchioReferee, random_base_motion,
-    random_direction, random_motion, random_parameters, random_wrench, relative, rng,
-    rotation_about, size_of, smooth_motion, STANDARD_GRAVITY, uncompiled)
+    derivative, each_relative, energies, energy_in_world, friction, PinocchioReferee,
+    random_base_motion, random_direction, random_motion, random_parameters, random_wrench,
+    relative, rng, rotation_about, size_of, smooth_motion, STANDARD_GRAVITY, uncompiled)
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.mechanics import base_wrench
@@ -200,20 +200,6 @@ def test_the_coriolis_matrix_on_a_turning_base_keeps_its_identities() -> None:
     assert np.array_equal(platform.mass_matrix(motion), platform.mass_matrix(motion.pose))
 
 
-def inertial(base: Motion, motion: Motion) -> Motion:
-    """Return a platform's motion in the world on a base whose motion in the world is given."""
-    r, w = base.rotation, base.angular_velocity
-
-    def turned(vector: Any) -> Any:
-        return (r @ vector[..., None])[..., 0]
-
-    out = turned(motion.position)
-    return Motion(
-        base.position + out, r @ motion.rotation,
-        base.linear_velocity + np.cross(w, out) + turned(motion.linear_velocity),
-        w + turned(motion.angular_velocity))
-
-
 @pytest.mark.parametrize('seed', range(3))
 def test_power_of_legs_and_base_is_the_rate_of_energy(seed: int) -> None:
     """Kinetic and potential energy in the world, from speeds of all parts in the world."""
@@ -224,38 +210,8 @@ def test_power_of_legs_and_base_is_the_rate_of_energy(seed: int) -> None:
     platform, gravity = StewartPlatform(p), p['gravity']
     of_base, of_platform = smooth_motion(p, random), smooth_motion(p, random)
 
-    def energy(time: float) -> float:
-        base, motion = of_base(time), of_platform(time)
-        kinetic = potential = 0.0
-        world = inertial(base, motion)
-        xx, xy, xz, yy, yz, zz = p['platform.inertia']
-        r = world.rotation
-        arm = r @ p['platform.center_of_mass']
-        speed = world.linear_velocity + np.cross(world.angular_velocity, arm)
-        spin = r.T @ world.angular_velocity
-        kinetic += 0.5 * p['platform.mass'] * speed @ speed + 0.5 * spin @ np.array(
-            [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ spin
-        potential -= p['platform.mass'] * (world.position + arm) @ gravity
-        for i in range(6):
-            foot = base.rotation @ p['geometry.base_joints'][i]
-            foot_speed = base.linear_velocity + np.cross(base.angular_velocity, foot)
-            foot = base.position + foot
-            a = r @ p['geometry.platform_joints'][i]
-            leg = world.position + a - foot
-            leg_speed = (world.linear_velocity + np.cross(world.angular_velocity, a)
-                         - foot_speed)
-            length = np.linalg.norm(leg)
-            s = leg / length
-            rate = s @ leg_speed
-            s_rate = (leg_speed - rate * s) / length
-            s1, s2 = (p[f'legs.{part}.center_of_mass'][i] for part in ('cylinder', 'piston'))
-            m1, m2 = (p[f'legs.{part}.mass'][i] for part in ('cylinder', 'piston'))
-            inertia = p['legs.cylinder.inertia'][i] + p['legs.piston.inertia'][i]
-            v1 = foot_speed + s1 * s_rate
-            v2 = foot_speed + rate * s + (length - s2) * s_rate
-            kinetic += 0.5 * (m1 * v1 @ v1 + m2 * v2 @ v2 + inertia * s_rate @ s_rate)
-            potential -= (m1 * (foot + s1 * s) + m2 * (foot + (length - s2) * s)) @ gravity
-        return float(kinetic + potential)
+    def energy(time: float) -> Any:
+        return energy_in_world(p, of_base(time), of_platform(time), gravity)
 
     base, motion = of_base(0.0), of_platform(0.0)
     moving = BaseMotion.from_motion(base, gravity)
@@ -401,6 +357,8 @@ def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
                 with pytest.raises(MotionError) as error:
                     getattr(platform, call)(some, None, wrong)
                 assert text in str(error.value)
+    with pytest.raises(MotionError, match='wrench: a value of type BaseMotion: .* argument base'):
+        getattr(platform, call)(motion[0], base[0])
     with pytest.raises(MotionError) as error:
         getattr(platform, call)(motion, None, BaseMotion([0.0, 0.0, 0.0], [1e308] * 3,
                                                          [1e200, 0.0, 0.0]))

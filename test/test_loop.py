@@ -68,10 +68,10 @@ def test_feed_forward_cuts_the_tracking_error(
         run: Callable[..., Any], payload: float, times: float) -> None:
     alone, forward = run(False, payload), run(True, payload)
     assert len(alone.errors.seconds) == len(forward.errors.seconds) == 501
-    for name, error in forward.rms.items():
-        assert 0.0 < times * error < alone.rms[name], name
+    for name, error in forward.errors.rms.items():
+        assert 0.0 < times * error < alone.errors.rms[name], name
     # PD alone carries the weight by its error: what is missing is the node's force.
-    assert 100.0 < alone.rms['all legs'] < 10e3  # [um]
+    assert 100.0 < alone.errors.rms['all legs'] < 10e3  # [um]
 
 
 @pytest.mark.slow

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    energies, friction, printed_compiled_and_not, relative, rng, ROOT, rotation_about, size_of,
-    smooth_motion)
+    assert_order, energies, friction, printed_compiled_and_not, relative, rng, ROOT,
+    rotation_about, size_of, smooth_motion)
 from simulated import FRICTIONLESS, HEXAPOD, MASSLESS, random_simulated, simulated, UNLIMITED
 
 from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
@@ -126,11 +126,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step() -> None:
             plant.advance(tuple(load.tolist()), tuple((0.3 * load).tolist()))
         assert not plant.fault
         ends.append(np.array(plant.state.pose + plant.state.twist))
-    errors = [float(np.linalg.norm(one - finer)) for one, finer in zip(ends, ends[1:],
-                                                                       strict=False)]
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert errors[0] > 1e-9  # else it is rounding that is compared
-    assert np.all(np.abs(orders - 4.0) < 0.3)
+    assert_order(4.0, ends)
 
 
 def test_the_energy_lost_is_the_work_of_friction() -> None:

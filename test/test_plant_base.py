@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    energies, printed_compiled_and_not, random_base_motion, relative, rng, rotation_about, size_of,
-    smooth_motion)
+    assert_order, energy_in_world, in_world, printed_compiled_and_not, random_base_motion,
+    relative, rng, rotation_about, size_of, smooth_motion)
 from simulated import FRICTIONLESS, MASSLESS, random_simulated, simulated, UNLIMITED
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.parameters import PARAMETERS
 from stewart_dynamics.runtime.plant import Plant, State
 from test_plant import motion_of, set_moving, ZERO
 
@@ -54,56 +53,6 @@ def rows_at(base: MotionOf, begin: float, period: float, gravity: Any = GRAVITY)
     """Return what the plant takes for a period."""
     times = begin + period * np.array([0.0, 0.5, 1.0])
     return BaseMotion.from_motion(base(times), gravity).rows
-
-
-def in_world(base: Motion, motion: Motion) -> Motion:
-    """Return the motion of the platform in the world (...), without accelerations."""
-    r = base.rotation
-
-    def turned(vector: Array) -> Array:
-        result: Array = np.einsum('...ij,...j->...i', r, vector)
-        return result
-
-    arm = turned(motion.position)
-    return Motion(
-        base.position + arm, r @ motion.rotation,
-        base.linear_velocity + np.cross(base.angular_velocity, arm)
-        + turned(motion.linear_velocity),
-        base.angular_velocity + turned(motion.angular_velocity))
-
-
-def energy_in_world(p: Parameters, base: Motion, motion: Motion) -> Array:
-    """
-    Return kinetic and potential energy of all moving parts in the world, a batch (N,) [J].
-
-    The platform as ``energies`` has it, without its legs; each leg from the velocities of its two
-    joints in the world.
-    """
-    platform = in_world(base, motion)
-    alone = Parameters({**{name: value for name, value in p.given.items() if name in PARAMETERS},
-                        **MASSLESS, 'gravity': GRAVITY.tolist()})
-    total: Array = sum(energies(alone, platform))
-    r, r_platform = base.rotation, platform.rotation
-    for i in range(6):
-        lower_arm = r @ p['geometry.base_joints'][i]
-        upper_arm = r_platform @ p['geometry.platform_joints'][i]
-        lower, upper = base.position + lower_arm, platform.position + upper_arm
-        lower_velocity = base.linear_velocity + np.cross(base.angular_velocity, lower_arm)
-        upper_velocity = platform.linear_velocity + np.cross(platform.angular_velocity, upper_arm)
-        leg, leg_velocity = upper - lower, upper_velocity - lower_velocity
-        length = np.linalg.norm(leg, axis=-1, keepdims=True)
-        s = leg / length
-        rate = np.sum(s * leg_velocity, axis=-1, keepdims=True)
-        s_rate = (leg_velocity - s * rate) / length
-        s1, s2 = p['legs.cylinder.center_of_mass'][i], p['legs.piston.center_of_mass'][i]
-        for mass, center, velocity in (
-                (p['legs.cylinder.mass'][i], lower + s1 * s, lower_velocity + s1 * s_rate),
-                (p['legs.piston.mass'][i], upper - s2 * s, upper_velocity - s2 * s_rate)):
-            total = total + mass * (0.5 * np.sum(velocity ** 2, axis=-1) - center @ GRAVITY)
-        inertia = p['legs.cylinder.inertia'][i] + p['legs.piston.inertia'][i]
-        total = total + 0.5 * (inertia * np.sum(s_rate ** 2, axis=-1)
-                               + p['actuator.reflected_mass'][i] * rate[..., 0] ** 2)
-    return total
 
 
 def simpson(values: Array, step: float) -> float:
@@ -157,7 +106,8 @@ def balance(parameters: Any, base: MotionOf, blocks: int) -> tuple[float, float,
         works.append(simpson(power, period))
     assert not plant.fault
     last = base(np.array([blocks * _HELD * period])), motion_of(plant.state)[None]
-    change = float((energy_in_world(parameters, *last) - energy_in_world(parameters, *first))[0])
+    change = float((energy_in_world(parameters, *last, GRAVITY)
+                    - energy_in_world(parameters, *first, GRAVITY))[0])
     return change, float(np.sum(works)), float(np.sum(np.abs(works)))
 
 
@@ -191,11 +141,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_period() -> None:
             plant.advance(ZERO, ZERO, rows_at(base, n / rate, 1.0 / rate))
         assert not plant.fault
         ends.append(np.array(plant.state.pose + plant.state.twist))
-    errors = [float(np.linalg.norm(one - finer)) for one, finer in zip(ends, ends[1:],
-                                                                       strict=False)]
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert errors[0] > 1e-9  # else it is rounding that is compared
-    assert np.all(np.abs(orders - 4.0) < 0.3)
+    assert_order(4.0, ends)
 
 
 def test_steps_within_a_period_follow_the_base_as_well() -> None:

@@ -74,7 +74,7 @@ def test_base_terms_cut_the_error(run: Callable[..., Any], name: str, times: flo
     without, forward = run('PD + forces, fixed base'), run(name)
     assert len(without.errors.seconds) == len(forward.errors.seconds) == 301
     for series in ('all legs', 'position', 'rotation'):
-        assert 0.0 < times * forward.rms[series] < without.rms[series], series
+        assert 0.0 < times * forward.errors.rms[series] < without.errors.rms[series], series
 
 
 @pytest.mark.parametrize('name', ['PD + forces, base motion', 'PD + forces, IMU'])

@@ -26,11 +26,11 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.base_load import carried
 from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.mechanics.pose import as_rotation, Pose
+from stewart_dynamics.mechanics.pose import as_rotation, Pose, row_by_row
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
     BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, ROTATION)
-from stewart_dynamics.mechanics.samples import listed, Samples
+from stewart_dynamics.mechanics.samples import listed, rows_of, Samples
 from stewart_dynamics.mechanics.vectors import Matrix3, rotate, rotate_back, subtract, Vector3
 from stewart_dynamics.parameters import STANDARD_GRAVITY
 
@@ -79,10 +79,8 @@ class BaseMotion(Samples):
                 ('angular_acceleration', BASE_ANGULAR_ACCELERATION, angular_acceleration)):
             if part is not None:
                 parts[name] = where, as_array(name, part, (3,))
-        self.shape = common_shape(**{name: part.shape[:-1] for name, (_, part) in parts.items()})
-        self.rows = np.zeros((*self.shape, BASE))
-        for where, array in parts.values():
-            self.rows[..., where] = array
+        self.rows = rows_of(BASE, parts)
+        self.shape = self.rows.shape[:-1]
 
     @classmethod
     def from_pose(cls, pose: Pose | Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
@@ -166,7 +164,7 @@ class BaseMotion(Samples):
         with np.errstate(all='ignore'):
             return cls.of_rows(_stacked(row_of_imu(
                 _columns(force), _columns(spin), _columns(spin_rate), _columns(arm),
-                _columns(turn.reshape(*turn.shape[:-2], 9)))))
+                _columns(row_by_row(turn)))))
 
     @property
     def gravity(self) -> Array:

@@ -116,7 +116,8 @@ class ForceBreakdownRows:
         """
         Return the forces (N, 7, 6) [N]: sample, source in the order of SOURCES, leg.
 
-        They sum to the demanded forces. nan where J_inv cannot be solved.
+        They sum to the demanded forces. nan where J_inv cannot be solved, or the base's motion is
+        not known.
 
         Parameters
         ----------
@@ -125,7 +126,8 @@ class ForceBreakdownRows:
         wrenches : (N, WRENCH) or (1, WRENCH)
             External wrenches at the platform's origin, base axes [N, N m]; one row for all.
         bases : (N, BASE) or (1, BASE), optional
-            Rows of the base's motion; one row for all. By default it is still.
+            Rows of the base's motion; one row for all; one of nan: it is not known. By default
+            the base is still.
 
         """
         forces = np.empty((len(motions), len(SOURCES), 6))
@@ -149,7 +151,9 @@ class ForceBreakdownRows:
             bases[:, GRAVITY] *= 0.0
         results = batch.solve(self._whole, rows, None, gravity)
         by.gravity[:] = results[:, FORCES]
-        unsolvable = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
+        unknown = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
+        if bases is not None:
+            unknown = unknown | np.isnan(bases[:, -1])
         by.wrench[:] = 0.0 if wrenches is None else batch.solve(
             self._weightless, rows, wrenches)[:, FORCES]
 
@@ -168,4 +172,4 @@ class ForceBreakdownRows:
         by.friction[:] = own
         by.base_motion[:] = 0.0 if bases is None else (
             batch.solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
-        forces[unsolvable] = np.nan
+        forces[unknown] = np.nan

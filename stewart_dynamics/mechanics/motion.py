@@ -23,10 +23,11 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics import rotation as rotations
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
 from stewart_dynamics.mechanics.pose import (
-    as_rotation, matrix_of_quaternion, Pose, Posed, row_of_one)
+    as_rotation, matrix_of_quaternion, Pose, Posed, row_by_row, row_of_one)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
+from stewart_dynamics.mechanics.samples import rows_of
 
 
 class Motion(Posed):
@@ -83,8 +84,8 @@ class Motion(Posed):
         if row is not None:
             self.rows, self.shape = row, ()
             return
-        turn = as_rotation(rotation)
-        parts = {'position': (POSITION, as_array('position', position, (3,)))}
+        parts = {'rotation': (ROTATION, row_by_row(as_rotation(rotation))),
+                 'position': (POSITION, as_array('position', position, (3,)))}
         for name, where, part in (
                 ('linear_velocity', LINEAR_VELOCITY, linear_velocity),
                 ('angular_velocity', ANGULAR_VELOCITY, angular_velocity),
@@ -92,12 +93,8 @@ class Motion(Posed):
                 ('angular_acceleration', ANGULAR_ACCELERATION, angular_acceleration)):
             if part is not None:
                 parts[name] = where, as_array(name, part, (3,))
-        self.shape = common_shape(rotation=turn.shape[:-2], **{
-            name: part.shape[:-1] for name, (_, part) in parts.items()})
-        self.rows = np.zeros((*self.shape, MOTION))
-        self.rows[..., ROTATION] = turn.reshape(*turn.shape[:-2], 9)
-        for where, array in parts.values():
-            self.rows[..., where] = array
+        self.rows = rows_of(MOTION, parts)
+        self.shape = self.rows.shape[:-1]
 
     @classmethod
     def from_pose(

@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics import rotation as rotations
-from stewart_dynamics.mechanics.arguments import as_array, common_shape
+from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.rows import POSE, POSITION, ROTATION
-from stewart_dynamics.mechanics.samples import listed, Samples
+from stewart_dynamics.mechanics.samples import listed, rows_of, Samples
 
 # A rotation matrix further from orthogonal than this is rejected.
 ORTHOGONALITY = 1e-6
@@ -92,11 +92,10 @@ class Pose(Posed):
         if row is not None:
             self.rows, self.shape = row, ()
             return
-        at, turn = as_array('position', position, (3,)), as_rotation(rotation)
-        self.shape = common_shape(position=at.shape[:-1], rotation=turn.shape[:-2])
-        self.rows = np.empty((*self.shape, POSE.stop))
-        self.rows[..., POSITION] = at
-        self.rows[..., ROTATION] = turn.reshape(*turn.shape[:-2], 9)
+        self.rows = rows_of(POSE.stop, {
+            'position': (POSITION, as_array('position', position, (3,))),
+            'rotation': (ROTATION, row_by_row(as_rotation(rotation)))})
+        self.shape = self.rows.shape[:-1]
 
     @classmethod
     def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
@@ -185,6 +184,11 @@ def as_rotation(rotation: ArrayLike) -> Array:
                 f'{ORTHOGONALITY:g}')
         raise MotionError(f'rotation{list(at) if at else ""}: {r[at].tolist()} {what}')
     return r
+
+
+def row_by_row(matrix: Array) -> Array:
+    """Return matrices (..., 3, 3) as rows (..., 9)."""
+    return matrix.reshape(*matrix.shape[:-2], 9)
 
 
 def matrix_of_quaternion(quaternion: ArrayLike) -> Array:

@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.arguments import common_shape
 
 Self = TypeVar('Self', bound='Samples')
 
@@ -84,6 +86,25 @@ class Samples:
     def _in_words(self) -> str:
         """Return the numbers of a single sample, as text."""
         raise NotImplementedError
+
+
+def rows_of(size: int, parts: Mapping[str, tuple[slice, Array]]) -> Array:
+    """
+    Return the rows (..., size) of samples; MotionError names parts whose shapes do not fit.
+
+    Parameters
+    ----------
+    size : int
+        How many numbers a row has; those of no part are zero.
+    parts : mapping of argument to (slice, (..., n))
+        Where in a row its numbers are, and these.
+
+    """
+    shape = common_shape(**{name: part.shape[:-1] for name, (_, part) in parts.items()})
+    rows = np.zeros((*shape, size))
+    for where, part in parts.values():
+        rows[..., where] = part
+    return rows
 
 
 def listed(numbers: Array) -> str:

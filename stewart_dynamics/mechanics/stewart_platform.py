@@ -26,20 +26,22 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics import (
     base_wrench, batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility,
-    stiffness)
+    regressor, stiffness)
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
+from stewart_dynamics.mechanics.linear_parameters import LINEAR, names_of
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.platform_arguments import (
     base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.regressor import Regressor
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, FORCES, GRAVITY,
-    LENGTHS, MOTION, POSE, POSITION, RESULT, TWIST, WRENCH)
+    LENGTHS, MOTION, NO_BASE, POSE, POSITION, RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters import Parameters
@@ -169,6 +171,29 @@ class StewartPlatform:
         known[unsolvable] = 0.0
         check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
         return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
+
+    def regressor(self, motion: Motion, base: BaseMotion | None = None) -> Regressor:
+        """
+        Return how the leg forces depend on the parameters in which they are linear.
+
+        ``regressor.matrix @ linear_parameters(platform.parameters)`` are the forces of
+        ``inverse_dynamics``; the parameters of this hexapod matter for it only by geometry and
+        gravity. Arguments and errors are those of ``inverse_dynamics``.
+        """
+        rows, _, bases, shape = loaded(motion, None, base)
+        results = self.solve(rows, None, bases)
+        check_finite('motion', results.reshape(*shape, RESULT), len(shape))
+        find_unsolvable(rows, results, shape, 'raise')
+        matrix = self.regressors(rows, bases).reshape(*shape, 6, LINEAR)
+        return Regressor(check_finite('motion', matrix, len(shape)), names_of(self.parameters))
+
+    def regressors(self, rows: Array, bases: Array | None = None) -> Array:
+        """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""
+        bases = np.array([NO_BASE]) if bases is None else bases
+        matrices = np.empty((len(rows), 6, LINEAR))
+        batch.in_parts(regressor.regressors, self.constants, *map(
+            batch.compact, (rows, bases)), matrices, scratch=regressor.WORK)
+        return matrices
 
     def base_wrench(self, motion: Motion, wrench: ArrayLike | None = None,
                     base: BaseMotion | None = None) -> Array:

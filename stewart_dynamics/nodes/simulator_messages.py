@@ -23,6 +23,7 @@ from stewart_dynamics.messages.imu import ImuWriter
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime import input_topics as inputs
 from stewart_dynamics.runtime.plant import State
 from stewart_dynamics.runtime.simulated_base import BasePeriod
 from stewart_dynamics.runtime.simulated_imu import SimulatedImu
@@ -40,13 +41,9 @@ OUTPUT_TYPES = {
     'accel': 'geometry_msgs/msg/AccelStamped',
 }
 # Those of the base: published where its motion is generated, subscribed where it comes by topics.
-BASE_TYPES = {
-    'base/pose': 'geometry_msgs/msg/PoseStamped',
-    'base/twist': 'geometry_msgs/msg/TwistStamped',
-    'base/accel': 'geometry_msgs/msg/AccelStamped',
-}
+BASE_TYPES = {topic: inputs.INPUT_TYPES[topic] for topic in inputs.BASE_SOURCES['motion']}
 IMU = 'imu'
-IMU_TYPE = 'sensor_msgs/msg/Imu'
+IMU_TYPE = inputs.INPUT_TYPES[inputs.BASE_IMU]
 
 
 class StateMessages:
@@ -102,6 +99,6 @@ class BaseMessages:
             readings = self._imu.read(period.rows[-1])
             yield IMU, self._imu_writer.write(stamp, readings[:3], readings[3:])
         if period.pose:
-            yield 'base/pose', self._pose.write(stamp, period.pose)
-            yield 'base/twist', self._six.write(stamp, period.twist)
-            yield 'base/accel', self._six.write(stamp, period.acceleration)
+            yield inputs.BASE_POSE, self._pose.write(stamp, period.pose)
+            yield inputs.BASE_TWIST, self._six.write(stamp, period.twist)
+            yield inputs.BASE_ACCEL, self._six.write(stamp, period.acceleration)

@@ -299,9 +299,6 @@ class _Run:
         if self.report is not None and self._breakdown is not None:
             breakdown = self._breakdown(
                 setpoints.motions, setpoints.wrenches, setpoints.bases)
-            if setpoints.bases is not None:
-                # it takes a base that is not known as a still one
-                breakdown[np.isnan(setpoints.bases[:, 0])] = np.nan
             self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         self._summary.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._comparison is not None:

@@ -158,14 +158,12 @@ class Summary:
         steps = self._steps(seconds, setpoints)
         lengths, rates, demanded = outputs.lengths, outputs.rates, outputs.demanded_forces
         without = with_nan(demanded)
-        unsolved = without
-        if setpoints.bases is not None:
-            unknown = np.isnan(setpoints.bases[:, 0])
-            unsolved = without & ~(unknown & (outputs.conditions < UNSOLVABLE_CONDITION))
-            if unknown.any():
-                self._base_unknown += int(unknown.sum())
-                if self._base_unknown_at is None:
-                    self._base_unknown_at = float(seconds[unknown.argmax()])
+        unknown = ~setpoints.base_known
+        unsolved = without & ~(unknown & (outputs.conditions < UNSOLVABLE_CONDITION))
+        if unknown.any():
+            self._base_unknown += int(unknown.sum())
+            if self._base_unknown_at is None:
+                self._base_unknown_at = float(seconds[unknown.argmax()])
         self._without_force += int(without.sum())
         self._unsolved += int(unsolved.sum())
         self._suppressed += int((with_nan(outputs.forces) & ~without).sum())

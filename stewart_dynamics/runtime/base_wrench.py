@@ -30,6 +30,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Six
 from stewart_dynamics.mechanics import base_wrench
+from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, WRENCH
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
@@ -64,8 +65,7 @@ class BaseWrench:
 
     def __init__(self, parameters: Parameters) -> None:
         self._platform = StewartPlatform(parameters)
-        x, y, z = parameters['gravity'].tolist()
-        self._still = (x, y, z, *(0.0,) * (BASE - 3))
+        self._still = tuple(BaseMotion(parameters['gravity']).rows.tolist())
         self._numbers = np.zeros(_RESULT.stop)
         self._memory = self._numbers.data  # the same as bytes
 

@@ -28,12 +28,11 @@ from stewart_dynamics.mechanics.rows import ACCELERATION, BASE, GRAVITY, POSITIO
 from stewart_dynamics.runtime.base_input import BaseInput
 from stewart_dynamics.runtime.generated_base_motion import GeneratedBaseMotion
 from stewart_dynamics.runtime.rejections import Rejections
+from stewart_dynamics.runtime.samples import LARGEST
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 # Periods that are computed at once: one alone takes as long as some of them.
 _AT_ONCE = 16
-# Larger numbers are no motion of a base; their squares could overflow [SI units].
-_LARGEST = 1e9
 
 
 class BasePeriod(NamedTuple):
@@ -146,7 +145,7 @@ class BaseOfTopics:
         """
         rows: Array = np.array(
             [self.input.at(round(end - halves * self._half)) for halves in (2, 1, 0)])
-        known = bool(np.max(np.abs(rows)) < _LARGEST)  # not where it is nan
+        known = bool(np.max(np.abs(rows)) < LARGEST)  # not where it is nan
         if known:
             self._last = rows
         else:

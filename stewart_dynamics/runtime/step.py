@@ -57,6 +57,11 @@ class Setpoint(NamedTuple):
     base: tuple[float, ...] | None = None
     """A row of the base's motion; one of nan: it is not known. None: the base is still."""
 
+    @property
+    def base_known(self) -> bool:
+        """Return whether the base is still, or its motion is known."""
+        return self.base is None or self.base[0] == self.base[0]
+
 
 class Output(NamedTuple):
     """What one setpoint gives."""
@@ -97,6 +102,13 @@ class Batch(NamedTuple):
     """When the message that completed each came (N,) [ns]."""
     bases: Array | None = None
     """Rows of the base's motion (N, 12); one of nan: it is not known. None: the base is still."""
+
+    @property
+    def base_known(self) -> Flags:
+        """(N,): the base is still, or its motion is known."""
+        if self.bases is None:
+            return np.ones(len(self.stamps), dtype=bool)
+        return ~np.isnan(self.bases[:, 0])
 
     def chosen(self, which: Any) -> Batch:
         """Return some of them: a slice, or an index or a mask (N,)."""
@@ -292,11 +304,11 @@ class Step:
             The output's before this one; none for the first.
 
         """
-        stamp, base = setpoint.stamp, setpoint.base
+        stamp = setpoint.stamp
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
-            *(base or NO_BASE), *(before or _FIRST).numbers, setpoint.restart,
-            -STAMPS_END <= stamp < STAMPS_END, base is None or base[0] == base[0])
+            *(setpoint.base or NO_BASE), *(before or _FIRST).numbers, setpoint.restart,
+            -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
         written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
         if not written[_ANSWERED.start]:
@@ -315,15 +327,14 @@ class Step:
 
     def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
         """Return what setpoints give one after the other; see the call for one."""
-        bases = setpoints.bases
-        results = self._platform.solve(setpoints.motions, setpoints.wrenches, bases)
+        results = self._platform.solve(
+            setpoints.motions, setpoints.wrenches, setpoints.bases)
         many = len(results)
-        known = np.ones(many, dtype=bool) if bases is None else ~np.isnan(bases[:, 0])
         state = np.array((before or _FIRST).numbers)
         forces, states = np.empty((many, 6)), np.empty((many, STATE))
         answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
-        _watch_many(self._settings, setpoints.stamps, known, setpoints.restarts, state, results,
-                    forces, states, answered, exceeding)
+        _watch_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
+                    state, results, forces, states, answered, exceeding)
         stamps = setpoints.stamps
         if not answered.all():
             stamps, results, forces = stamps[answered], results[answered], forces[answered]

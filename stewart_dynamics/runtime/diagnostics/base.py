@@ -78,8 +78,7 @@ class BaseDiagnostics:
 
     def answered(self, setpoint: Setpoint, now: float) -> None:
         """Note a setpoint that was answered."""
-        assert setpoint.base is not None
-        if setpoint.base[0] != setpoint.base[0]:
+        if not setpoint.base_known:
             self._unknown += 1
             self._unknown_held.happened(Level(ERROR, self._why(now)), now)
 

@@ -1,0 +1,285 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A controller in the loop with the simulated hexapod: what the demos have in common.
+
+The simulator owns time and waits for each command, so that no figure depends on the load of the
+computer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import struct
+import subprocess
+import tempfile
+import time
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+import numpy as np
+from numpy.typing import NDArray
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.messages.setpoint import pose
+from tqdm import tqdm
+import yaml
+
+Array = NDArray[np.float64]
+
+ROOT = Path(__file__).resolve().parent.parent
+SIMULATOR = '/stewart_simulator'
+QOS = QoSProfile(depth=1000)
+BEGIN = 1_000_000_000  # of simulated time [ns]
+BANDWIDTH = 8.0  # natural frequency of a leg under PD control [Hz]
+# Longer than any wait on an idle computer, including the compilation of two programs [s].
+PATIENCE = 60.0
+LOOK = 0.1  # interval between checks of programs and progress [s]
+
+UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position': 'um',
+         'rotation': 'urad'}
+
+
+class Failure(Exception):
+    """Ends the demo; its text is one line."""
+
+
+class Errors(NamedTuple):
+    """Measured minus desired state at the same times, N samples."""
+
+    seconds: Array
+    """Since the start of the motion (N,)."""
+    legs: Array
+    """Of the lengths (N, 6) [um]."""
+    position: Array
+    """Distance of the platform's origin (N,) [um]."""
+    rotation: Array
+    """Angle (N,) [urad]."""
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root of the mean square of each series of errors."""
+        return self._of_each(lambda each: np.sqrt(np.mean(np.square(each))))
+
+    @property
+    def peak(self) -> dict[str, float]:
+        """Largest of each."""
+        return self._of_each(lambda each: np.abs(each).max())
+
+    def _of_each(self, figure: Callable[[Array], Any]) -> dict[str, float]:
+        series = [*self.legs.T, self.legs, self.position, self.rotation]
+        return {name: float(figure(each)) for name, each in zip(UNITS, series, strict=True)}
+
+
+class Recorder(Node):
+    """Records the measured states."""
+
+    def __init__(self) -> None:
+        super().__init__('recorder')
+        self.diagnostics: dict[str, str] = {}
+        self.states = self._kept(JointState, f'{SIMULATOR}/leg_states')
+        self.poses = self._kept(PoseStamped, f'{SIMULATOR}/pose')
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, QOS)
+
+    def _kept(self, kind: Any, topic: str) -> list[bytes]:
+        messages: list[bytes] = []
+        self.create_subscription(kind, topic, messages.append, QOS, raw=True)
+        return messages
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.diagnostics.update({pair.key: pair.value for pair in status.values})
+
+    def ready(self) -> bool:
+        """
+        Return whether the simulator is received and the controller is subscribed to the node.
+
+        The node answers each setpoint once, so the controller must be connected before the first.
+        Everything else is repeated, or waited for, until it is received.
+        """
+        return (int(self.diagnostics.get('leg_states: readers', 0)) > 0
+                and bool(self.states) and bool(self.poses))
+
+    @property
+    def time(self) -> int:
+        """Return the simulated time since its start [ns]."""
+        last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
+        return max(last - BEGIN, 0)
+
+    def errors(self, times: NDArray[np.int64], lengths: Array, desired: Motion) -> Errors:
+        """Return the errors from a motion (N,) and its leg positions (N, 6) at its times."""
+        states = {_stamp(data): np.array(deserialize_message(data, JointState).position)
+                  for data in self.states}
+        poses = {stamp: numbers for stamp, _, numbers in map(pose, self.poses)}
+        stamps = (BEGIN + times).tolist()
+        missing = sum(stamp not in states or stamp not in poses for stamp in stamps)
+        if missing:
+            raise Failure(f'{missing} of {len(stamps)} states are missing')
+        true = np.array([poses[stamp] for stamp in stamps])
+        rotation = np.moveaxis(np.reshape(from_quaternion(*true[:, 3:].T), (3, 3, -1)), -1, 0)
+        turned = desired.rotation.swapaxes(1, 2) @ rotation
+        # By the sine: the cosine does not resolve angles below 1e-8.
+        sine = 0.5 * np.linalg.norm(turned[:, [2, 0, 1], [1, 2, 0]]
+                                    - turned[:, [1, 2, 0], [2, 0, 1]], axis=1)
+        return Errors(
+            times * 1e-9, 1e6 * (np.array([states[stamp] for stamp in stamps]) - lengths),
+            1e6 * np.linalg.norm(true[:, :3] - desired.position, axis=1),
+            1e6 * np.arcsin(np.minimum(sine, 1.0)))
+
+
+def _stamp(message: bytes) -> int:
+    """Return the stamp of any message with a header, from this computer [ns]."""
+    sec, nanosec = struct.unpack_from('<iI', message, 4)
+    return int(sec) * 1_000_000_000 + int(nanosec)
+
+
+class Program:
+    """One of the programs, in its own process."""
+
+    def __init__(self, name: str, command: Sequence[str | Path], folder: Path) -> None:
+        self.name = name
+        self._output = folder / f'{name}.txt'
+        with self._output.open('wb') as output:
+            self._process = subprocess.Popen(
+                command, stdout=output, stderr=output, stdin=subprocess.DEVNULL)
+
+    @property
+    def last_line(self) -> str:
+        """Return the last line that it has printed."""
+        return (self._output.read_text(errors='replace').splitlines() or ['no output'])[-1]
+
+    def check(self) -> None:
+        """Raise Failure if it has ended, unless the reference motion is complete."""
+        code = self._process.poll()
+        if code or (code == 0 and self.name != 'stewart_trajectory'):
+            raise Failure(f'{self.name} ended with exit code {code}: {self.last_line}')
+
+    def stop(self) -> None:
+        """Terminate it, if it still runs."""
+        self._process.terminate()
+
+    def wait(self) -> None:
+        """Wait until it has ended."""
+        try:
+            self._process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+def simulate(commands: Mapping[str, Sequence[str | Path]], files: Mapping[str, Sequence[Path]],
+             given: Mapping[str, Any], recorder: Recorder, end: int,
+             progress: Callable[[int], object]) -> None:
+    """
+    Run programs until the simulated time has come to its end, and record the measured states.
+
+    Parameters
+    ----------
+    commands : mapping of str to sequence
+        Of each program, by its name; the last one is started when the others are connected.
+    files : mapping of str to sequence of Path
+        Their parameter files.
+    given : mapping
+        Further parameters, as in a file.
+    recorder : Recorder
+        Is destroyed.
+    end : int
+        [ns] since the start.
+    progress : callable
+        Called with the simulated time [ns].
+
+    """
+    executor = EventsExecutor()
+    executor.add_node(recorder)
+    programs: list[Program] = []
+
+    def until(done: Callable[[], bool]) -> None:
+        reached, since, looked = 0, time.monotonic(), 0.0
+        while not done():
+            executor.spin_once(timeout_sec=LOOK)
+            now = time.monotonic()
+            if now - looked < LOOK:
+                continue
+            looked = now
+            for program in programs:
+                program.check()
+            if reached != (reached := recorder.time):
+                since = now
+                progress(reached)
+            if now - since > PATIENCE:
+                raise Failure(f'no progress at {reached * 1e-9:.3f} s; ' + '; '.join(
+                    f'{each.name}: {each.last_line}' for each in programs))
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / 'given.yaml'
+        file.write_text(yaml.safe_dump(given), encoding='utf-8')
+        try:
+            for n, (name, command) in enumerate(commands.items(), start=1):
+                if n == len(commands):
+                    until(recorder.ready)
+                arguments = [part for path in (*files.get(name, ()), file)
+                             for part in ('--params-file', path)]
+                programs.append(Program(name, [
+                    *command, *([] if '--ros-args' in command else ['--ros-args']), *arguments],
+                    Path(folder)))
+            until(lambda: recorder.time >= end)
+        finally:
+            for program in programs:
+                program.stop()
+            for program in programs:
+                program.wait()
+            executor.shutdown()
+            recorder.destroy_node()
+    progress(end)
+
+
+def leg_mass(platform: StewartPlatform, motion: Motion) -> float:
+    """Return the mass that one leg moves alone [kg], the mean of the six."""
+    to_legs = np.linalg.inv(platform.inverse_jacobian(motion))
+    masses = to_legs.T @ platform.mass_matrix(motion) @ to_legs
+    return float(np.mean(np.diag(masses)))
+
+
+@contextmanager
+def demonstration(command: str) -> Iterator[None]:
+    """Give ROS programs a domain of their own, and end with one line where something fails."""
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(os.getpid() % 100 + 1))
+    try:
+        yield
+    except (Failure, StewartError, OSError) as exc:
+        raise SystemExit(f'{command}: {exc}') from None
+    except (KeyboardInterrupt, ExternalShutdownException):
+        raise SystemExit(130) from None
+    finally:
+        rclpy.try_shutdown()
+
+
+def progress_bar(seconds: float) -> tqdm[Any]:
+    """Return a bar of the simulated time of all runs [s], on a terminal only."""
+    return tqdm(total=seconds, unit='s', ncols=79, mininterval=0.5, disable=None,
+                bar_format='{desc} {bar} {n:.1f} of {total:.1f} s')

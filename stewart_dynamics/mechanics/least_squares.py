@@ -1,0 +1,270 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Weighted linear least squares that say what the data cannot tell.
+
+Efforts f = Y x + noise. ``Information`` is what is left of the samples: Y^T W Y and Y^T W f, which
+sum over blocks of any length, so that memory does not grow with the data. Its unit is that of the
+noise: the weights are 1 / variance.
+
+Parameters have different units, so identifiability needs a scale for each: the change that would
+matter, such as its usual size. In parameters by their scales, the singular values of W^1/2 Y say
+how many times larger than the noise the effect of such a change is, direction by direction, and
+their inverses are the standard errors. Directions whose standard error is above a limit are not
+told by the data: they keep the start's value. Noise in Y seems to tell something, too; with the
+information of the noise alone given, only what exceeds it by far counts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+
+# A direction is known if its standard error is at most this, by the parameters' scales.
+LARGEST_ERROR = 0.25
+# And if its information exceeds this many times that of the noise in the regressor.
+TIMES_NOISE = 10.0
+# Smaller singular values than this, by the largest, are rounding.
+ROUNDING = 1e-6
+# A parameter is identifiable if unknown directions have at most this share in it.
+LARGEST_SHARE = 0.05
+# A smaller coefficient of a combination, by its largest one and the scales, is left out.
+SMALLEST_COEFFICIENT = 0.02
+
+
+class Information(NamedTuple):
+    """
+    What samples tell about n parameters.
+
+    Attributes
+    ----------
+    matrix : (n, n)
+        Y^T W Y.
+    vector : (n,)
+        Y^T W f.
+    squares : float
+        f^T W f.
+    rows : int
+        Number of efforts, six for each sample.
+
+    """
+
+    matrix: Array
+    vector: Array
+    squares: float
+    rows: int
+
+    def plus(self, other: Information) -> Information:
+        """Return what both tell together."""
+        return Information(self.matrix + other.matrix, self.vector + other.vector,
+                           self.squares + other.squares, self.rows + other.rows)
+
+    def residual_squares(self, x: Array) -> float:
+        """Return the weighted sum of squared residuals of parameters (n,)."""
+        return max(float(self.squares + x @ (self.matrix @ x) - 2.0 * x @ self.vector), 0.0)
+
+
+class Identifiability(NamedTuple):
+    """
+    What data can tell about n parameters.
+
+    Attributes
+    ----------
+    scales : (n,)
+        Of the parameters, as given.
+    singular_values : (n,)
+        Of the scaled regressor, largest first: 1 / standard error of each direction.
+    directions : (n, n)
+        Each column one direction, by the scales, in the order of the singular values.
+    rank : int
+        Number of directions that are known; they come first.
+    shares : (n,)
+        Of the unknown directions in each parameter, 0 to 1.
+
+    """
+
+    scales: Array
+    singular_values: Array
+    directions: Array
+    rank: int
+    shares: Array
+
+    @property
+    def identifiable(self) -> Flags:
+        """Return which parameters (n,) the data tell by themselves, not only in combinations."""
+        return self.shares <= LARGEST_SHARE
+
+    @property
+    def known(self) -> Array:
+        """Return the known directions (n, rank) in the parameters' units."""
+        return self.scales[:, None] * self.directions[:, :self.rank]
+
+
+class Solution(NamedTuple):
+    """
+    Parameters that fit the samples, unknown directions left as they were.
+
+    Attributes
+    ----------
+    values : (n,)
+        The parameters.
+    covariance : (n, n)
+        For white noise of the weights' variance; of the known directions.
+    identifiability : Identifiability
+        Which of them the data tell.
+
+    """
+
+    values: Array
+    covariance: Array
+    identifiability: Identifiability
+
+
+class Combination(NamedTuple):
+    """
+    A sum of parameters that the data tell although they do not tell its terms.
+
+    Attributes
+    ----------
+    parameters : tuple of int
+        Their indices.
+    coefficients : (k,)
+        Their factors, in units of the first one's; the first is 1.
+
+    """
+
+    parameters: tuple[int, ...]
+    coefficients: Array
+
+
+def nothing(many: int) -> Information:
+    """Return the information of no samples about some parameters."""
+    return Information(np.zeros((many, many)), np.zeros(many), 0.0, 0)
+
+
+def information(regressor: Array, efforts: Array, weights: Array) -> Information:
+    """
+    Return what samples tell.
+
+    Parameters
+    ----------
+    regressor : (N, 6, n)
+        Y of each sample.
+    efforts : (N, 6)
+        Less those of parameters that are not asked for [N].
+    weights : (6,) or (N, 6)
+        1 / variance of each effort [1/N^2]; 0 leaves it out.
+
+    """
+    weights = np.broadcast_to(weights, efforts.shape)
+    rows = regressor.reshape(-1, regressor.shape[-1])
+    weighted = rows * weights.reshape(-1, 1)
+    flat = efforts.reshape(-1)
+    return Information(weighted.T @ rows, weighted.T @ flat,
+                       float(weights.reshape(-1) @ flat ** 2), int(np.count_nonzero(weights)))
+
+
+def identifiability(matrix: Array, scales: Array, noise: Array | None = None,
+                    largest_error: float = LARGEST_ERROR) -> Identifiability:
+    """
+    Return what an information matrix tells.
+
+    Parameters
+    ----------
+    matrix : (n, n)
+        Y^T W Y.
+    scales : (n,)
+        For each parameter the change that would matter.
+    noise : (n, n), optional
+        What the same sum is for the noise in Y alone.
+    largest_error : float
+        Standard error of a known direction at most, by the scales.
+
+    """
+    told = matrix if noise is None else matrix - TIMES_NOISE * noise
+    values, directions = np.linalg.eigh(scales[:, None] * told * scales)
+    values, directions = values[::-1], directions[:, ::-1]
+    singular = np.sqrt(np.maximum(values, 0.0))
+    known = singular > max(1.0 / largest_error, ROUNDING * float(singular[0]))
+    rank = int(np.count_nonzero(known))
+    shares = np.sqrt(np.minimum(np.sum(directions[:, rank:] ** 2, axis=1), 1.0))
+    return Identifiability(scales, singular, directions, rank, shares)
+
+
+def solve(samples: Information, start: Array, scales: Array, noise: Array | None = None,
+          largest_error: float = LARGEST_ERROR) -> Solution:
+    """
+    Return the parameters that fit the samples best.
+
+    Parameters
+    ----------
+    samples : Information
+        Of n parameters.
+    start : (n,)
+        Unknown directions keep these values.
+    scales, noise, largest_error
+        As ``identifiability`` takes them.
+
+    """
+    what = identifiability(samples.matrix, scales, noise, largest_error)
+    known = what.known
+    # by their own sizes: the digits of small ones count as much as those of large ones
+    inner = known.T @ samples.matrix @ known
+    sizes = 1.0 / np.sqrt(np.diag(inner))
+    inverse = sizes[:, None] * np.linalg.inv(sizes[:, None] * inner * sizes) * sizes
+    step = inverse @ (known.T @ (samples.vector - samples.matrix @ start))
+    return Solution(start + known @ step, known @ inverse @ known.T, what)
+
+
+def combinations(what: Identifiability) -> tuple[Combination, ...]:
+    """
+    Return what the data tell about parameters that are not identifiable by themselves.
+
+    The rows of the known subspace, reduced: each begins with a parameter that is in no other
+    combination (base parameters: Gautier, Khalil, "Direct calculation of minimum set of inertial
+    parameters of serial robots", IEEE T-RA 6(3), 1990, doi:10.1109/70.56655).
+    """
+    unclear = np.flatnonzero(~what.identifiable)
+    if not len(unclear) or not what.rank:
+        return ()
+    # Of the known directions those within these parameters: there their length is 1, else 0.
+    rows = what.directions[unclear, :what.rank]
+    left, sizes, _ = np.linalg.svd(rows, full_matrices=False)
+    reduced, pivots = _reduced(left[:, sizes > 0.5].T)
+    found = []
+    for row, pivot in zip(reduced, pivots, strict=True):
+        kept = np.flatnonzero(np.abs(row) > SMALLEST_COEFFICIENT * np.abs(row).max())
+        order = [pivot, *(int(n) for n in kept if n != pivot)]
+        physical = row[order] / what.scales[unclear[order]]
+        found.append(Combination(tuple(int(unclear[n]) for n in order), physical / physical[0]))
+    return tuple(found)
+
+
+def _reduced(rows: Array) -> tuple[Array, list[int]]:
+    """Return independent rows in reduced form, by Gauss-Jordan with full pivoting, and pivots."""
+    rows = rows.copy()
+    pivots = np.full(len(rows), -1)
+    for _ in rows:
+        sizes = np.abs(rows) * (pivots < 0)[:, None]
+        row, column = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
+        pivots[row] = column
+        rows[row] /= rows[row, column]
+        others = np.arange(len(rows)) != row
+        rows[others] -= rows[others, column, None] * rows[row]
+    order = np.argsort(pivots)
+    return rows[order], pivots[order].tolist()

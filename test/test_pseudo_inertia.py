@@ -1,0 +1,88 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pseudo-inertia and log-Cholesky parameters: every body, and nothing that is none."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import derivative, random_parameters, rng
+
+from stewart_dynamics import ParameterError
+from stewart_dynamics.mechanics.linear_parameters import linear_parameters, PLATFORM
+from stewart_dynamics.mechanics.pseudo_inertia import (
+    from_log_cholesky, inertial_parameters, is_consistent, log_cholesky, log_cholesky_derivative,
+    pseudo_inertia)
+
+Array = NDArray[np.float64]
+
+
+def body_of_points(seed: int) -> Array:
+    """Return the inertial parameters of points of mass: sums over them, no tensor algebra."""
+    random = rng(seed)
+    ten = np.zeros(10)
+    for mass, (x, y, z) in zip(random.uniform(0.1, 5.0, 8), random.normal(size=(8, 3)),
+                               strict=True):
+        ten += mass * np.array([1.0, x, y, z, y * y + z * z, -x * y, -x * z, x * x + z * z,
+                                -y * z, x * x + y * y])
+    return ten
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(st.integers(0, 10 ** 6))
+def test_points_of_mass_are_a_body(seed: int) -> None:
+    ten = body_of_points(seed)
+    assert is_consistent(ten)
+    np.testing.assert_allclose(inertial_parameters(pseudo_inertia(ten)), ten, rtol=1e-12)
+    eta = log_cholesky(ten)
+    np.testing.assert_allclose(np.exp(2.0 * eta[0]), ten[0], rtol=1e-12)
+    np.testing.assert_allclose(from_log_cholesky(eta), ten, rtol=1e-9, atol=1e-9)
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(st.lists(st.floats(-1.5, 1.5), min_size=10, max_size=10))
+def test_any_log_cholesky_parameters_are_a_body(eta: list[float]) -> None:
+    ten = from_log_cholesky(np.array(eta))
+    assert is_consistent(ten)
+    np.testing.assert_allclose(log_cholesky(ten), eta, rtol=1e-6, atol=1e-6)
+
+
+def test_the_derivative_is_that_of_finite_differences() -> None:
+    eta = rng(1).uniform(-1.0, 1.0, 10)
+    exact = log_cholesky_derivative(eta)
+    for n in range(10):
+        along = derivative(lambda h, n=n: from_log_cholesky(eta + h * np.eye(10)[n]), 1e-3)
+        np.testing.assert_allclose(exact[:, n], along, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize('hexapod', range(5))
+def test_platforms_are_bodies(hexapod: int) -> None:
+    assert is_consistent(linear_parameters(random_parameters(rng(hexapod)))[PLATFORM])
+
+
+@pytest.mark.parametrize(('mass', 'inertia'), [
+    (-1.0, (1.0, 1.0, 1.0)),
+    (0.0, (1.0, 1.0, 1.0)),
+    (1.0, (1.0, 1.0, 2.5)),  # positive definite, and yet more than the sum of the others
+    (1.0, (-1.0, 1.0, 1.0)),
+])
+def test_what_is_no_body(mass: float, inertia: tuple[float, float, float]) -> None:
+    ten = np.array([mass, 0.0, 0.0, 0.0, inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]])
+    assert not is_consistent(ten)
+    with pytest.raises(ParameterError, match='no body has these'):
+        log_cholesky(ten)

@@ -1,0 +1,182 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The regressor: times the linear parameters it is the inverse dynamics, for any hexapod."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import (
+    derivative, PinocchioReferee, printed_compiled_and_not, QUARTER_TURN, random_base_motion,
+    random_motion, random_parameters, rng, symmetric_parameters)
+
+from stewart_dynamics import (
+    Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
+from stewart_dynamics.mechanics.linear_parameters import (
+    COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR, linear_parameters,
+    names_of, OFFSET, parameter_values, PISTON_MASS, PISTON_SECOND, PLATFORM, REFLECTED_MASS,
+    UNITS, VISCOUS_FRICTION)
+
+Array = NDArray[np.float64]
+
+MANY = 20
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(st.integers(0, 10 ** 6), st.booleans(), st.booleans())
+def test_times_the_parameters_it_is_the_inverse_dynamics(
+        seed: int, moving: bool, actuators: bool) -> None:
+    random = rng(seed)
+    p = random_parameters(random, actuators)
+    motion = random_motion(p, random, MANY)
+    base = random_base_motion(p, random, MANY) if moving else None
+    platform = StewartPlatform(p)
+    forces = platform.inverse_dynamics(motion, base=base).forces
+    own = platform.regressor(motion, base).matrix @ linear_parameters(p)
+    assert np.max(np.abs(own - forces).max(axis=1) / np.abs(forces).max(axis=1)) < 1e-12
+
+
+@pytest.mark.parametrize('moving', [False, True])
+def test_pinocchio_has_the_same_forces(moving: bool) -> None:
+    random = rng(7)
+    p = random_parameters(random)
+    motion = random_motion(p, random, MANY)
+    base = random_base_motion(p, random, MANY) if moving else None
+    forces = StewartPlatform(p).regressor(motion, base).matrix @ linear_parameters(p)
+    referee = PinocchioReferee(p, random)
+    for n in range(MANY):
+        truth = referee.forces(motion[n], np.zeros(6), None if base is None else base[n])
+        assert np.abs(forces[n] - truth).max() < 1e-10 * np.abs(truth).max()
+
+
+def test_each_column_is_the_force_of_one_unit_of_its_parameter() -> None:
+    # By finite differences of the inverse dynamics in the parameters of the file.
+    random = rng(3)
+    p = random_parameters(random)
+    motion = random_motion(p, random, MANY)
+    matrix = StewartPlatform(p).regressor(motion).matrix
+    start = linear_parameters(p)
+    for n in (0, 2, 5, 9, *(kind.start + 4 for kind in (
+            CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS,
+            VISCOUS_FRICTION, COULOMB_FRICTION))):
+        def forces(step: float, n: int = n) -> Array:
+            theta = start.copy()
+            theta[n] += step
+            changed = p.replaced(parameter_values(theta, p))
+            return StewartPlatform(changed).inverse_dynamics(motion).forces
+
+        column = derivative(forces, 1e-3 * abs(start[n]))
+        np.testing.assert_allclose(matrix[..., n], column, rtol=1e-8,
+                                   atol=1e-8 * np.abs(column).max())
+    np.testing.assert_array_equal(matrix[..., OFFSET], np.broadcast_to(np.eye(6), (MANY, 6, 6)))
+
+
+def test_what_no_motion_can_tell() -> None:
+    random = rng(4)
+    p = random_parameters(random)
+    matrix = StewartPlatform(p).regressor(random_motion(p, random, MANY)).matrix
+    assert not matrix[..., CYLINDER_MASS].any()
+    np.testing.assert_array_equal(matrix[..., CYLINDER_SECOND], matrix[..., PISTON_SECOND])
+
+
+def test_one_sample_and_any_shape_are_the_same_bits() -> None:
+    random = rng(5)
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = random_motion(p, random, 12)
+    whole = platform.regressor(motion)
+    assert whole.matrix.shape == (12, 6, LINEAR)
+    assert len(whole.names) == len(set(whole.names)) == len(UNITS) == LINEAR
+    assert repr(whole).startswith('<Regressor of shape (12, 6, 70): platform.mass, ')
+    np.testing.assert_array_equal(platform.regressor(motion[3]).matrix, whole.matrix[3])
+    square = platform.regressor(Motion.of_rows(motion.rows.reshape(3, 4, -1)))
+    np.testing.assert_array_equal(square.matrix.reshape(12, 6, LINEAR), whole.matrix)
+
+
+def test_large_batches_are_divided_without_a_change() -> None:
+    random = rng(6)
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion = random_motion(p, random, 9001)
+    whole = platform.regressors(motion.rows)
+    np.testing.assert_array_equal(whole[::997], platform.regressors(motion.rows[::997]))
+
+
+def test_uncompiled_code_gives_the_same_bits() -> None:
+    assert len(printed_compiled_and_not(
+        'import numpy as np\n'
+        'from referees import *\n'
+        'from stewart_dynamics import StewartPlatform\n'
+        'random = rng(8)\n'
+        'p = random_parameters(random)\n'
+        'motion = random_motion(p, random, 3)\n'
+        'base = random_base_motion(p, random, 3)\n'
+        'for b in None, base:\n'
+        '    print(StewartPlatform(p).regressor(motion, b).matrix.tobytes().hex())\n')) == 1
+
+
+def test_names_of_the_legs_are_the_file_s() -> None:
+    p = symmetric_parameters().replaced({'joints': ['a', 'b', 'c', 'd', 'e', 'f']})
+    names = names_of(p)
+    assert names[PLATFORM][:2] == ('platform.mass', 'platform.first_moment.x')
+    assert names[VISCOUS_FRICTION][1] == 'actuator.viscous_friction.b'
+    assert names[OFFSET][5] == 'effort_offset.f'
+
+
+def test_singular_and_wrong_motions_are_rejected() -> None:
+    platform = StewartPlatform(symmetric_parameters())
+    with pytest.raises(SingularityError, match='sample 0: J_inv cannot be solved'):
+        platform.regressor(Motion([[0.0, 0.0, 1.0]], [QUARTER_TURN]))
+    with pytest.raises(MotionError):
+        platform.regressor(Motion([0.0, 0.0, 1.0], np.eye(3), [1e200, 0.0, 0.0]))
+    with pytest.raises(MotionError, match='must be a Motion'):
+        platform.regressor(3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize('hexapod', range(5))
+def test_parameters_come_back_from_their_linear_form(hexapod: int) -> None:
+    p = random_parameters(rng(hexapod))
+    values = parameter_values(linear_parameters(p), p)
+    for name, value in values.items():
+        np.testing.assert_allclose(value, p[name], rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+def test_what_is_no_body_is_rejected() -> None:
+    p = random_parameters(rng(9))
+    theta = linear_parameters(p)
+
+    def changed(at: int, value: float) -> Array:
+        other = theta.copy()
+        other[at] = value
+        return other
+
+    for at, value, text in ((0, 0.0, 'platform.mass: 0 kg: must be more than 0'),
+                            (PISTON_MASS.start + 2, -1.0, 'legs.piston of leg_3: mass -1 kg'),
+                            (CYLINDER_MASS.start, 0.0, 'legs.cylinder of leg_1: mass 0 kg'),
+                            (PISTON_SECOND.start + 5, 1e-6, 'legs.piston of leg_6')):
+        with pytest.raises(ParameterError, match=text):
+            parameter_values(changed(at, value), p)
+
+
+def test_parts_without_mass_keep_their_center_of_mass() -> None:
+    p = Parameters({**symmetric_parameters().given, 'legs.piston.mass': 0.0,
+                    'legs.piston.inertia': 0.0})
+    values = parameter_values(linear_parameters(p), p)
+    np.testing.assert_array_equal(values['legs.piston.center_of_mass'],
+                                  p['legs.piston.center_of_mass'])
+    assert not values['legs.piston.inertia'].any()
