@@ -79,6 +79,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
     _legs('actuator.coulomb_friction',
           'Coulomb friction along the leg; linear at rates below 1 mm/s', 'N', minimum=0.0),
+    _legs('actuator.screw_lead', 'travel of a leg in one turn of its motor; used by '
+          'stewart_identify alone, where efforts are torques', 'm', (), minimum=0.0, above=True),
     Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
               'base.source is pose or motion; not used where it is imu', 'm/s^2',
               STANDARD_GRAVITY, sizes=(3,)),
