@@ -174,6 +174,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('external_wrench.moment_max', 'double', "external moment at the platform's origin "
               'above which diagnostics report an ERROR; none: not checked', 'N m', minimum=0.0,
               above=True, while_active=True),
+    Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
+              'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
     *_meshes(),
     Parameter('visualization_rate', 'double', 'maximum rate of ~/markers; 0: off', 'Hz', 30.0,
               minimum=0.0),
