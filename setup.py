@@ -52,6 +52,7 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.2',
     ],
+    'mujoco': ['mujoco>=3.2'],
     'parquet': ['pyarrow>=14'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
@@ -75,6 +76,7 @@ extras_require = {
         'matplotlib',
         'mcap',
         'mcap-ros2-support',
+        'mujoco',
         'mypy',
         'packaging',
         'pin',
@@ -97,7 +99,8 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['templates/*']},
+    package_data={package_name: ['py.typed'], f'{package_name}.identification': ['templates/*'],
+                  f'{package_name}.replay': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),
@@ -117,7 +120,9 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
+            'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.nodes.console_scripts:dynamics',
+            'stewart_identify = stewart_dynamics.identification:main',
             'stewart_replay = stewart_dynamics.replay:main',
             'stewart_simulator = stewart_dynamics.nodes.console_scripts:simulator',
             'stewart_trajectory = stewart_dynamics.nodes.console_scripts:trajectory',

@@ -20,7 +20,7 @@ The check, the node's declaration, ``--help`` and the documents are all made fro
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 import math
 from types import MappingProxyType
 from typing import Any
@@ -41,6 +41,20 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 
 def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
     return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
+
+
+def _meshes() -> Iterator[Parameter]:
+    for part, body in (('base', 'base'), ('platform', 'platform'), ('cylinder', 'each cylinder'),
+                       ('piston', 'each piston')):
+        axes = {'base': 'base frame', 'platform': 'platform frame'}.get(
+            part, 'z along the leg, from the ' + (
+                'base joint' if part == 'cylinder' else 'platform joint'))
+        yield Parameter(f'meshes.{part}', 'string', f'file of the mesh of {body}, as '
+                        'stewart_describe writes it; empty: a simple shape', default='')
+        yield Parameter(f'meshes.{part}_offset', 'double', 'x y z, and roll pitch yaw, of this '
+                        f'mesh; {axes}', 'm, rad', (0.0,) * 6, sizes=(6,))
+    yield Parameter('meshes.scale', 'double', 'scale of all meshes; 0.001 for files in mm', '',
+                    1.0, minimum=0.0, above=True)
 
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
@@ -86,6 +100,8 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
     _legs('actuator.coulomb_friction',
           'Coulomb friction along the leg; linear at rates below 1 mm/s', 'N', minimum=0.0),
+    _legs('actuator.screw_lead', 'travel of a leg in one turn of its motor; used by '
+          'stewart_identify alone, where efforts are torques', 'm', (), minimum=0.0, above=True),
     Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
               'base.source is pose or motion; not used where it is imu', 'm/s^2',
               STANDARD_GRAVITY, sizes=(3,)),
@@ -158,6 +174,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('external_wrench.moment_max', 'double', "external moment at the platform's origin "
               'above which diagnostics report an ERROR; none: not checked', 'N m', minimum=0.0,
               above=True, while_active=True),
+    Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
+              'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
+    *_meshes(),
     Parameter('visualization_rate', 'double', 'maximum rate of ~/markers and ~/joint_states; 0: '
               'off', 'Hz', 30.0, minimum=0.0),
     Parameter('publish_tf', 'bool', 'publish the transform from base_frame to platform_frame on '

@@ -87,9 +87,9 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
             for line in lines]
 
 
-def measured_headline(measured: Mapping[str, Any]) -> list[str]:
+def measured_headline(measured: Mapping[str, Any]) -> str:
     """
-    Return what accounts for the difference between measured and computed forces.
+    Return by how much measured and computed forces differ.
 
     Parameters
     ----------
@@ -98,45 +98,24 @@ def measured_headline(measured: Mapping[str, Any]) -> list[str]:
 
     """
     if not measured['setpoints_compared']:
-        return ['no setpoint could be compared']
-    lines = []
-    if measured['mass']['unmodelled_kg'] is not None:
-        lines.append(f'{measured["mass"]["unmodelled_kg"]:.4g} kg in addition on the platform '
-                     f'account for {100.0 * measured["mass"]["share"]:.0f} % of the residual '
-                     'force')
-    legs = measured['legs'].values()
-    found = [leg for leg in legs if leg['coulomb_friction_n'] is not None]
-    if found:
-        lines.append(f'friction in addition to the parameters, in {len(found)} of {len(legs)} '
-                     f'legs: Coulomb {_span(found, "coulomb_friction_n")} N, viscous '
-                     f'{_span(found, "viscous_friction_n_s_m")} N s/m')
-    if not lines:
-        largest = max(leg['residual_rms_n'] for leg in legs)
-        lines.append('neither a mass on the platform nor friction accounts for half of the '
-                     f'residual; its RMS is at most {largest:.3g} N')
-    return lines
-
-
-def _span(legs: Sequence[Mapping[str, Any]], key: str) -> str:
-    values = [leg[key] for leg in legs]
-    # without the rounding error of zero
-    texts = (f'{round(value, 6) + 0.0:.4g}' for value in (min(values), max(values)))
-    return ' to '.join(dict.fromkeys(texts))
+        return 'no setpoint could be compared'
+    worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())
+    share = '' if measured['residual_share'] is None else (
+        f', {100.0 * measured["residual_share"]:.3g} % of the measured force')
+    return (f'measured and computed forces differ by {measured["residual_rms_n"]:.3g} N RMS'
+            f'{share}; most in {leg}, by {worst:.3g} N')
 
 
 def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
     """Return the result of the comparison with measured forces, the headline first."""
-    lines = [f'measured: {text}' for text in measured['headline']]
+    lines = [measured['headline']]
     if not measured['setpoints_compared']:
         return lines
-    lines += [f'  {leg}: Coulomb {found["coulomb_friction_n"]:.4g} N, viscous '
-              f'{found["viscous_friction_n_s_m"]:.4g} N s/m'
-              for leg, found in measured['legs'].items()
-              if found['coulomb_friction_n'] is not None]
     rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
-                    measured['legs'].items() if found['residual_rms_n'] is not None)
-    lines.append(f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
-                 f'force, RMS [N]: {rms or "none"}')
+                    measured['legs'].items())
+    lines += [f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
+              f'force, RMS [N]: {rms}',
+              'stewart_identify finds the payload and friction that fit the measured forces']
     contacts = measured['contacts']
     lines += [f'contact from t = {each["from_s"]:.2f} to {each["to_s"]:.2f} s: external force '
               f'({", ".join(f"{part:.1f}" for part in each["force_n"])}) N'
