@@ -28,7 +28,7 @@ from messages import STORE
 import numpy as np
 import pytest
 from referees import rng
-from running import DynamicsNode, NODE, NodeProcess, rejected, ROOT, Sample
+from running import DynamicsNode, executable, NODE, NodeProcess, Program, ROOT, Sample
 from sensor_msgs.msg import JointState
 from stewart_dynamics import Motion, Pose
 from stewart_dynamics.runtime.model_messages import JOINT_STATES, MODEL_TYPES, TF
@@ -187,8 +187,7 @@ def test_each_setpoint_has_its_transform(with_tf2: dict[str, str], tmp_path: Pat
     else:
         TFMessage = MarkerArray  # noqa: N806
     random = rng()
-    with closing(NodeProcess(tmp_path, 'publish_tf:=true', 'base_frame:=base',
-                             environment=with_tf2)) as process:
+    with closing(NodeProcess(tmp_path, 'publish_tf:=true', **with_tf2)) as process:
         with closing(DynamicsNode(process)) as node:
             node.until_active()
             raw = node.peer.listen(TF, TFMessage)
@@ -221,6 +220,12 @@ def test_each_setpoint_has_its_transform(with_tf2: dict[str, str], tmp_path: Pat
 
 @pytest.mark.skipif(HAVE_TF2, reason='tf2_msgs is installed')
 def test_without_tf2_msgs_publish_tf_is_rejected(domain: int, tmp_path: Path) -> None:
-    line = rejected(domain, tmp_path, '--params-file', ROOT / 'config' / 'platform.yaml', '-p',
-                    'publish_tf:=true')
-    assert 'publish_tf: true: needs the ROS package tf2_msgs, which is not installed' in line
+    program = Program([
+        executable('stewart_dynamics'), '--ros-args', '--params-file',
+        ROOT / 'config' / 'platform.yaml', '-p', 'publish_tf:=true'], domain, tmp_path)
+    try:
+        assert program.wait() == 1, program.stderr
+    finally:
+        program.kill()
+    assert 'publish_tf: true: needs the ROS package tf2_msgs, which is not installed' in (
+        program.stderr.splitlines()[-1])
