@@ -424,7 +424,7 @@ def bound(program: Program) -> set[str]:
 def shares_memory(program: Program) -> bool:
     """Return whether a program has the shared memory of Fast DDS."""
     maps = (Path('/proc') / str(program.process.pid) / 'maps').read_text()
-    return '/dev/shm/fastrtps' in maps
+    return '/dev/shm/fastrtps' in maps or '/dev/shm/fastdds' in maps
 
 
 def flows(receiver: Partner, mark: int, more: int = 20) -> Callable[[], bool]:
