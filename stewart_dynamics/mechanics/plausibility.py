@@ -106,10 +106,11 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         if geometry:
             reach = reach_of(parameters, shape)
             found += _legs(parameters, shape, reach)
-            odd = [*_symmetry(parameters)]
-            found += odd
-            if not (sizes or odd):  # else what follows from a wrong unit or joint
-                found += (tuple(_singular(parameters, shape, reach))
+            odd = tuple(_symmetry(parameters))
+            if len(odd) == 1:
+                found += odd
+            elif not sizes:  # else what follows from a wrong unit
+                found += (tuple(_singular(parameters, shape, reach)) or odd
                           or _order(parameters, shape, reach))
     return tuple(found)
 
