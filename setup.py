@@ -99,7 +99,8 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.replay': ['templates/*']},
+    package_data={package_name: ['py.typed'], f'{package_name}.identification': ['templates/*'],
+                  f'{package_name}.replay': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),
@@ -121,6 +122,7 @@ setup(
         'console_scripts': [
             'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.nodes.console_scripts:dynamics',
+            'stewart_identify = stewart_dynamics.identification:main',
             'stewart_replay = stewart_dynamics.replay:main',
             'stewart_simulator = stewart_dynamics.nodes.console_scripts:simulator',
             'stewart_trajectory = stewart_dynamics.nodes.console_scripts:trajectory',

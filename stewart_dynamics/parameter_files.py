@@ -170,9 +170,9 @@ def check_given(name: str, value: Any, source: str) -> None:
         raise ParameterError(f'{source}: {name}: {shown(value)}: must be a bool')
 
 
-def write_yaml(path: str | Path, values: Mapping[str, Any], units: Mapping[str, str]) -> None:
+def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[str, str]) -> None:
     """
-    Write a ROS parameter file for any node, with units as comments.
+    Write a ROS parameter file for any node, with comments.
 
     Parameters
     ----------
@@ -180,8 +180,8 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], units: Mapping[str, 
         The file; an existing one is replaced.
     values : mapping of dotted name to value
         Texts, doubles, bools, or tuples of them; a tuple of length 1 is written as a single value.
-    units : mapping of dotted name to str
-        Empty where there is no unit.
+    comments : mapping of dotted name to str
+        Behind the values: units and more; empty where there is none.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], units: Mapping[str, 
         group = tree
         for each in groups:
             group = group.setdefault(each, {})
-        group[last] = value, units[name]
+        group[last] = value, comments[name]
     try:
         lines = ['/**:', '  ros__parameters:', *_lines(tree, '    ')]
         Path(path).write_text('\n'.join(lines) + '\n', encoding='utf-8')
@@ -211,9 +211,9 @@ def _lines(tree: Mapping[str, Any], indent: str) -> Iterator[str]:
             yield f'{indent}{name}:'
             yield from _lines(content, f'{indent}  ')
             continue
-        value, unit = content
+        value, text = content
         entries = [_written(each) for each in (value if isinstance(value, tuple) else (value,))]
-        comment = f'  # {unit}' if unit else ''
+        comment = f'  # {text}' if text else ''
         if len(entries) == 1:
             yield f'{indent}{name}: {entries[0]}{comment}'
         elif len(entries) <= _LONGEST_ROW:

@@ -142,11 +142,18 @@ class ParameterSet(Mapping[str, Any]):
         """
         return cls(read_yaml(path, node or cls.node), str(path), exact_types=True)
 
-    def to_yaml(self, path: str | Path) -> None:
+    def to_yaml(self, path: str | Path, comments: Mapping[str, str] | None = None) -> None:
         """
         Write a complete ROS parameter file, for any node (``/**:``), that reads back equal.
 
         An existing file is replaced.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        comments : mapping of name to str, optional
+            What is written behind the unit of a parameter.
 
         Raises
         ------
@@ -156,9 +163,11 @@ class ParameterSet(Mapping[str, Any]):
         """
         values = {name: self._given.get(name, parameter.default)
                   for name, parameter in self.table.items()}
-        units = {name: parameter.unit for name, parameter in self.table.items()}
+        added = comments or {}
+        texts = {name: '; '.join(filter(None, (parameter.unit, added.get(name))))
+                 for name, parameter in self.table.items()}
         write_yaml(path, {name: value for name, value in values.items()
-                          if value is not None and value != ()}, units)
+                          if value is not None and value != ()}, texts)
 
     @classmethod
     def check_file(cls, path: str | Path) -> None:

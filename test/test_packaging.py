@@ -253,7 +253,7 @@ def test_flake8_has_the_settings_of_ament_and_no_milder_ones() -> None:
         'extend-ignore': 'B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202',
         'import-order-style': 'google', 'max-line-length': '99', 'show-source': 'true',
         'statistics': 'true', 'docstring-convention': 'all', 'property-decorators': '',
-        'exclude': '.cache,.git,.venv,build,install,log'}
+        'exclude': '.cache,.git,.venv,.venv-*,build,install,log'}
 
 
 def test_no_module_has_the_name_of_one_of_python() -> None:

@@ -26,13 +26,17 @@ import base64
 from collections.abc import Sequence
 import functools
 import hashlib
+import importlib.util
 import math
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+import numpy as np
+from numpy.typing import ArrayLike
+from stewart_dynamics.errors import StewartError
 
-_FOLDER = Path(__file__).with_name('templates')
+FOLDER = Path(__file__).with_name('templates')
 
 # Between thousands: a narrow space that does not break, as SI recommends.
 _THIN_SPACE = '\u202f'
@@ -65,9 +69,9 @@ def _typeset(text: str) -> str:
     return text.replace(',', _THIN_SPACE).replace('-', '−')
 
 
-@functools.lru_cache(maxsize=1)
-def _environment() -> Environment:
-    made = Environment(loader=FileSystemLoader(_FOLDER), autoescape=True,
+@functools.lru_cache(maxsize=2)
+def _environment(folder: Path) -> Environment:
+    made = Environment(loader=FileSystemLoader(folder), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
     made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr)
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
@@ -76,7 +80,8 @@ def _environment() -> Environment:
     return made
 
 
-def page(template: str, scripts: Sequence[str] = (), shared: bool = False, **values: Any) -> str:
+def page(template: str, scripts: Sequence[str] = (), shared: bool = False,
+         folder: Path = FOLDER, **values: Any) -> str:
     """
     Return a page.
 
@@ -88,18 +93,41 @@ def page(template: str, scripts: Sequence[str] = (), shared: bool = False, **val
         Other scripts that the page is allowed to run.
     shared : bool
         The page is allowed to run scripts in files.
+    folder : Path
+        Where the template is.
     values : mapping
         Variables of the template.
 
     """
-    script, style = (_FOLDER.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
+    script, style = (folder.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
                      for suffix in ('.js', '.css'))
     script = f'\n{script}'
     hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script)),
                        *(["'self'"] if shared else [])])
-    return _environment().get_template(f'{template}.html').render(
+    return _environment(folder).get_template(f'{template}.html').render(
         hashes=hashes, script=script, style=style, **values)
 
 
 def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def base64_of(numbers: ArrayLike, kind: str) -> str:
+    """Return numbers as a typed array, in base64."""
+    return base64.b64encode(np.ascontiguousarray(numbers, dtype=kind).tobytes()).decode()
+
+
+@functools.lru_cache(maxsize=1)
+def plotly_script() -> str:
+    """Return plotly.js; the package plotly is not imported."""
+    found = importlib.util.find_spec('plotly')
+    for folder in found.submodule_search_locations or () if found else ():
+        try:
+            script = (Path(folder) / 'package_data' / 'plotly.min.js').read_text(encoding='utf-8')
+        except OSError:
+            continue
+        # A browser reads line ends as \n, and ends a script at the first of these.
+        script = script.replace('\r\n', '\n').replace('\r', '\n')
+        return script.replace('</script', r'<\/script').replace('<!--', r'<\!--')
+    raise StewartError('the report needs plotly, which is not installed: pip install plotly, or '
+                       'use --no-report')

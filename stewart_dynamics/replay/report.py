@@ -22,25 +22,20 @@ base64 of typed arrays.
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
-import functools
 import hashlib
-import importlib.util
 import os
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import StewartError
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay import report_plots as channels
 from stewart_dynamics.replay.force_sources import sources_of
-from stewart_dynamics.replay.html_pages import page
+from stewart_dynamics.replay.html_pages import base64_of, page, plotly_script
 from stewart_dynamics.replay.plot_curves import Curves, Frames
 from stewart_dynamics.replay.report_plots import (
     base_wrench_plots, COLORS, measured_plots, motion_plots, spectrum_plots)
@@ -114,8 +109,9 @@ class Report:
         rows[channels.DETERMINANT] = outputs.determinants
         rows[channels.CONDITION] = outputs.conditions
         rows[channels.BASE_WRENCH] = base_wrenches.T
-        parts = rows[channels.BREAKDOWN]
+        parts = rows[channels.BREAKDOWN.start:channels.joint_angles_of(self._parameters).start]
         parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
+        rows[channels.joint_angles_of(self._parameters)] = np.degrees(outputs.joint_angles).T
         self._curves.add(seconds, rows)
         self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
         self._frames.add(seconds, np.concatenate(
@@ -157,7 +153,7 @@ class Report:
         Raises StewartError if plotly is not installed.
 
         """
-        script = _plotly() if plotly is None else ''
+        script = plotly_script() if plotly is None else ''
         text = page(
             'report', [script] if script else [], plotly is not None, s=summary,
             p=self._parameters, legs=list(self._legs),
@@ -204,7 +200,7 @@ class Report:
             'colors': COLORS,
             'baseJoints': p['geometry.base_joints'].tolist(),
             'platformJoints': p['geometry.platform_joints'].tolist(),
-            'frames': {'times': _base64(times, '<f8'), 'numbers': _base64(frames, '<f8')},
+            'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},
             'warnings': singularity['warnings_from_to_s'],
             'crossings': singularity['crossings_at_s'],
             'allWarnings': singularity['warnings'],
@@ -231,16 +227,12 @@ def _curve(curves: Curves, channel: int) -> dict[str, str]:
 
 def _packed(times: Array, values: Array) -> dict[str, str]:
     most = float(np.finfo(np.float32).max)
-    return {'times': _base64(times, '<f8'), 'values': _base64(values.clip(-most, most), '<f4')}
-
-
-def _base64(numbers: ArrayLike, kind: str) -> str:
-    return base64.b64encode(np.ascontiguousarray(numbers, dtype=kind).tobytes()).decode()
+    return {'times': base64_of(times, '<f8'), 'values': base64_of(values.clip(-most, most), '<f4')}
 
 
 def share_plotly(folder: Path) -> Path:
     """Write plotly.js into a folder, if it is not there; return its path."""
-    script = _plotly().encode()
+    script = plotly_script().encode()
     path = folder.absolute() / f'plotly-{hashlib.sha256(script).hexdigest()[:12]}.min.js'
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -248,19 +240,3 @@ def share_plotly(folder: Path) -> Path:
         partial.write_bytes(script)
         partial.replace(path)
     return path
-
-
-@functools.lru_cache(maxsize=1)
-def _plotly() -> str:
-    """Return plotly.js; the package plotly is not imported."""
-    found = importlib.util.find_spec('plotly')
-    for folder in found.submodule_search_locations or () if found else ():
-        try:
-            script = (Path(folder) / 'package_data' / 'plotly.min.js').read_text(encoding='utf-8')
-        except OSError:
-            continue
-        # A browser reads line ends as \n, and ends a script at the first of these.
-        script = script.replace('\r\n', '\n').replace('\r', '\n')
-        return script.replace('</script', r'<\/script').replace('<!--', r'<\!--')
-    raise StewartError('the report needs plotly, which is not installed: pip install plotly, or '
-                       'replay with --no-report')

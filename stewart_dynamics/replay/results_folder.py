@@ -31,19 +31,32 @@ from pathlib import Path
 import re
 import shutil
 import tempfile
-from typing import Any
+from typing import Any, Protocol
 
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.replay.options import Options
 
+RESULT = 'summary.json'
+"""The file by which a folder is known as results of a replay."""
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(
     rf'(\..+\.)(?:[0-9a-f]{{32}}|one)\.partial\.\w{{8}}(?:{re.escape(_REPLACED)})?', re.DOTALL)
 
 
+class Writing(Protocol):
+    """Options of what writes the folder."""
+
+    @property
+    def force(self) -> bool:
+        """Return whether existing results are replaced."""
+
+    @property
+    def run(self) -> str:
+        """Return the identifier of the run."""
+
+
 @contextmanager
-def whole_folder(final: Path, options: Options) -> Iterator[Path]:
+def whole_folder(final: Path, options: Writing, result: str = RESULT) -> Iterator[Path]:
     """Yield a folder that gets its final name only when it is complete."""
     final.parent.mkdir(parents=True, exist_ok=True)
     partial, lock = _new_folder(final, options.run)
@@ -53,7 +66,7 @@ def whole_folder(final: Path, options: Options) -> Iterator[Path]:
         partial.chmod(0o755)
         # Existing results are kept until their replacement is complete.
         if final.exists():
-            check_free(final, options)
+            check_free(final, options, result)
             final.rename(replaced)
         partial.rename(final)
     finally:
@@ -133,15 +146,15 @@ def _beginning(final: Path) -> str:
     return f'.{short}.'
 
 
-def check_free(folder: Path, options: Options) -> None:
+def check_free(folder: Path, options: Writing, result: str = RESULT) -> None:
     """Raise BagError if results must not be written there."""
     if not folder.exists():
         return
     if not options.force:
         raise BagError(f'{folder}: exists already; --force replaces results')
-    if not (folder / 'summary.json').is_file():
-        raise BagError(f'{folder}: exists already and is not a folder of replay results: it is '
-                       'not replaced')
+    if not (folder / result).is_file():
+        raise BagError(f'{folder}: exists already and is not a folder of results, with a '
+                       f'{result}: it is not replaced')
 
 
 def write_json(path: Path, document: Any) -> None:

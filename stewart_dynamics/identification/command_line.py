@@ -1,0 +1,197 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of stewart_identify."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import io
+from pathlib import Path
+import re
+import signal
+import sys
+
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification.options import CUTOFF, HOLD_OUT, Options
+from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
+from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
+from stewart_dynamics.replay.unexpected_errors import unexpected
+
+_INTERRUPTED = 130
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    given = _arguments().parse_args(arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
+            stream.reconfigure(errors='backslashreplace')
+    try:
+        return _run(given)
+    except StewartError as exc:
+        _complain(exc)
+        return BAD_INPUT
+    except OSError as exc:  # what cannot be read is a StewartError
+        where = f'{exc.filename}: ' if exc.filename else ''
+        _complain(f'{where}cannot be written: {exc.strerror or exc}')
+        return BAD_INPUT
+    except Exception as exc:  # exit codes and one line also for errors that no rule covers
+        _complain(unexpected(exc))
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _complain('interrupted')
+        return _INTERRUPTED
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='stewart_identify', formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Identify mass, center of mass, inertia and friction of a hexapod from the '
+                    'measured legs of recorded motions.',
+        epilog='DIR/ gets identified.yaml (the whole parameter file, for the node), '
+               'identification.json and report.html.\n\nexit codes: 0 done; 1 with --strict, '
+               'when the motion does not tell everything that was asked for;\n2 bad arguments, '
+               'parameters or bags, or a likely mistake; 3 part of a bag could not be read, the '
+               'rest is done; 130 interrupted')
+    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
+                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
+                             'with bags in it; several are of one and the same hexapod')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the hexapod as far as they are known, the file that '
+                             'the node takes')
+    parser.add_argument('--output', type=Path, default=Path('identified'), metavar='DIR',
+                        help='folder of the results (default: identified)')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when the motion does not tell everything that was '
+                             'asked for')
+    parser.add_argument('--no-report', action='store_true', help='write no report.html')
+    topics = parser.add_argument_group('topics')
+    topics.add_argument('--node', default=NODE, metavar='NAME', type=_node,
+                        help=f'name before the usual topic, NAME/measured_legs (default: {NODE})')
+    topics.add_argument('--measured', metavar='TOPIC',
+                        help='JointState with positions and efforts, and rates where they are')
+    topics.add_argument('--efforts', metavar='TOPIC',
+                        help='another JointState with the efforts, at stamps of its own')
+    what = parser.add_argument_group('what is identified, and how')
+    what.add_argument('--identify', type=_kinds, default=DEFAULT, metavar='LIST',
+                      help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)})')
+    what.add_argument('--motor-torque', action='store_true',
+                      help='efforts are torques of the motors [N m]; needs actuator.screw_lead')
+    what.add_argument('--cutoff', type=_frequency, default=CUTOFF, metavar='HZ',
+                      help='cut-off frequency of the filter on both sides of the regression '
+                           f'(default: {CUTOFF:g}): above the frequencies of the motion')
+    what.add_argument('--prior', type=_part, metavar='PART',
+                      help="the file's values count, as if known to this part of their size")
+    what.add_argument('--hold-out', type=_held, default=HOLD_OUT, metavar='PART',
+                      help='end of each bag that validates a fit to the rest; 0: none '
+                           f'(default: {HOLD_OUT:g})')
+    what.add_argument('--no-delay', action='store_true',
+                      help='efforts are not delayed; by default the delay is estimated')
+    what.add_argument('--accept-mistakes', action='store_true',
+                      help='write results although a mistake is likely')
+    return parser
+
+
+def _run(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.compilation.entry_point import prepare
+    from stewart_dynamics.compilation.machine_code import HINT
+    from stewart_dynamics.identification.one_run import FUNCTIONS, run
+    from stewart_dynamics.identification.text import result_text
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters import Parameters
+    from stewart_dynamics.replay.bags import find_bags
+
+    for each in _SIGNALS:
+        signal.signal(each, _interrupted)
+    options = Options(
+        given.node, given.measured, given.efforts, given.identify, given.motor_torque,
+        given.cutoff, given.prior, given.hold_out, not given.no_delay, given.accept_mistakes,
+        not given.no_report, given.force)
+    parameters = Parameters.from_yaml(given.params, given.node)
+    bags = [bag for path in given.bags for bag in find_bags(path, given.output)]
+    if HINT:
+        print(f'stewart_identify: {HINT}', file=sys.stderr)
+    prepare(FUNCTIONS)
+    for mistake in likely_mistakes(parameters):
+        _complain(f'warning: {mistake}')
+    result = run(bags, parameters, given.output, options, _complain)
+    print(_printable(result_text(result)))
+    print(_printable(f'results: {given.output}'))
+    missing = [f'{bag["bag"]}: part of it could not be read: {"; ".join(bag["missing"])}'
+               for bag in result['bags'] if bag['missing']]
+    for text in missing:
+        _complain(text)
+    if missing:
+        return PARTLY_READ
+    everything = all(each['state'] == 'identified' and not each['at_bound']
+                     for each in result['parameters'])
+    return LIMIT_MET if given.strict and not everything else DONE
+
+
+def _interrupted(number: int, frame: object) -> None:
+    """Stop; further signals are ignored while partial results are removed."""
+    for each in _SIGNALS:
+        signal.signal(each, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def _complain(what: object) -> None:
+    print(f'stewart_identify: {_printable(" ".join(str(what).split()))}', file=sys.stderr)
+
+
+def _printable(text: str) -> str:
+    """Return text in which control characters, as names in bags may hold, are escaped."""
+    return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)
+
+
+def _node(text: str) -> str:
+    name = '/' + text.strip('/')
+    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
+        raise argparse.ArgumentTypeError(f'{text!r}: not a valid node name')
+    return name
+
+
+def _kinds(text: str) -> tuple[str, ...]:
+    kinds = tuple(dict.fromkeys(each.strip() for each in text.split(',') if each.strip()))
+    for kind in kinds:
+        if kind not in KINDS:
+            raise argparse.ArgumentTypeError(
+                f'{kind!r}: cannot be identified; known are {", ".join(KINDS)}')
+    if not kinds:
+        raise argparse.ArgumentTypeError('names nothing')
+    return kinds
+
+
+def _frequency(text: str) -> float:
+    return _between(text, 0.1, 1000.0)
+
+
+def _part(text: str) -> float:
+    return _between(text, 1e-6, 1e3)
+
+
+def _held(text: str) -> float:
+    return _between(text, 0.0, 0.9)
+
+
+def _between(text: str, least: float, most: float) -> float:
+    value = float(text)
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least {least:g}, at most {most:g}')
+    return value

@@ -1,0 +1,196 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From a window of recorded legs to regressor and efforts, filtered alike and at a lower rate.
+
+Lengths are filtered with a wide band and differentiated, forward kinematics and J_inv make the
+motion of it, and the regressor is computed at the full rate. Then the same narrow low-pass filter
+takes the regressor and the efforts to a lower rate: as f = Y theta holds before, it holds after.
+(Gautier, Venture: "Identification of standard dynamic parameters of robots with positive definite
+inertia matrix", IROS 2013, doi:10.1109/IROS.2013.6697198, section V.)
+
+Efforts are kept with their first derivatives, so that a delay shifts them later.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.identification.filters import (
+    convolved, decimated, LowPass, white_deviation)
+from stewart_dynamics.identification.kinematics import motions, poses
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# The wide band, by the narrow one; and samples for each period of the narrow cut-off.
+WIDE, SAMPLES = 2.5, 4.0
+# The transition of both, by the narrow cut-off.
+_TRANSITION = 1.0
+ORDERS = 4
+"""Efforts and so many of their derivatives less one."""
+# Of the limits [m]: nearer to them an end stop may be touched. Of force_max, as a part.
+_STOP, _SATURATED = 5e-5, 0.999
+# Samples of which the regressor is computed at once.
+_TOGETHER = 4096
+
+
+class Extract(NamedTuple):
+    """Regressor and efforts of N samples, filtered and at a lower rate."""
+
+    times: Array
+    """(N,) since the begin of the window [s]"""
+    regressor: Array
+    """(N, 6, n) of the linear parameters that depend on the unknowns"""
+    known: Array
+    """(N, 6) force of all other parameters [N]"""
+    efforts: Array
+    """(N, 6, ORDERS) and derivatives by time [N, N/s, ...]"""
+    sound: Flags
+    """(N, 6) whether nothing is wrong with what went into it"""
+    rates: Array
+    """(N, 6) of the legs [m/s]"""
+    deviations: tuple[float, float]
+    """Of the white noise of lengths [m] and of rates [m/s]; nan: none are measured."""
+    stops: int
+    """Recorded samples at an end stop or a force limit."""
+    end: Pose
+    """The last pose."""
+
+
+class Extraction:
+    """
+    Makes extracts of windows.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        With the parameters of the file.
+    unknowns : Unknowns
+        What is asked for.
+    period : float
+        Of the windows [s].
+    cutoff : float
+        Of the narrow band [Hz].
+
+    """
+
+    def __init__(self, platform: StewartPlatform, unknowns: Unknowns, period: float,
+                 cutoff: float) -> None:
+        self.platform, self._unknowns, self._period = platform, unknowns, period
+        self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
+        self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
+        self.cutoff = cutoff
+        self.step = max(1, int(1.0 / (SAMPLES * cutoff * period)))
+        self.margin = self._wide.half + self._narrow.half
+        """Samples at each end of a window that give no output."""
+
+    def __call__(self, window: Window, guess: Pose, noise: np.random.Generator | None = None,
+                 ) -> Extract:
+        """
+        Return the extract of a window.
+
+        Parameters
+        ----------
+        window : Window
+            Longer than twice the margin.
+        guess : Pose
+            Near the first.
+        noise : Generator, optional
+            Add as much noise to lengths and rates as there is in them.
+
+        """
+        deviations = self._deviations(window)
+        lengths, rates, accelerations = self._filtered(window, deviations, noise)
+        found = poses(self.platform, lengths, guess)
+        rows = motions(self.platform, found, rates, accelerations)
+        regressor, known = self._decimated(rows)
+        many, half = len(known), self._narrow.half
+        efforts = np.stack([decimated(
+            window.efforts[self._wide.half:-self._wide.half], self._narrow.taps(order), self.step)
+            for order in range(ORDERS)], axis=-1)
+        wrong, stops = self._wrong(window)
+        times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
+        at = half + self.step * np.arange(many)
+        return Extract(times, regressor, known, efforts, ~wrong[:many], rates[at], deviations,
+                       stops, Pose.of_rows(found.rows[-1]))
+
+    def _deviations(self, window: Window) -> tuple[float, float]:
+        of_lengths = float(np.sqrt(np.mean(white_deviation(window.positions) ** 2)))
+        if window.rates is None:
+            return of_lengths, float('nan')
+        # Whatever rates are off the derivative of the lengths by is noise, a wrong unit as well.
+        smooth = self._wide.taps(1), self._wide.taps()
+        off = convolved(window.rates, smooth[1]) - convolved(window.positions, smooth[0])
+        in_band = np.sqrt(2.0 * WIDE / SAMPLES / self.step)  # of white noise, what the band keeps
+        white = float(np.sqrt(np.mean(white_deviation(window.rates) ** 2)))
+        return of_lengths, max(white, float(np.sqrt(np.mean(off ** 2))) / max(in_band, 1e-3), 1e-9)
+
+    def _filtered(self, window: Window, deviations: tuple[float, float],
+                  noise: np.random.Generator | None) -> tuple[Array, Array, Array]:
+        """Return lengths, rates and accelerations of the legs, without a margin."""
+        positions, rates = window.positions, window.rates
+        positions = positions + self.platform.parameters['geometry.zero_length']
+        if noise is not None:
+            positions = positions + deviations[0] * noise.normal(size=positions.shape)
+            rates = None if rates is None else (
+                rates + deviations[1] * noise.normal(size=rates.shape))
+        derivatives = []
+        for order in range(3):
+            if rates is None:
+                derivatives.append(convolved(positions, self._wide.taps(order)))
+                continue
+            of_positions, of_rates = self._wide.fused(order, max(deviations[0], 1e-12),
+                                                      deviations[1])
+            derivatives.append(convolved(positions, of_positions) + convolved(rates, of_rates))
+        return derivatives[0], derivatives[1], derivatives[2]
+
+    def _decimated(self, rows: Array) -> tuple[Array, Array]:
+        """Return the regressor and the known forces of rows of motion, at the lower rate."""
+        taps, linear = self._narrow.taps(), self._unknowns.linear
+        fixed = self._unknowns.fixed
+        parts, known = [], []
+        # A part begins where the next output does.
+        stride = max(1, _TOGETHER // self.step) * self.step
+        last = len(rows) - len(taps)
+        for first in range(0, last + 1, stride):
+            end = min(first + stride - self.step, (last - first) // self.step * self.step + first)
+            matrix = self.platform.regressors(rows[first:end + len(taps)])
+            parts.append(decimated(matrix[..., linear], taps, self.step))
+            known.append(decimated(matrix @ fixed, taps, self.step))
+        return np.concatenate(parts), np.concatenate(known)
+
+    def _wrong(self, window: Window) -> tuple[Flags, int]:
+        """Return which outputs (N, 6) a wrong sample went into, and how many are at a stop."""
+        p = self.platform.parameters
+        lengths = window.positions + p['geometry.zero_length']
+        stopped = np.zeros(lengths.shape, dtype=bool)
+        for name, sign in (('limits.length_min', -1.0), ('limits.length_max', 1.0)):
+            if p[name] is not None:
+                stopped |= sign * (lengths - p[name]) > -_STOP
+        if p['limits.force_max'] is not None:
+            stopped |= np.abs(window.efforts) > _SATURATED * p['limits.force_max']
+        bad = (window.outliers | stopped)[self._wide.half:-self._wide.half]
+        # Two half waves of the cut-off: what is farther has a small part in the output.
+        reach = min(self._narrow.half, round(1.0 / (self._narrow.cutoff * self._period)))
+        sums = np.cumsum(np.concatenate([np.zeros((1, 6)), bad]), axis=0)
+        at = self._narrow.half + self.step * np.arange(
+            (len(bad) - 2 * self._narrow.half - 1) // self.step + 1)
+        wrong: Flags = sums[at + reach + 1] - sums[at - reach] > 0.0
+        return wrong, int(np.count_nonzero(stopped.any(axis=1)))

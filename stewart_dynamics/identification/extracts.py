@@ -1,0 +1,73 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Extracts of all windows in a temporary file, so that memory does not grow with the bags."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import tempfile
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.identification.extraction import Extract
+
+
+class Block(NamedTuple):
+    """What the fit needs of one window, N samples."""
+
+    number: int
+    bag: int
+    times: Array
+    """(N,) since the begin of the bag [s]"""
+    columns: Array
+    """(N, 6, n + 1 + ORDERS): regressor, known force, effort and its derivatives"""
+    sound: Flags
+    """(N, 6)"""
+    rates: Array
+    """(N, 6) [m/s]"""
+
+
+class Extracts:
+    """Extracts in the order in which they were added; may be read many times."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()
+        self._bags: list[int] = []
+        self.samples = 0
+
+    def add(self, bag: int, begin: float, extract: Extract) -> None:
+        """Add the extract of a window of a bag that begins at a time [s]."""
+        columns = np.concatenate(
+            [extract.regressor, extract.known[..., None], extract.efforts], axis=-1)
+        for array in (begin + extract.times, columns, extract.sound, extract.rates):
+            np.save(self._file, array)
+        self._bags.append(bag)
+        self.samples += len(extract.times)
+
+    def __iter__(self) -> Iterator[Block]:
+        """Read them."""
+        self._file.seek(0)
+        for number, bag in enumerate(self._bags):
+            yield Block(number, bag, *(np.load(self._file) for _ in range(4)))
+
+    def __len__(self) -> int:
+        """Return the number of windows."""
+        return len(self._bags)
+
+    def close(self) -> None:
+        """Remove the file."""
+        self._file.close()

@@ -1,0 +1,147 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Zero-phase filters of uniformly sampled signals, as symmetric FIR filters.
+
+Three of them take positions, and rates where they are measured, to positions, rates and
+accelerations of the same low-pass band. Where both are there, each frequency takes them by their
+noise: positions of white noise s_q give rates of noise w s_q, which is less than that of the rates
+s_v below w = s_v / s_q (Wiener's weights). Another takes any signal to a lower rate.
+
+The output at a time needs the input half a filter before and after it, and nothing else: so what
+is wrong with a sample spoils no more than that, and windows can be filtered one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+
+# Of Blackman's window: the width between its first zeros, in periods of its length.
+_TRANSITION = 5.5
+
+
+class LowPass(NamedTuple):
+    """
+    A low-pass filter of a sampling period.
+
+    Attributes
+    ----------
+    period : float
+        [s]
+    cutoff : float
+        Where the amplitude is a half [Hz].
+    half : int
+        Samples before and after that an output needs.
+
+    """
+
+    period: float
+    cutoff: float
+    half: int
+
+    @classmethod
+    def of(cls, period: float, cutoff: float, transition: float) -> LowPass:
+        """Return a filter whose amplitude falls from 1 to 0 in a band of some width [Hz]."""
+        return cls(period, cutoff, math.ceil(0.5 * _TRANSITION / (transition * period)))
+
+    def taps(self, order: int = 0, delay: float = 0.0) -> Array:
+        """
+        Return the filter's numbers (2 half + 1,), the newest sample last.
+
+        Parameters
+        ----------
+        order : int
+            Of the derivative that it gives.
+        delay : float
+            The output is that of a time later by this [s]; less than a tenth of the filter.
+
+        """
+        return self._sampled(lambda w: (1j * w) ** order * np.exp(1j * w * delay))
+
+    def fused(self, order: int, deviation: float, rate_deviation: float) -> tuple[Array, Array]:
+        """Return the numbers for positions and for rates, by their standard deviations."""
+        def of_positions(w: Array) -> Any:
+            return rate_deviation ** 2 / (rate_deviation ** 2 + (w * deviation) ** 2)
+
+        def of_rates(w: Array) -> Any:
+            return -1j * w * deviation ** 2 / (rate_deviation ** 2 + (w * deviation) ** 2)
+
+        return (self._sampled(lambda w: (1j * w) ** order * of_positions(w)),
+                self._sampled(lambda w: (1j * w) ** order * of_rates(w)))
+
+    def _sampled(self, response: Callable[[Array], Any]) -> Array:
+        """Return the numbers of the low-pass filter times a response at frequencies [rad/s]."""
+        # A finite pulse, whose derivatives end where it ends.
+        lags = np.arange(-self.half, self.half + 1)
+        pulse = 2.0 * self.cutoff * self.period * np.sinc(2.0 * self.cutoff * self.period * lags)
+        pulse *= np.blackman(2 * self.half + 3)[1:-1]
+        pulse /= pulse.sum()
+        many = 8 * self.half + 8
+        circle = np.zeros(many)
+        circle[lags] = pulse
+        w = np.asarray(2.0 * np.pi * np.fft.rfftfreq(many, self.period), dtype=np.float64)
+        impulse = np.fft.irfft(np.fft.rfft(circle) * response(w), many)
+        # y(t) = sum h(k) x(t - k): the newest sample, k = -half, last
+        taps: Array = impulse[lags[::-1]]
+        # What is cut off at its ends must change nothing of slow signals: exact at 0 and at a low
+        # frequency, by parts of the pulse and of its differences.
+        low = 0.05 * 2.0 * np.pi * self.cutoff
+        parts = np.column_stack([pulse, np.gradient(pulse), np.gradient(np.gradient(pulse))])
+        wave = np.exp(1j * low * self.period * lags)  # as the taps stand: the newest last
+        should, is_now = response(np.array([0.0, low])), np.array([taps.sum(), taps @ wave])
+        of_parts = np.array([parts.sum(axis=0), wave @ parts])
+        system = np.array([of_parts[0].real, of_parts[1].real, of_parts[1].imag])
+        off = should * np.array([1.0, pulse @ wave]) - is_now
+        right: Array = np.linalg.solve(system, np.array([off[0].real, off[1].real, off[1].imag]))
+        return taps + parts @ right
+
+
+def convolved(signal: Array, taps: Array) -> Array:
+    """Return a filtered signal (N, k), without the half filter at each end."""
+    many = len(signal) - len(taps) + 1
+    size = 1 << (len(signal) - 1).bit_length()
+    spectrum = np.fft.rfft(signal, size, axis=0) * np.fft.rfft(taps[::-1], size)[:, None]
+    whole: Array = np.fft.irfft(spectrum, size, axis=0)[len(taps) - 1:len(taps) - 1 + many]
+    return whole
+
+
+def decimated(signal: Array, taps: Array, step: int) -> Array:
+    """Return every so many-th sample of the same (M, ...)."""
+    many = (len(signal) - len(taps)) // step + 1
+    blocks = -(-len(taps) // step)
+    padded = np.zeros(blocks * step)
+    padded[:len(taps)] = taps
+    flat: Array = signal.reshape(len(signal), -1)
+    short = (many + blocks - 1) * step - len(flat)
+    if short > 0:
+        flat = np.concatenate([flat, np.zeros((short, flat.shape[1]))])
+    parts = flat[:(many + blocks - 1) * step].reshape(many + blocks - 1, step, -1)
+    result = np.zeros((many, 1, flat.shape[1]))
+    for n in range(blocks):
+        result += padded[None, None, n * step:(n + 1) * step] @ parts[n:n + many]
+    return result.reshape(many, *signal.shape[1:])
+
+
+def white_deviation(signal: Array) -> Array:
+    """Return the standard deviation of the white noise in a smooth signal (N, k), by columns."""
+    # Fourth differences remove the signal; 1 4 6 4 1 have the sum of squares 70.
+    deviations: Array = np.sqrt(np.mean(np.diff(signal, 4, axis=0) ** 2, axis=0) / 70.0)
+    return deviations

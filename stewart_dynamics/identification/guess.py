@@ -1,0 +1,57 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A pose from lengths without one to begin with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# Turns about z that are tried, the platform's axes parallel to the base's first [rad].
+_TURNS = (0.0, 0.3, -0.3, 0.6, -0.6)
+
+
+def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
+    """
+    Return the pose of lengths (6,), begun at the home pose, or where legs are as long on average.
+
+    Raises
+    ------
+    PoseError, SingularityError
+        No beginning leads to a pose with these lengths.
+
+    """
+    guesses = []
+    try:
+        guesses.append(platform.home_pose())
+    except ParameterError:  # without limits there may be none
+        pass
+    p = platform.parameters
+    across = p['geometry.platform_joints'] - p['geometry.base_joints']
+    level = float(np.mean(lengths ** 2 - np.sum(across[:, :2] ** 2, axis=1)))
+    height = np.sqrt(max(level, 1e-4))
+    up = -1.0 if p['gravity'][2] > 0.0 else 1.0
+    guesses += [Pose.from_euler([0.0, 0.0, up * height - across[:, 2].mean()], [0.0, 0.0, turn])
+                for turn in _TURNS]
+    for guess in guesses[:-1]:
+        try:
+            return platform.forward_kinematics(lengths, guess)
+        except (PoseError, SingularityError):
+            continue
+    return platform.forward_kinematics(lengths, guesses[-1])

@@ -1,0 +1,328 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+An identification: from bags to what they tell about the hexapod; numbers only, no files.
+
+Windows of each bag become extracts (``extraction``), whose sums are fitted (``fit``) twice, the
+second time without outliers. Then come intervals, and the validation: the end of each bag,
+predicted by a fit to the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
+from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
+from stewart_dynamics.identification.extracts import Block, Extracts
+from stewart_dynamics.identification.filters import LowPass
+from stewart_dynamics.identification.fit import Fit, fit
+from stewart_dynamics.identification.guess import pose_near
+from stewart_dynamics.identification.intervals import Errors, errors_of
+from stewart_dynamics.identification.likely_mistakes import (
+    Likely, of_efforts, of_kinematics, of_no_pose)
+from stewart_dynamics.identification.options import Options
+from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
+from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay.recording import Recording
+
+# Of bags that are sampled so slowly the cut-off is lower: samples for each of its periods.
+_FEWEST_SAMPLES = 10.0
+# A residual beyond so many deviations of its leg is an outlier: a contact, a collision.
+_OUTLIER = 8.0
+# More than this part are no outliers.
+_MOST_OUTLIERS = 0.2
+# Filtered samples at least.
+_FEWEST = 20
+# A seed: of the noise that is added to see what noise alone seems to tell.
+_SEED = 20221
+
+
+class BagRead(NamedTuple):
+    """What was read of one bag."""
+
+    path: Path
+    topics: Topics
+    samples: int
+    seconds: float
+    period: float
+    cutoff: float
+    rates: bool
+    rejected: dict[str, int]
+    windows_left_out: int
+    """Too short for the filters, between gaps."""
+    stops: int
+    outliers: int
+    deviations: tuple[float, float]
+    missing: list[str]
+    notices: list[str]
+
+
+class Validation(NamedTuple):
+    """Residuals on held-out time, RMS of each leg (6,) [N]: by the file, and by the fit."""
+
+    before: Array
+    after: Array
+    measured: Array
+    samples: int
+
+
+class Identified(NamedTuple):
+    """What bags tell about a hexapod."""
+
+    parameters: Parameters
+    """The file's, changed by what was identified."""
+    unknowns: Unknowns
+    fit: Fit
+    errors: Errors
+    bags: tuple[BagRead, ...]
+    samples: int
+    """Filtered, of all bags."""
+    outliers: int
+    """Filtered efforts that were left out."""
+    unsound: int
+    """Filtered efforts left out beforehand: outliers of samples, end stops, force limits."""
+    before: Array
+    """Residuals by the file, RMS (6,) [N]."""
+    after: Array
+    """By the identified parameters."""
+    measured: Array
+    """Efforts, RMS (6,) [N]."""
+    validation: Validation | None
+    likely: tuple[Likely, ...]
+
+
+Progress = Callable[[int], None]
+
+
+class Identification:
+    """
+    Reads bags and identifies.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod, as far as they are known.
+    options : Options
+        What is identified, and how.
+
+    """
+
+    def __init__(self, parameters: Parameters, options: Options) -> None:
+        if parameters['base.source'] != 'fixed':
+            raise ParameterError(
+                f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '
+                'rest: must be fixed')
+        if options.motor_torque and parameters['actuator.screw_lead'] is None:
+            raise ParameterError('actuator.screw_lead: has no value: --motor-torque needs it')
+        self.parameters, self._options = parameters, options
+        self.platform = StewartPlatform(parameters)
+        self.unknowns = Unknowns(parameters, options.kinds)
+        self.extracts = Extracts()
+        self.bags: list[BagRead] = []
+        self.chosen: list[Flags] = []
+        self._first: tuple[Extraction, Window, Pose] | None = None
+        self._noise: Array | None = None
+        self._of_noise = 0
+
+    def read(self, path: Path, progress: Progress | None = None) -> None:
+        """
+        Read a bag.
+
+        Raises
+        ------
+        BagError
+            It cannot be read, or contains nothing that can be used.
+
+        """
+        options, p = self._options, self.parameters
+        number, left_out, stops, outliers = len(self.bags), 0, 0, 0
+        extraction: Extraction | None = None
+        last: Extract | None = None
+        begin = end = 0
+        before = self.extracts.samples
+        with closing(Recording(path)) as recording:
+            topics = find_topics(recording, options.node, options.measured, options.efforts)
+            overlap = 2.0 * _margin(options.cutoff)
+            legs = RecordedLegs(recording, topics, p['joints'], overlap)
+            for window in legs.windows(progress):
+                if extraction is None:
+                    cutoff = min(options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
+                    extraction = Extraction(self.platform, self.unknowns, window.period, cutoff)
+                    begin = window.begin
+                if options.motor_torque:
+                    window = window._replace(
+                        efforts=window.efforts * 2.0 * np.pi / p['actuator.screw_lead'])
+                if len(window.positions) < 2 * extraction.margin + 2 * extraction.step:
+                    left_out += 1
+                    continue
+                last = self._extract(path, number, extraction, window, (
+                    window.begin - begin) * 1e-9, last)
+                stops, outliers = stops + last.stops, outliers + int(
+                    np.count_nonzero(window.outliers))
+                end = window.begin + round(len(window.positions) * window.period * 1e9)
+            rejected, missing = dict(legs.rejected), list(recording.missing)
+            notices = list(recording.notices)
+        if extraction is None or last is None or self.extracts.samples == before:
+            raise BagError(
+                f'{path}: {topics.legs}: nothing to identify from: '
+                + (f'{legs.samples} samples, of which no {2.0 * _margin(options.cutoff):.2g} s '
+                   'are without a gap; a lower --cutoff needs even more' if legs.samples else
+                   ', '.join(f'{count} messages {why}' for why, count in rejected.items())
+                   or 'no messages'))
+        if extraction.cutoff < options.cutoff:
+            notices.append(f'sampled at {1.0 / legs.period:.4g} Hz: the cut-off frequency is '
+                           f'{extraction.cutoff:.3g} Hz')
+        self.bags.append(BagRead(
+            path, topics, legs.samples, (end - begin) * 1e-9, legs.period, extraction.cutoff,
+            bool(legs.rates), rejected, left_out, stops, outliers, last.deviations, missing,
+            notices))
+
+    def _extract(self, path: Path, number: int, extraction: Extraction, window: Window,
+                 begin: float, last: Extract | None) -> Extract:
+        try:
+            lengths = window.positions[0] + self.parameters['geometry.zero_length']
+            guess = last.end if last is not None else pose_near(self.platform, lengths)
+            try:
+                extract = extraction(window, guess)
+            except (PoseError, SingularityError):
+                if last is None:
+                    raise
+                guess = pose_near(self.platform, lengths)
+                extract = extraction(window, guess)
+        except (PoseError, SingularityError) as exc:
+            raise BagError(f'{path}: {of_no_pose(self.parameters, window.positions)}') from exc
+        self.extracts.add(number, begin, extract)
+        self.chosen.append(extract.sound)
+        if last is None:  # once for each bag
+            noisy = extraction(window, guess, np.random.default_rng(_SEED))
+            change = noisy.regressor - extract.regressor
+            found = np.einsum('nla,nlb->lab', change, change)
+            self._noise = found if self._noise is None else self._noise + found
+            self._of_noise += len(change)
+            if self._first is None:
+                self._first = extraction, window, guess
+        return extract
+
+    def result(self) -> Identified:
+        """Return what the bags tell."""
+        options, unknowns = self._options, self.unknowns
+        if self.extracts.samples < _FEWEST:
+            raise BagError(f'{self.bags[0].path}: {self.extracts.samples} samples are left after '
+                           f'the filters: must be at least {_FEWEST}')
+        assert self._noise is not None
+        noise = self._noise * (self.extracts.samples / self._of_noise)
+        unsound = sum(int(np.count_nonzero(~each)) for each in self.chosen)
+        sums = self._sums()
+        likely = list(of_efforts(sums, unknowns, self.parameters, options.motor_torque))
+        found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
+        outliers = self._leave_out_outliers(found)
+        if outliers:
+            sums = self._sums()
+            found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
+        errors = errors_of(self.extracts, sums, unknowns, found, self.chosen, options.prior)
+        after = _rms(sums, unknowns, found.values, found.delays)
+        measured = _measured(sums)
+        if not likely:
+            assert self._first is not None
+            likely += of_kinematics(self.parameters, unknowns, *self._first, found, float(
+                np.sqrt(np.mean(after ** 2) / (np.mean(measured ** 2) + 1e-300))))
+        return Identified(
+            unknowns.parameters(found.values), unknowns, found, errors, tuple(self.bags),
+            self.extracts.samples, outliers, unsound,
+            _rms(sums, unknowns, unknowns.start, found.delays), after, measured,
+            self._validation(noise) if options.hold_out else None, tuple(likely))
+
+    def _sums(self, chosen: Callable[[Block], Flags] | None = None) -> Sums:
+        return sums_of(self.extracts, len(self.bags),
+                       chosen or (lambda block: self.chosen[block.number]))
+
+    def _cutoffs(self) -> Array | None:
+        return np.array([bag.cutoff for bag in self.bags]) if self._options.delay else None
+
+    def residuals(self, found: Fit) -> Sequence[Array]:
+        """Return the residuals of each block, (N, 6) [N]."""
+        theta = self.unknowns.theta(found.values)
+        return [block.columns @ residual_of(theta, found.delays[block.bag])
+                for block in self.extracts]
+
+    def _leave_out_outliers(self, found: Fit) -> int:
+        """Choose no efforts whose residuals are far off; return how many."""
+        residuals = self.residuals(found)
+        used = np.concatenate([np.where(which, each, np.nan) for which, each in zip(
+            self.chosen, residuals, strict=True)])
+        if np.isnan(used).all(axis=0).any():
+            return 0
+        deviation = np.nanmedian(np.abs(used), axis=0) / 0.6745
+        far = [(np.abs(each) > _OUTLIER * deviation) & which
+               for which, each in zip(self.chosen, residuals, strict=True)]
+        number = sum(int(np.count_nonzero(each)) for each in far)
+        if not number or number > _MOST_OUTLIERS * used.size:
+            return 0
+        self.chosen = [which & ~each for which, each in zip(self.chosen, far, strict=True)]
+        return number
+
+    def _validation(self, noise: Array) -> Validation | None:
+        """Return the residuals of the end of each bag by a fit to the rest of it."""
+        part, options = self._options.hold_out, self._options
+        ends = [bag.seconds * (1.0 - part) for bag in self.bags]
+
+        def held_out(block: Block) -> Flags:
+            held: Flags = self.chosen[block.number] & (block.times >= ends[block.bag])[:, None]
+            return held
+
+        test = self._sums(held_out)
+        train = self._sums(lambda block: self.chosen[block.number] & ~held_out(block))
+        if min(test.counts.sum(axis=0)) < _FEWEST or min(train.counts.sum(axis=0)) < _FEWEST:
+            return None
+        found = fit(train, self.unknowns, noise * (1.0 - part), options.prior, self._cutoffs())
+        return Validation(
+            _rms(test, self.unknowns, self.unknowns.start, found.delays),
+            _rms(test, self.unknowns, found.values, found.delays), _measured(test),
+            int(test.counts.sum()) // 6)
+
+    def close(self) -> None:
+        """Remove the temporary file."""
+        self.extracts.close()
+
+
+def _margin(cutoff: float) -> float:
+    """Return the time at each end that the filters of a cut-off need [s]."""
+    fine = 1e-4
+    return 2.0 * LowPass.of(fine, cutoff, cutoff).half * fine
+
+
+def _rms(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
+    squares = sums.squares(unknowns.theta(values), delays).sum(axis=0)
+    rms: Array = np.sqrt(squares / np.maximum(sums.counts.sum(axis=0), 1))
+    return rms
+
+
+def _measured(sums: Sums) -> Array:
+    effort = -ORDERS
+    squares = sums.grams[:, :, effort, effort].sum(axis=0)
+    rms: Array = np.sqrt(squares / np.maximum(sums.counts.sum(axis=0), 1))
+    return rms

@@ -1,0 +1,81 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The motion of the platform from lengths of the legs and their derivatives, of a whole window."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, ROTATION, TWIST
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# Samples between those whose pose is found one after the other; the others begin there.
+_STRIDE = 32
+
+
+def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:
+    """
+    Return the poses of lengths (N, 6) that change little from one to the next.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        The hexapod.
+    lengths : (N, 6)
+        [m]
+    guess : Pose
+        Near the first.
+
+    Raises
+    ------
+    PoseError, SingularityError
+        As ``forward_kinematics``.
+
+    """
+    anchors = []
+    for each in lengths[::_STRIDE]:
+        guess = platform.forward_kinematics(each, guess)
+        anchors.append(guess.rows)
+    nearest = np.minimum((np.arange(len(lengths)) + _STRIDE // 2) // _STRIDE, len(anchors) - 1)
+    return platform.forward_kinematics(lengths, Pose.of_rows(np.array(anchors)[nearest]))
+
+
+def motions(platform: StewartPlatform, poses: Pose, rates: Array, accelerations: Array) -> Array:
+    """
+    Return rows of motion (N, MOTION) of poses, leg rates and leg accelerations (N, 6).
+
+    ``J_inv X' = L'`` and ``J_inv X'' = L'' - J_inv' X'``; the last term is the acceleration of the
+    legs in a motion with the twist and without acceleration.
+    """
+    p = platform.parameters
+    rows = np.zeros((len(poses.rows), MOTION))
+    rows[:, POSE] = poses.rows[:, POSE]
+    j_inv = platform.inverse_jacobian(poses)
+    twists = np.linalg.solve(j_inv, rates[..., None])[..., 0]
+    rows[:, TWIST] = twists
+    rotation = rows[:, ROTATION].reshape(-1, 3, 3)
+    arms = np.einsum('nij,lj->nli', rotation, p['geometry.platform_joints'])
+    omega = twists[:, None, 3:]
+    joint_rates = twists[:, None, :3] + np.cross(omega, arms)
+    lengths = np.linalg.norm(
+        rows[:, None, :3] + arms - p['geometry.base_joints'], axis=-1)
+    # L'' = s . x'' + |x' across the leg|^2 / L
+    across = np.sum(joint_rates ** 2, axis=-1) - rates ** 2
+    drift = (np.einsum('nli,nli->nl', j_inv[:, :, :3], np.cross(omega, np.cross(omega, arms)))
+             + across / lengths)
+    rows[:, ACCELERATION] = np.linalg.solve(j_inv, (accelerations - drift)[..., None])[..., 0]
+    return rows

@@ -1,0 +1,104 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One identification with its files, which get their names only when all are complete."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification.identify import Identification, Identified
+from stewart_dynamics.identification.options import Options
+from stewart_dynamics.identification.report import Report
+from stewart_dynamics.identification.results import comments, document
+from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics, regressor
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.replay import mcap_scan, message_blocks
+from stewart_dynamics.replay.bags import bytes_of
+from stewart_dynamics.replay.results_folder import (
+    check_free, remove_abandoned, whole_folder, write_json)
+from tqdm import tqdm
+
+PARAMETERS, RESULT, REPORT = 'identified.yaml', 'identification.json', 'report.html'
+
+# The machine code that every identification needs.
+FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
+             *message_blocks.FUNCTIONS, mcap_scan.scan)
+
+
+def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Options,
+        warn: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Identify from bags into a folder; return the content of identification.json.
+
+    Parameters
+    ----------
+    bags : sequence of Path
+        Of one hexapod.
+    parameters : Parameters
+        Of it, as far as they are known.
+    folder : Path
+        It gets its name when it is complete; it must not exist, unless ``options.force``.
+    options : Options
+        What is identified, and how.
+    warn : callable
+        Called with likely mistakes that were accepted.
+
+    Raises
+    ------
+    StewartError
+        A bag cannot be used, or a mistake is likely: nothing is written.
+
+    """
+    check_free(folder, options, RESULT)
+    remove_abandoned([folder])
+    with closing(Identification(parameters, options)) as work:
+        with tqdm(total=sum(map(bytes_of, bags)), unit='B', unit_scale=True, disable=None,
+                  leave=False, dynamic_ncols=True) as bar:
+            for bag in bags:
+                work.read(bag, bar.update)
+        found = work.result()
+        for likely in found.likely:
+            if not options.accept_mistakes:
+                raise StewartError(f'{bags[0]}: {likely.text}; nothing is written '
+                                   '(--accept-mistakes writes)')
+            warn(f'warning: {likely.text}')
+        result = document(found, options)
+        with whole_folder(folder, options, RESULT) as partial:
+            _rounded(found).to_yaml(
+                partial / PARAMETERS, comments(result, found.unknowns))
+            write_json(partial / RESULT, result)
+            if options.report:
+                Report(work, found).write(partial / REPORT, result)
+    return result
+
+
+def _rounded(found: Identified) -> Parameters:
+    """Return the parameters with digits that the intervals justify."""
+    errors = np.sqrt(np.maximum(np.diag(found.errors.covariance), 0.0))
+    values = found.fit.values.copy()
+    for n, (value, error) in enumerate(zip(values, errors, strict=True)):
+        if error > 0.0 and math.isfinite(error):
+            # to a hundredth of the standard error
+            values[n] = round(value, int(np.clip(2 - math.floor(math.log10(error)), 0, 15)))
+    try:
+        return found.unknowns.parameters(values)
+    except StewartError:  # a body at its bound has no digits to lose
+        return found.parameters

@@ -1,0 +1,114 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The nearest values that a machine can have, by what the samples tell.
+
+Mass and friction are not negative, and the platform's pseudo-inertia is positive definite
+(``mechanics.pseudo_inertia``). Where least squares break a bound, the platform's ten parameters
+are found again in log-Cholesky parameters, which are a body whatever they are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.least_squares import Identifiability, Information
+from stewart_dynamics.mechanics.pseudo_inertia import (
+    from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
+
+# Nearer to the bound than this, by its size, a body is a point or a rod within rounding.
+SMALLEST = 1e-6
+_STEPS = 200
+
+
+def consistent(unknowns: Unknowns, values: Array, information: Information,
+               what: Identifiability) -> tuple[Array, tuple[str, ...]]:
+    """
+    Return values within all bounds, and the names of those that were beyond one.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+        What was asked for.
+    values : (k,)
+        Without bounds.
+    information : Information
+        Of the samples about them.
+    what : Identifiability
+        What they tell.
+
+    """
+    # What is not told is held as firmly as its scale; it decides where nothing else does.
+    matrix = information.matrix + np.diag(unknowns.scales ** -2.0)
+    beyond: list[str] = []
+    free: Flags = np.ones(len(values), dtype=bool)
+    found = values
+    for _ in range(len(values)):
+        negative = [n for n in unknowns.not_negative() if found[n] < 0.0 and free[n]]
+        if not negative:
+            break
+        beyond += [unknowns.names[n] for n in negative]
+        free[negative] = False
+        found = _held(matrix, values, free)
+    many = unknowns.many_of_platform
+    if many and smallest_eigenvalue(unknowns.inertial(found)) < SMALLEST:
+        beyond += unknowns.names[:many]
+        found = _as_body(unknowns, found, matrix)
+    return found, tuple(beyond)
+
+
+def _held(matrix: Array, values: Array, free: Flags) -> Array:
+    """Return the values with some at zero and the others where the information wants them."""
+    at_zero = np.where(free, values, 0.0)
+    change = at_zero - values
+    shift = np.linalg.solve(matrix[np.ix_(free, free)], matrix[np.ix_(free, ~free)]
+                            @ change[~free])
+    at_zero[free] = values[free] - shift
+    return at_zero
+
+
+def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
+    """Return the values of the nearest platform that is a body, in the metric of information."""
+    def candidate(eta: Array) -> Array:
+        return unknowns.with_inertial(values, from_log_cholesky(eta))
+
+    many = unknowns.many_of_platform
+    metric = matrix[:many, :many]
+    eta = log_cholesky(unknowns.inertial(unknowns.start))
+    found = candidate(eta)
+    damping = 1e-3
+    for _ in range(_STEPS):
+        off = (found - values)[:many]
+        derivative = np.linalg.pinv(unknowns.derivative(found)[:10, :many]) @ (
+            log_cholesky_derivative(eta))
+        normal = derivative.T @ metric @ derivative
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12),
+                               -derivative.T @ metric @ off)
+        eta_next = eta + np.clip(step, -1.0, 1.0)
+        following = candidate(eta_next)
+        nearer = (following - values)[:many]
+        cost, next_cost = off @ metric @ off, nearer @ metric @ nearer
+        if next_cost > cost:
+            damping *= 10.0
+            if damping > 1e12:
+                break
+            continue
+        eta, found, damping = eta_next, following, damping / 3.0
+        if cost - next_cost < 1e-12 * cost or smallest_eigenvalue(
+                unknowns.inertial(found)) < SMALLEST:
+            break
+    return found

@@ -1,0 +1,235 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The measured legs of a bag, in windows: positions, rates where they are, and efforts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.errors import BagError
+from stewart_dynamics.identification.windows import period_of, segments, Signal, uniform, Window
+from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, MISSING_JOINTS
+from stewart_dynamics.replay.recording import Recording
+from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
+from stewart_dynamics.runtime.recorded_messages import Messages
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+# Samples of a window at most: it and what is made of it fit into memory.
+_WINDOW = 1 << 16
+# Larger than any position [m] or force [N]: squares would overflow.
+_END = 1e100
+_SECOND = 1_000_000_000
+_LEGS, _EFFORTS = 'legs', 'efforts'
+
+
+class Topics(NamedTuple):
+    """Where positions and efforts are."""
+
+    legs: str
+    efforts: str
+
+
+def find_topics(recording: Recording, node: str, measured: str | None, efforts: str | None,
+                ) -> Topics:
+    """
+    Return the topics: as given, under the usual name, or the only one of its type.
+
+    Raises
+    ------
+    BagError
+        There is none, or there are several.
+
+    """
+    usual, own = f'{node}/{MEASURED_LEGS}', f'{node}/leg_states'
+    found = sorted(name for name, kind in recording.topics.items() if kind == JOINT_STATE)
+    for name in (measured, efforts):
+        if name is not None and name not in found:
+            kind = recording.topics.get(name)
+            raise BagError(f'{recording.path}: ' + (
+                f'{name}: is a {kind}, must be a {JOINT_STATE}' if kind else
+                f'has no topic {name}; of type {JOINT_STATE} it has {", ".join(found) or "none"}'))
+    if measured is None:
+        others = [name for name in found if name not in (own, efforts)]
+        if usual not in found and len(others) != 1:
+            raise BagError(
+                f'{recording.path}: has no topic {usual}, and '
+                + (f'several of its type, {", ".join(others)}: select one by --measured' if others
+                   else f'no other of its type, {JOINT_STATE}'
+                   + (f' but {own}, which is computed, not measured' if own in found else '')))
+        measured = usual if usual in found else others[0]
+    return Topics(measured, efforts or measured)
+
+
+class RecordedLegs:
+    """
+    Reads the measured legs of a bag.
+
+    Parameters
+    ----------
+    recording : Recording
+        The bag.
+    topics : Topics
+        In it.
+    joints : sequence of str
+        Names of the legs.
+    overlap : float
+        Time by which a window begins before the end of the last [s].
+
+    Attributes
+    ----------
+    rejected : Counter
+        Messages by reason.
+    samples : int
+        Of positions, used.
+    rates : bool
+        There are rates.
+    period : float
+        Of the samples [s], from the first on.
+
+    """
+
+    def __init__(self, recording: Recording, topics: Topics, joints: tuple[str, ...],
+                 overlap: float) -> None:
+        self._recording, self._topics, self._overlap = recording, topics, overlap
+        self._joints = joints
+        self.rejected: Counter[str] = Counter()
+        self.samples = 0
+        self.rates: bool | None = None
+        self.period = 0.0
+        self._one = topics.legs == topics.efforts
+        self._legs, self._efforts = _Buffer(), _Buffer()
+        self._readers: dict[str, JointStateReader] = {}
+
+    def windows(self, progress: Callable[[int], None] | None = None) -> Iterator[Window]:
+        """Yield the windows; reports the bytes read."""
+        keys = {self._topics.legs: _LEGS} | ({} if self._one else {
+            self._topics.efforts: _EFFORTS})
+        for messages, size in self._recording.messages(keys):
+            self._take(messages)
+            if progress is not None:
+                progress(size)
+            while len(self._legs) > _WINDOW and (self._one or len(self._efforts) > 8):
+                yield from self._released(last=False)
+        yield from self._released(last=True)
+        for reader in self._readers.values():
+            if not reader.found and self.rejected[MISSING_JOINTS]:
+                missing = [joint for joint in self._joints if joint not in reader.other_names]
+                raise BagError(
+                    f'{self._recording.path}: {self._topics.legs}: no message contains '
+                    f'{", ".join(missing)}; they contain {", ".join(reader.other_names)}: they '
+                    'must be those of the parameter joints')
+
+    def _take(self, messages: Messages) -> None:
+        for n, topic in enumerate(messages.topics):
+            which = messages.of_topic == n
+            if not which.any():
+                continue
+            starts, sizes = messages.starts[which], messages.sizes[which]
+            if topic == _LEGS:
+                if self.rates is None:
+                    self.rates = self._has_rates(messages, starts[:1], sizes[:1])
+                fields = ['position', *(['velocity'] if self.rates else []),
+                          *(['effort'] if self._one else [])]
+                stamps, values = self._read(_LEGS, fields, messages, starts, sizes)
+                many = 12 if self.rates else 6
+                self.samples += len(stamps)
+                self._legs.add(stamps, values[:, :many], self.rejected)
+                if self._one:
+                    self._efforts.add(stamps, values[:, many:], Counter())
+            else:
+                stamps, values = self._read(_EFFORTS, ['effort'], messages, starts, sizes)
+                self._efforts.add(stamps, values, self.rejected)
+
+    def _has_rates(self, messages: Messages, starts: Stamps, sizes: Stamps) -> bool:
+        reader = JointStateReader(self._joints, FIELDS if self._one else FIELDS[:2])
+        stamps, _, _ = reader.read_many(messages.data, starts, sizes)
+        return len(stamps) > 0
+
+    def _read(self, key: str, fields: list[str], messages: Messages, starts: Stamps,
+              sizes: Stamps) -> tuple[Stamps, Array]:
+        reader = self._readers.setdefault(key, JointStateReader(self._joints, fields))
+        stamps, values, rejected = reader.read_many(messages.data, starts, sizes)
+        sound = (np.abs(values) < _END).all(axis=1) & (stamps > 0)
+        self.rejected.update(rejected)
+        if not sound.all():
+            self.rejected['out of range or without a stamp'] += int(np.count_nonzero(~sound))
+        return stamps[sound], values[sound]
+
+    def _released(self, last: bool) -> Iterator[Window]:
+        """Yield windows of what is there, and keep what the next one needs."""
+        legs, efforts = self._legs.signal(), self._efforts.signal()
+        if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
+            self._legs.keep_from(int(legs.stamps[-1]) if len(legs.stamps) else 0)
+            return
+        if not self.period:
+            self.period = period_of(legs.stamps)
+        end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
+        for part in segments(legs.stamps, self.period):
+            inner = Signal(legs.stamps[part], legs.values[part]).between(0, end)
+            if len(inner.stamps) < 8:
+                continue
+            pushes = efforts.between(
+                int(inner.stamps[0]) - _SECOND, int(inner.stamps[-1]) + _SECOND)
+            window = uniform(inner, pushes, self.period, bool(self.rates))
+            if window is not None:
+                yield window
+        keep = end if last else end - round(self._overlap * _SECOND)
+        self._legs.keep_from(keep)
+        self._efforts.keep_from(keep)
+
+
+class _Buffer:
+    """Samples in the order of their stamps; those out of order are left out."""
+
+    def __init__(self) -> None:
+        self._stamps: list[Stamps] = []
+        self._values: list[Array] = []
+        self._newest = -1
+
+    def __len__(self) -> int:
+        return sum(map(len, self._stamps))
+
+    def add(self, stamps: Stamps, values: Array, rejected: Counter[str]) -> None:
+        """Add samples; those that are older than one before are counted."""
+        if not len(stamps):
+            return
+        before = np.maximum.accumulate(np.concatenate([[self._newest], stamps[:-1]]))
+        rising = stamps > before
+        if not rising.all():
+            rejected['stamp not increasing'] += int(np.count_nonzero(~rising))
+            stamps, values = stamps[rising], values[rising]
+        if len(stamps):
+            self._newest = int(stamps[-1])
+            self._stamps.append(stamps)
+            self._values.append(values)
+
+    def signal(self) -> Signal:
+        """Return all samples."""
+        if not self._stamps:
+            return Signal(np.empty(0, dtype=np.int64), np.empty((0, 6)))
+        self._stamps, self._values = [np.concatenate(self._stamps)], [
+            np.concatenate(self._values)]
+        return Signal(self._stamps[0], self._values[0])
+
+    def keep_from(self, stamp: int) -> None:
+        """Leave out samples before a stamp."""
+        whole = self.signal()
+        first = int(np.searchsorted(whole.stamps, stamp))
+        self._stamps, self._values = [whole.stamps[first:]], [whole.values[first:]]

@@ -1,0 +1,164 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What was identified as a document for identification.json, see docs/identification.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, timezone
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.identification.fit import LEAST_TOLD
+from stewart_dynamics.identification.identify import Identified
+from stewart_dynamics.identification.intervals import TWO_SIDED
+from stewart_dynamics.identification.options import Options
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.least_squares import combinations
+from stewart_dynamics.replay.fingerprint import plain_parameters, software
+
+# Of identification.json; increased when the meaning of a key changes.
+VERSION = 1
+
+IDENTIFIED, IN_COMBINATION, NOT_TOLD = 'identified', 'in_combination', 'not_told'
+
+
+def document(found: Identified, options: Options) -> dict[str, Any]:
+    """Return the content of identification.json."""
+    what = found.fit.identifiability
+    states = _states(found)
+    errors = _errors(found)
+    u = found.unknowns
+    parameters = [{
+        'name': name, 'unit': unit, 'file': float(start), 'value': float(value),
+        'state': state, 'standard_error': _plain(error) if state != NOT_TOLD else None,
+        'interval': ([float(value - TWO_SIDED * error), float(value + TWO_SIDED * error)]
+                     if state == IDENTIFIED else None),
+        'unknown_share': float(share), 'at_bound': name in found.fit.at_bound,
+    } for name, unit, start, value, state, error, share in zip(
+        u.names, u.units, u.start, found.fit.values, states, errors, what.shares, strict=True)]
+    return {
+        'version': VERSION, 'software': software(),
+        'date': datetime.now(timezone.utc).strftime('%Y-%m-%dT%H:%M:%SZ'),
+        'bags': [{
+            'bag': str(bag.path), 'legs': bag.topics.legs, 'efforts': bag.topics.efforts,
+            'samples': bag.samples, 'seconds': bag.seconds, 'period_s': bag.period,
+            'cutoff_hz': bag.cutoff, 'rates': bag.rates,
+            'rejected': bag.rejected, 'pieces_left_out': bag.windows_left_out,
+            'samples_at_stops': bag.stops, 'samples_outliers': bag.outliers,
+            'noise_of_lengths_m': bag.deviations[0], 'noise_of_rates_m_s': _plain(
+                bag.deviations[1]),
+            'delay_s': float(delay) if error else None,
+            'delay_standard_error_s': float(error) if error else None,
+            'missing': bag.missing, 'notices': bag.notices,
+        } for bag, delay, error in zip(
+            found.bags, found.fit.delays, found.errors.delays, strict=True)],
+        'options': {
+            'identify': list(options.kinds), 'motor_torque': options.motor_torque,
+            'cutoff_hz': options.cutoff, 'prior': options.prior, 'hold_out': options.hold_out,
+            'delay': options.delay, 'accept_mistakes': options.accept_mistakes},
+        'samples': found.samples, 'efforts_left_out': found.unsound,
+        'efforts_outliers': found.outliers,
+        'parameters': parameters,
+        'combinations': _combinations(found),
+        'rank': what.rank, 'unknowns': len(u.names),
+        'singular_values': what.singular_values.tolist(),
+        'residuals': _residuals(found.parameters['joints'], found.before, found.after,
+                                found.measured),
+        'validation': None if found.validation is None else {
+            'samples': found.validation.samples,
+            **_residuals(found.parameters['joints'], found.validation.before,
+                         found.validation.after, found.validation.measured)},
+        'likely_mistakes': [each._asdict() for each in found.likely],
+        'identified': plain_parameters(found.parameters),
+    }
+
+
+def _states(found: Identified) -> list[str]:
+    what = found.fit.identifiability
+    return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_TOLD else NOT_TOLD
+            for known, part in zip(what.identifiable, what.told, strict=True)]
+
+
+def _errors(found: Identified) -> Array:
+    """Return standard errors (k,), with what unknown directions may add."""
+    what = found.fit.identifiability
+    own = np.maximum(np.diag(found.errors.covariance), 0.0)
+    errors: Array = np.sqrt(own + (what.shares * what.scales) ** 2)
+    return errors
+
+
+def _combinations(found: Identified) -> list[dict[str, Any]]:
+    u, values = found.unknowns, found.fit.values
+    result = []
+    for each in combinations(found.fit.identifiability):
+        places = list(each.parameters)
+        c = each.coefficients
+        variance = float(c @ found.errors.covariance[np.ix_(places, places)] @ c)
+        result.append({
+            'parameters': [u.names[n] for n in places], 'coefficients': c.tolist(),
+            'unit': u.units[places[0]], 'value': float(c @ values[places]),
+            'standard_error': math.sqrt(max(variance, 0.0)),
+            'words': in_words(c, [u.names[n] for n in places])})
+    return result
+
+
+def in_words(coefficients: Array, names: Sequence[str]) -> str:
+    """Return a combination as a sum."""
+    text = ''
+    for c, name in zip(coefficients, names, strict=True):
+        sign = ' - ' if c < 0.0 else ' + '
+        size = f'{abs(c):.3g} '
+        text += (sign if text else '-' if c < 0.0 else '') + ('' if size == '1 ' else size) + name
+    return text
+
+
+def _residuals(joints: Sequence[str], before: Array, after: Array, measured: Array,
+               ) -> dict[str, Any]:
+    return {'legs': {joint: {
+        'before_rms_n': float(b), 'after_rms_n': float(a), 'measured_rms_n': float(m)}
+        for joint, b, a, m in zip(joints, before, after, measured, strict=True)},
+        'before_rms_n': _mean(before), 'after_rms_n': _mean(after),
+        'measured_rms_n': _mean(measured)}
+
+
+def _mean(rms: Array) -> float:
+    return float(np.sqrt(np.mean(rms ** 2)))
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
+    """Return what identified.yaml says beside each value: intervals and date."""
+    texts: dict[str, list[str]] = {}
+    for each in result['parameters']:
+        parts = each['name'].split('.')
+        name = '.'.join(parts[:2]) if parts[0] == 'platform' else '.'.join(parts[:-1])
+        name = name.replace('first_moment', 'center_of_mass').replace('second_moment', 'inertia')
+        if each['state'] == IDENTIFIED:
+            text = f'+-{TWO_SIDED * each["standard_error"]:.2g}'
+        else:
+            text = 'kept' if each['state'] == NOT_TOLD else 'partly told'
+        texts.setdefault(name, []).append(text)
+    return {name: f'identified {result["date"][:10]}, 95 %: {", ".join(dict.fromkeys(each))}'
+            if len(set(each)) == 1 else
+            f'identified {result["date"][:10]}, 95 %: {", ".join(each)}'
+            if any(text.startswith('+') for text in each) else 'kept: the motion does not tell it'
+            for name, each in texts.items()}

@@ -1,0 +1,90 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Sums of products of all columns of the extracts: all that least squares need of them.
+
+For each bag and leg the Gram matrix of ``[Y | known | f, f', f'', f''']``. A residual with a
+delay d of the efforts, ``r = f(t + d) - known - Y theta`` by Taylor's series, is a sum of these
+columns; so is its derivative by theta and by d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.identification.extraction import ORDERS
+from stewart_dynamics.identification.extracts import Block, Extracts
+
+
+class Sums(NamedTuple):
+    """
+    Gram matrices of B bags.
+
+    Attributes
+    ----------
+    grams : (B, 6, q, q)
+        Of the columns.
+    counts : (B, 6)
+        Of efforts that went into them.
+
+    """
+
+    grams: Array
+    counts: Integers
+
+    def plus(self, other: Sums) -> Sums:
+        """Return those of both."""
+        return Sums(self.grams + other.grams, self.counts + other.counts)
+
+    def squares(self, theta: Array, delays: Array) -> Array:
+        """Return the sum of squared residuals (B, 6) of linear parameters and delays (B,)."""
+        found: Array = np.empty(self.counts.shape)
+        for bag, delay in enumerate(delays):
+            c = residual_of(theta, delay)
+            found[bag] = np.einsum('i,lij,j->l', c, self.grams[bag], c)
+        return np.maximum(found, 0.0)
+
+
+def sums_of(extracts: Extracts, bags: int, chosen: Callable[[Block], Flags]) -> Sums:
+    """Return the sums of the efforts (N, 6) that a function chooses in each block."""
+    grams: Array | None = None
+    counts = np.zeros((bags, 6), dtype=np.int64)
+    for block in extracts:
+        if grams is None:
+            many = block.columns.shape[-1]
+            grams = np.zeros((bags, 6, many, many))
+        which = chosen(block)
+        for leg in range(6):
+            columns = block.columns[which[:, leg], leg]
+            grams[block.bag, leg] += columns.T @ columns
+        counts[block.bag] += np.count_nonzero(which, axis=0)
+    return Sums(np.zeros((bags, 6, 0, 0)) if grams is None else grams, counts)
+
+
+def residual_of(theta: Array, delay: float) -> Array:
+    """Return the coefficients (q,) of the columns in a residual."""
+    return np.concatenate([-theta, [-1.0], [
+        delay ** order / math.factorial(order) for order in range(ORDERS)]])
+
+
+def delayed_by(theta: Array, delay: float) -> Array:
+    """Return those of its derivative by the delay."""
+    return np.concatenate([np.zeros(len(theta) + 2), [
+        delay ** order / math.factorial(order) for order in range(ORDERS - 1)]])

@@ -1,0 +1,68 @@
+'use strict';
+const data = JSON.parse(document.getElementById('data').textContent);
+const FONT = {family: 'system-ui, sans-serif', size: 13, color: '#1d2430'};
+const CONFIG = {responsive: true, displaylogo: false, modeBarButtonsToRemove: ['select2d', 'lasso2d']};
+const GREY = '#8a93a1';
+
+function numbers(text) {
+  const bytes = Uint8Array.from(atob(text), (each) => each.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+
+function layout(y, more) {
+  return {
+    font: FONT, margin: {l: 70, r: 16, t: 10, b: 44}, legend: {orientation: 'h', y: 1.12},
+    xaxis: {title: {text: 'time [s]'}, gridcolor: '#e8ecf1', zeroline: false},
+    yaxis: {title: {text: y}, gridcolor: '#e8ecf1', zerolinecolor: '#c4ccd6'},
+    hovermode: 'x unified', ...more,
+  };
+}
+
+const columns = data.curves.map(numbers);
+const times = columns[0];
+const line = (name, y, color, width, dash) => (
+  {x: times, y, name, type: 'scatter', mode: 'lines', line: {color, width, dash}, connectgaps: false});
+const less = (a, b) => a.map((each, n) => each - b[n]);
+
+// Forces and residuals of one leg.
+let range = null;
+function show(leg) {
+  const [effort, before, after] = [1, 7, 13].map((first) => columns[first + leg]);
+  Plotly.react('forces', [
+    line('measured', effort, '#222222', 2.2), line('by the file', before, '#e69f00', 1.4),
+    line('by the identified parameters', after, '#0072b2', 1.4, 'dot')], layout('force [N]'), CONFIG);
+  Plotly.react('residuals', [
+    line('residual by the file', less(effort, before), '#e69f00', 1.2),
+    line('by the identified parameters', less(effort, after), '#0072b2', 1.2)], layout('residual [N]'), CONFIG);
+  document.querySelectorAll('#legs button').forEach((button, n) => button.setAttribute('aria-pressed', n === leg));
+}
+
+data.legs.forEach((name, leg) => {
+  const button = document.createElement('button');
+  button.type = 'button';
+  button.textContent = name;
+  button.addEventListener('click', () => show(leg));
+  document.getElementById('legs').append(button);
+});
+show(0);
+for (const [one, other] of [['forces', 'residuals'], ['residuals', 'forces']]) {
+  document.getElementById(one).on('plotly_relayout', (change) => {
+    const wanted = change['xaxis.autorange'] ? null : [change['xaxis.range[0]'], change['xaxis.range[1]']];
+    if (wanted && wanted[0] === undefined || JSON.stringify(wanted) === JSON.stringify(range)) return;
+    range = wanted;
+    Plotly.relayout(other, wanted ? {'xaxis.range': wanted.slice()} : {'xaxis.autorange': true});
+  });
+}
+
+const spectra = data.spectra.map(({frequencies, values}) => ({x: numbers(frequencies), y: numbers(values)}));
+if (spectra.length) {
+  const traces = spectra.map(({x, y}, n) => ({
+    x, y, mode: 'lines', name: n < 6 ? 'by the file' : data.legs[n - 6], legendgroup: n < 6 ? 'file' : data.legs[n - 6],
+    showlegend: n === 0 || n > 5, line: {color: n < 6 ? GREY : data.colors[n - 6], width: n < 6 ? 1 : 1.5},
+    opacity: n < 6 ? 0.6 : 1,
+  }));
+  Plotly.newPlot('spectrum', traces, layout('residual [N/√Hz]', {
+    xaxis: {title: {text: 'frequency [Hz]'}, type: 'log', gridcolor: '#e8ecf1'},
+    yaxis: {title: {text: 'residual [N/√Hz]'}, type: 'log', gridcolor: '#e8ecf1'}, hovermode: 'closest',
+  }), CONFIG);
+} else document.getElementById('spectrum').textContent = 'Too few samples for a spectrum.';

@@ -1,0 +1,134 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The result of an identification for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from stewart_dynamics.identification.intervals import TWO_SIDED
+from stewart_dynamics.identification.results import IDENTIFIED, NOT_TOLD
+from stewart_dynamics.replay.summary_text import plural
+
+
+def result_text(result: Mapping[str, Any]) -> str:
+    """
+    Return the text, no wider than 100 columns but for long names.
+
+    Parameters
+    ----------
+    result : mapping
+        The content of identification.json.
+
+    """
+    lines = [*_headline(result), '', *_table(result['parameters']), *_not_told(result)]
+    lines += _bags(result)
+    return '\n'.join(lines)
+
+
+def _headline(result: Mapping[str, Any]) -> list[str]:
+    residuals = result['residuals']
+    lines = [f'residual RMS {residuals["before_rms_n"]:.4g} N by the file, '
+             f'{residuals["after_rms_n"]:.4g} N by the identified parameters '
+             f'({_percent(residuals["after_rms_n"], residuals["measured_rms_n"])} of the efforts)']
+    held = result['validation']
+    if held is None:
+        lines.append('not validated: too little data to hold some out')
+    else:
+        worst = max(held['legs'], key=lambda leg: held['legs'][leg]['after_rms_n'])
+        lines.append(
+            f'on held-out time: {held["before_rms_n"]:.4g} N by the file, '
+            f'{held["after_rms_n"]:.4g} N by a fit to the rest; worst leg {worst}, '
+            f'{held["legs"][worst]["after_rms_n"]:.4g} N')
+    return lines
+
+
+def _percent(part: float, whole: float) -> str:
+    return f'{100.0 * part / whole:.2g} %' if whole > 0.0 else '-'
+
+
+def _table(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
+    name_width = max([len(each['name']) for each in parameters] + [9])
+    lines = [f'{"parameter":<{name_width}} {"file":>10} {"identified":>11} {"95 % interval":>24}'
+             '  unit']
+    for each in parameters:
+        if each['state'] == IDENTIFIED:
+            low, high = each['interval']
+            digits = decimals(each['standard_error'])
+            shown = f'{each["value"]:>11.{digits}f}', f'{low:.{digits}f} .. {high:.{digits}f}'
+            remark = '  at its bound' if each['at_bound'] else ''
+        else:
+            shown = f'{"-":>11}', ('kept: not told' if each['state'] == NOT_TOLD
+                                   else 'only in a combination')
+            remark = ''
+        lines.append(f'{each["name"]:<{name_width}} {each["file"]:>10.5g} {shown[0]} '
+                     f'{shown[1]:>24}  {each["unit"]}{remark}')
+    return lines
+
+
+def decimals(error: float) -> int:
+    """Return how many decimals a standard error justifies: two of its digits."""
+    digits = 0
+    while digits < 9 and error * 10 ** digits < 1.95:
+        digits += 1
+    return digits
+
+
+def _not_told(result: Mapping[str, Any]) -> list[str]:
+    not_told = [each['name'] for each in result['parameters'] if each['state'] == NOT_TOLD]
+    lines = []
+    if not_told:
+        lines += ['', "the motion does not tell (the file's values are kept):",
+                  *(f'  {name}' for name in grouped(not_told))]
+    if result['combinations']:
+        lines += ['', 'of these it tells only combinations:']
+        for each in result['combinations']:
+            size = TWO_SIDED * each['standard_error']
+            digits = decimals(each['standard_error'])
+            lines.append(f'  {each["words"]} = {each["value"]:.{digits}f} +- {size:.{digits}f} '
+                         f'{each["unit"]}')
+    return lines
+
+
+def grouped(names: Sequence[str]) -> list[str]:
+    """Return names, with those that differ in the last part alone in one line."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        begin, _, end = name.rpartition('.')
+        groups.setdefault(begin, []).append(end)
+    return [f'{begin}: {" ".join(ends)}' if begin else ' '.join(ends)
+            for begin, ends in groups.items()]
+
+
+def _bags(result: Mapping[str, Any]) -> list[str]:
+    lines = ['']
+    for bag in result['bags']:
+        delay = '' if bag['delay_s'] is None else (
+            f', efforts {1e3 * bag["delay_s"]:.2f} +- '
+            f'{1e3 * TWO_SIDED * bag["delay_standard_error_s"]:.2f} ms later than positions')
+        lines.append(f'{bag["bag"]}: {plural(bag["samples"], "sample")} in '
+                     f'{bag["seconds"]:.1f} s of {bag["legs"]}{delay}')
+        left = [(bag['samples_outliers'], 'wild value', 'replaced'),
+                (bag['samples_at_stops'], 'sample', 'at an end stop or force limit left out'),
+                (bag['pieces_left_out'], 'piece', 'between gaps too short for the filters')]
+        lines += [f'  {plural(number, what)} {why}' for number, what, why in left if number]
+        lines += [f'  {plural(number, "message")} rejected: {why}'
+                  for why, number in bag['rejected'].items()]
+        lines += [f'  {notice}' for notice in bag['notices']]
+    if result['efforts_outliers']:
+        lines.append(f'{plural(result["efforts_outliers"], "filtered effort")} left out as '
+                     'outliers')
+    return lines

@@ -1,0 +1,221 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What is asked for: parameters by the names and in the terms of the parameter file.
+
+The platform's are mass, center of mass and inertia about it, so that what a motion cannot tell
+keeps the value of the file. Of those the ten inertial parameters in which forces are linear are
+functions; all others are linear themselves: of parts of a leg mass, first and second moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.linear_parameters import (
+    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_SECOND, LINEAR, linear_parameters,
+    names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS,
+    UNITS, VISCOUS_FRICTION)
+from stewart_dynamics.parameters import Parameters
+
+# Of the platform, in the terms of the parameter file.
+_PLATFORM = ('platform.mass', *(f'platform.center_of_mass.{axis}' for axis in 'xyz'),
+             *(f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')))
+_PLATFORM_UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
+MASS, CENTER, INERTIA = slice(0, 1), slice(1, 4), slice(4, 10)
+PLATFORM = 10
+
+_OF_PLATFORM = {'mass': (MASS,), 'center_of_mass': (CENTER,), 'inertia': (INERTIA,),
+                'platform': (MASS, CENTER, INERTIA)}
+_OF_LEGS = {'cylinder': (CYLINDER_FIRST, CYLINDER_SECOND),
+            'piston': (PISTON_MASS, PISTON_FIRST, PISTON_SECOND),
+            'reflected_mass': (REFLECTED_MASS,), 'viscous_friction': (VISCOUS_FRICTION,),
+            'coulomb_friction': (COULOMB_FRICTION,),
+            'friction': (VISCOUS_FRICTION, COULOMB_FRICTION), 'offset': (OFFSET,)}
+KINDS = (*_OF_PLATFORM, *_OF_LEGS)
+"""What can be asked for."""
+DEFAULT = ('platform', 'viscous_friction', 'coulomb_friction')
+
+# Friction that matters is that which makes a leg's share of the weight at this rate [m/s].
+_RATE = 0.25
+# An effect of motion matters if it makes that share at this acceleration [m/s^2].
+_ACCELERATION = 10.0
+
+
+class Unknowns:
+    """
+    The parameters that are asked for, k of them.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        The file's: scales and the values of all that is not asked for.
+    kinds : sequence of str
+        Of KINDS.
+
+    Attributes
+    ----------
+    names, units : tuple of str
+        Of each parameter.
+    start : (k,)
+        The values of the file.
+    scales : (k,)
+        For each the change that would matter.
+    linear : (n,)
+        Which of the LINEAR parameters depend on them; the platform's ten come first.
+
+    """
+
+    def __init__(self, parameters: Parameters, kinds: Sequence[str] = DEFAULT) -> None:
+        for kind in kinds:
+            if kind not in KINDS:
+                raise ParameterError(f'{kind}: cannot be identified; known are {", ".join(KINDS)}')
+        self._parameters = p = parameters
+        self._theta = linear_parameters(p)
+        of_platform = np.zeros(PLATFORM, dtype=bool)
+        of_legs: Flags = np.zeros(LINEAR, dtype=bool)
+        for kind in kinds:
+            for part in _OF_PLATFORM.get(kind, ()):
+                of_platform[part] = True
+            for part in _OF_LEGS.get(kind, ()):
+                of_legs[part] = True
+        self._platform: Integers = np.flatnonzero(of_platform)
+        legs: Integers = np.flatnonzero(of_legs)
+        self.linear: Integers = np.concatenate([np.arange(PLATFORM), legs])
+        names = names_of(p)
+        self.names = (*(_PLATFORM[n] for n in self._platform), *(names[n] for n in legs))
+        self.units = (*(_PLATFORM_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs))
+        self._of_file: Array = np.concatenate([
+            [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia']])
+        self.start: Array = np.concatenate([self._of_file[self._platform], self._theta[legs]])
+        of_kinds = np.concatenate([_platform_scales(p)[self._platform], _leg_scales(p)[legs]])
+        self.scales: Array = of_kinds
+
+    @property
+    def many_of_platform(self) -> int:
+        """Return how many are the platform's; they come first."""
+        return len(self._platform)
+
+    @property
+    def fixed(self) -> Array:
+        """Return the linear parameters (LINEAR,) with zeros where they depend on the unknowns."""
+        theta = self._theta.copy()
+        theta[self.linear] = 0.0
+        return theta
+
+    def theta(self, values: Array) -> Array:
+        """Return the linear parameters (n,) of values (k,)."""
+        theta: Array = np.concatenate(
+            [_inertial(self._whole(values)), values[self.many_of_platform:]])
+        return theta
+
+    def derivative(self, values: Array) -> Array:
+        """Return the derivative of the linear parameters, (n, k)."""
+        d: Array = np.zeros((len(self.linear), len(values)))
+        d[:PLATFORM, :self.many_of_platform] = _inertial_derivative(
+            self._whole(values))[:, self._platform]
+        d[PLATFORM:, self.many_of_platform:] = np.eye(len(values) - self.many_of_platform)
+        return d
+
+    def with_inertial(self, values: Array, ten: Array) -> Array:
+        """Return values whose platform has these inertial parameters (10,), as far as asked."""
+        mass, center = ten[0], ten[1:4] / ten[0]
+        inertia = ten[4:] - about_origin(mass, center, np.zeros(6))
+        changed = values.copy()
+        changed[:self.many_of_platform] = np.concatenate(
+            [[mass], center, inertia])[self._platform]
+        return changed
+
+    def inertial(self, values: Array) -> Array:
+        """Return the platform's ten inertial parameters of values (k,)."""
+        return _inertial(self._whole(values))
+
+    def not_negative(self) -> Integers:
+        """Return which of the parameters cannot be negative, besides the platform's."""
+        ends = ('.mass.', '.second_moment.', 'reflected_mass.', '_friction.')
+        return np.array([n for n, name in enumerate(self.names) if n >= self.many_of_platform
+                         and any(end in f'{name}.' for end in ends)], dtype=np.int64)
+
+    def parameters(self, values: Array) -> Parameters:
+        """Return the parameter file's with these values (k,); ParameterError if none can have."""
+        theta = self._theta.copy()
+        theta[self.linear] = self.theta(values)
+        found = parameter_values(theta, self._parameters)
+        platform = self._whole(values)
+        found |= {'platform.mass': platform[0], 'platform.center_of_mass': platform[CENTER],
+                  'platform.inertia': platform[INERTIA]}
+        changed: dict[str, Any] = {name: value for name, value in found.items()
+                                   if not _alike(value, self._parameters[name])}
+        return self._parameters.replaced(changed, 'identified')
+
+    def _whole(self, values: Array) -> Array:
+        whole = self._of_file.copy()
+        whole[self._platform] = values[:self.many_of_platform]
+        return whole
+
+
+def _alike(value: Any, other: Any) -> bool:
+    return bool(np.allclose(value, other, rtol=1e-9, atol=1e-12))
+
+
+def _inertial(platform: Array) -> Array:
+    """Return the ten inertial parameters of mass, center of mass and inertia about it."""
+    mass, center, inertia = platform[0], platform[CENTER], platform[INERTIA]
+    ten: Array = np.concatenate([[mass], mass * center, about_origin(mass, center, inertia)])
+    return ten
+
+
+def _inertial_derivative(platform: Array) -> Array:
+    mass, center = platform[0], platform[CENTER]
+    d = np.zeros((10, 10))
+    d[0, 0] = 1.0
+    d[CENTER, 0], d[CENTER, CENTER] = center, mass * np.eye(3)
+    d[INERTIA, 0] = about_origin(1.0, center, np.zeros(6))
+    for axis in range(3):
+        # c . c 1 - c c^T
+        unit = np.eye(3)[axis]
+        change = mass * (2.0 * center[axis] * np.eye(3) - np.outer(unit, center)
+                         - np.outer(center, unit))
+        d[INERTIA, 1 + axis] = change[np.triu_indices(3)]
+    d[INERTIA, INERTIA] = np.eye(6)
+    return d
+
+
+def _size(p: Parameters) -> float:
+    return float(p['singularity.characteristic_length'])
+
+
+def _platform_scales(p: Parameters) -> Array:
+    mass, size = p['platform.mass'], _size(p)
+    return np.array([mass, *3 * [0.5 * size], *6 * [0.25 * mass * size ** 2]])
+
+
+def _leg_scales(p: Parameters) -> Array:
+    """Return the scales of all linear parameters; only those of legs are right."""
+    mass, length = p['platform.mass'] / 6.0, 2.0 * _size(p)
+    weight = _ACCELERATION * mass
+    scales: Array = np.empty(LINEAR)
+    for kind, scale in ((CYLINDER_FIRST, mass * length), (CYLINDER_SECOND, mass * length ** 2),
+                        (PISTON_MASS, mass), (PISTON_FIRST, mass * length),
+                        (PISTON_SECOND, mass * length ** 2), (REFLECTED_MASS, mass),
+                        (VISCOUS_FRICTION, weight / _RATE), (COULOMB_FRICTION, weight),
+                        (OFFSET, weight)):
+        scales[kind] = scale
+    return scales

@@ -1,0 +1,166 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Uniformly sampled windows of recorded legs: from stamps as they are, gaps and outliers left out.
+
+Positions and efforts may have stamps and rates of their own. Between samples that are at most
+``GAP`` periods apart values are interpolated by cubics through four samples; a longer gap, or a
+jump of the stamps, ends a segment.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Stamps
+
+# A longer time between two samples, in periods, is a gap.
+GAP = 4.0
+# A sample is an outlier if it is so many deviations off the cubic through its neighbours, and
+# half as many off the median of the five around it.
+_OUTLIER = 12.0
+# At most so many neighbours are replaced; more of them are no outlier but a step.
+_LONGEST = 3
+
+
+class Signal(NamedTuple):
+    """Recorded samples with their stamps [ns], strictly increasing."""
+
+    stamps: Stamps
+    values: Array
+
+    def between(self, begin: int, end: int) -> Signal:
+        """Return the samples within two stamps."""
+        first, last = np.searchsorted(self.stamps, (begin, end + 1))
+        return Signal(self.stamps[first:last], self.values[first:last])
+
+
+class Window(NamedTuple):
+    """Uniform samples of all legs."""
+
+    begin: int
+    """Stamp of the first [ns]."""
+    period: float
+    """[s]"""
+    positions: Array
+    """(N, 6) [m]"""
+    rates: Array | None
+    """(N, 6) [m/s]"""
+    efforts: Array
+    """(N, 6) as recorded"""
+    outliers: Flags
+    """(N, 6): an effort or a position of that leg was replaced."""
+
+
+def period_of(stamps: Stamps) -> float:
+    """Return the usual time between samples [s]."""
+    return float(np.median(np.diff(stamps))) * 1e-9
+
+
+def segments(stamps: Stamps, period: float) -> list[slice]:
+    """Return the parts between gaps."""
+    steps = np.diff(stamps) * 1e-9
+    breaks = np.flatnonzero((steps > GAP * period) | (steps <= 0.0)) + 1
+    edges = [0, *breaks.tolist(), len(stamps)]
+    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> Window | None:
+    """
+    Return the window of samples without gaps; None if there are too few.
+
+    Parameters
+    ----------
+    legs : Signal
+        (N, 6) positions, or (N, 12) with rates.
+    efforts : Signal
+        (M, 6), of their own stamps.
+    period : float
+        Of the window [s].
+    many_rates : bool
+        There are rates.
+
+    """
+    if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
+        return None
+    begin = max(int(legs.stamps[0]), int(efforts.stamps[0]))
+    end = min(int(legs.stamps[-1]), int(efforts.stamps[-1]))
+    many = int((end - begin) * 1e-9 / period + 1e-6) + 1
+    if many < 8:
+        return None
+    at = period * np.arange(many, dtype=float)
+    (positions, replaced), (pushes, replaced_too) = (
+        _without_outliers(each) for each in (legs.values[:, :6], efforts.values))
+    of_legs, of_efforts = (1e-9 * (each.stamps - begin).astype(float)
+                           for each in (legs, efforts))
+    outliers = _near(of_legs, replaced, at, period) | _near(of_efforts, replaced_too, at, period)
+    # Where efforts are missing there is nothing to fit.
+    after = np.clip(np.searchsorted(of_efforts, at), 1, len(of_efforts) - 1)
+    outliers |= (of_efforts[after] - of_efforts[after - 1] > GAP * max(
+        period, period_of(efforts.stamps)))[:, None]
+    return Window(
+        begin, period, interpolated(of_legs, positions, at),
+        interpolated(of_legs, legs.values[:, 6:], at) if many_rates else None,
+        interpolated(of_efforts, pushes, at), outliers)
+
+
+def interpolated(times: Array, values: Array, at: Array) -> Array:
+    """Return values (N, k) at times within those given, by cubics through four samples."""
+    nearest = np.clip(np.searchsorted(times, at), 0, len(times) - 1)
+    if len(at) == len(times) and np.abs(times - at).max() < 1e-7:
+        return values
+    first = np.clip(nearest - 2, 0, len(times) - 4)
+    result = np.zeros((len(at), values.shape[1]))
+    knots = [times[first + n] for n in range(4)]
+    for n in range(4):
+        weight = np.ones(len(at))
+        for m in range(4):
+            if m != n:
+                weight *= (at - knots[m]) / (knots[n] - knots[m])
+        result += weight[:, None] * values[first + n]
+    return result
+
+
+def _without_outliers(values: Array) -> tuple[Array, Flags]:
+    """Return values (N, k) with single wild ones replaced by their neighbours, and which."""
+    five = np.stack([np.roll(values, shift, axis=0) for shift in range(-2, 3)])
+    off = np.abs(values - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0)
+    usual = np.median(off, axis=0) / 0.6745 + 1e-9 * np.abs(values).max(axis=0)
+    wild = (off > _OUTLIER * usual) & (
+        np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual)
+    wild[:2] = wild[-2:] = False
+    if not wild.any():
+        return values, wild
+    clean = values.copy()
+    for column in np.flatnonzero(wild.any(axis=0)):
+        bad = wild[:, column]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], bad, [0]])))
+        for begin, end in edges.reshape(-1, 2):
+            if end - begin > _LONGEST:
+                bad[begin:end] = False
+        clean[bad, column] = np.interp(
+            np.flatnonzero(bad), np.flatnonzero(~bad), values[~bad, column])
+    return clean, wild
+
+
+def _near(times: Array, marked: Flags, at: Array, period: float) -> Flags:
+    """Return which of the uniform samples are next to a marked one (N, 6)."""
+    near = np.zeros((len(at), marked.shape[1]), dtype=bool)
+    rows, columns = np.nonzero(marked)
+    index = np.clip(np.round(times[rows] / period).astype(int), 0, len(at) - 1)
+    near[index, columns] = True
+    return near
