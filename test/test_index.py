@@ -86,8 +86,8 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
         'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
         'reason': 'length_max: leg_2; force_max: leg_1, leg_3; 2 crossings of det(J) = 0; '
-                  '1 singularity warning', 'residual_rms_n': '', 'unmodelled_mass_kg': '',
-        'coulomb_friction_n': '', 'viscous_friction_n_s_m': '', 'contacts': '', 'measured': '',
+                  '1 singularity warning', 'residual_rms_n': '', 'residual_share': '',
+        'residual_worst_leg': '', 'residual_worst_rms_n': '', 'contacts': '', 'measured': '',
         'results': 'deep/a'}]
 
 
@@ -111,14 +111,14 @@ def test_a_base_that_is_not_known_is_a_reason(tmp_path: Path) -> None:
 
 def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: Path) -> None:
     measured = {
-        'headline': ['19.5 kg', 'friction'], 'mass': {'unmodelled_kg': 19.5},
-        'contacts': {'count': 2}, 'legs': {f'leg_{n}': {
-            'residual_rms_n': 10.0 * n, 'coulomb_friction_n': 25.0 if n else None,
-            'viscous_friction_n_s_m': None} for n in range(6)}}
+        'headline': ['residual RMS 30 N', 'see also'], 'residual_rms_n': 30.0,
+        'residual_share': 0.1, 'worst_leg': 'leg_5', 'contacts': {'count': 2},
+        'legs': {f'leg_{n}': {'residual_rms_n': 10.0 * n} for n in range(6)}}
     write_fleet(tmp_path, [row('a', 0, summary([1.0], measured=measured)), row('b')])
     cells, without = table(tmp_path)
     keys = [column.key for column in COLUMNS if column.optional]
-    assert [cells[key] for key in keys] == ['50.0', '19.5', '25.0', '', '2', '19.5 kg; friction']
+    assert [cells[key] for key in keys] == [
+        '30.0', '0.1', 'leg_5', '50.0', '2', 'residual RMS 30 N; see also']
     assert [without[key] for key in keys] == [''] * 6
 
 

@@ -88,7 +88,7 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
 
 def measured_headline(measured: Mapping[str, Any]) -> list[str]:
     """
-    Return what accounts for the difference between measured and computed forces.
+    Return how far measured and computed forces are apart, and what finds out why.
 
     Parameters
     ----------
@@ -98,29 +98,12 @@ def measured_headline(measured: Mapping[str, Any]) -> list[str]:
     """
     if not measured['setpoints_compared']:
         return ['no setpoint could be compared']
-    lines = []
-    if measured['mass']['unmodelled_kg'] is not None:
-        lines.append(f'{measured["mass"]["unmodelled_kg"]:.4g} kg in addition on the platform '
-                     f'account for {100.0 * measured["mass"]["share"]:.0f} % of the residual '
-                     'force')
-    legs = measured['legs'].values()
-    found = [leg for leg in legs if leg['coulomb_friction_n'] is not None]
-    if found:
-        lines.append(f'friction in addition to the parameters, in {len(found)} of {len(legs)} '
-                     f'legs: Coulomb {_span(found, "coulomb_friction_n")} N, viscous '
-                     f'{_span(found, "viscous_friction_n_s_m")} N s/m')
-    if not lines:
-        largest = max(leg['residual_rms_n'] for leg in legs)
-        lines.append('neither a mass on the platform nor friction accounts for half of the '
-                     f'residual; its RMS is at most {largest:.3g} N')
-    return lines
-
-
-def _span(legs: Sequence[Mapping[str, Any]], key: str) -> str:
-    values = [leg[key] for leg in legs]
-    # without the rounding error of zero
-    texts = (f'{round(value, 6) + 0.0:.4g}' for value in (min(values), max(values)))
-    return ' to '.join(dict.fromkeys(texts))
+    worst = measured['worst_leg']
+    share = measured['residual_share']
+    part = '' if share is None else f', {100.0 * share:.2g} % of the measured forces'
+    return [f'residual RMS {measured["residual_rms_n"]:.4g} N{part}; worst leg {worst}, '
+            f'{measured["legs"][worst]["residual_rms_n"]:.4g} N',
+            'stewart_identify tells which masses and friction account for it']
 
 
 def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
@@ -128,10 +111,6 @@ def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
     lines = [f'measured: {text}' for text in measured['headline']]
     if not measured['setpoints_compared']:
         return lines
-    lines += [f'  {leg}: Coulomb {found["coulomb_friction_n"]:.4g} N, viscous '
-              f'{found["viscous_friction_n_s_m"]:.4g} N s/m'
-              for leg, found in measured['legs'].items()
-              if found['coulomb_friction_n'] is not None]
     rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
                     measured['legs'].items() if found['residual_rms_n'] is not None)
     lines.append(f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
