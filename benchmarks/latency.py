@@ -17,8 +17,8 @@ The processes around the node whose latency is measured.
 
 A source publishes setpoints and notes when it begins to publish the last message of each; a
 listener notes when its leg states have come, by the same clock of the computer; a caller asks
-for parameters and states meanwhile, a viewer takes the markers, a hexapod has its legs measured,
-an IMU is on the base, a planner sends planned trajectories.
+for parameters and states meanwhile, a viewer takes the markers, a hexapod has its legs measured
+and its payload weighed, an IMU is on the base, a planner sends planned trajectories.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import Trigger
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
@@ -286,21 +287,34 @@ def legs(parameters: Parameters, first: int) -> list[bytes]:
         result.forces)]
 
 
-def measure(name: str) -> None:
-    """Publish measured legs to a node at 1 kHz until a signal, and say how many."""
+def measure(*names: str, asked: str = '') -> None:
+    """
+    Publish measured legs to nodes at 1 kHz until a signal, and say how many.
+
+    One of them may be asked for its payload, each second.
+    """
     node = rclpy.create_node('hexapod')
-    publisher = node.create_publisher(JointState, f'/{name}/measured_legs', QOS)
+    publishers = [node.create_publisher(JointState, f'/{name}/measured_legs', QOS)
+                  for name in names]
+    client = node.create_client(Trigger, f'/{asked}/identify_payload') if asked else None
     bodies = legs(Parameters.from_yaml(PARAMETERS), FIRST_STAMP)
-    wait_for(publisher.get_subscription_count, 'the node is there')
+    for publisher in publishers:
+        wait_for(publisher.get_subscription_count, 'the node is there')
+    if client:
+        wait_for(client.service_is_ready, 'its service is there')
     print('ready', flush=True)
     begin = time.monotonic_ns()
     number = 0
     with suppress(KeyboardInterrupt, RCLError):
         while rclpy.ok():
             sec, nanosec = divmod(FIRST_STAMP + number * PERIOD, 1_000_000_000)
-            publisher.publish(b'\x00\x01\x00\x00' + sec.to_bytes(4, 'little')
-                              + nanosec.to_bytes(4, 'little') + bodies[number % REPEATED][12:])
+            message = (b'\x00\x01\x00\x00' + sec.to_bytes(4, 'little')
+                       + nanosec.to_bytes(4, 'little') + bodies[number % REPEATED][12:])
+            for publisher in publishers:
+                publisher.publish(message)
             number += 1
+            if client and number % 1000 == 0:
+                client.call_async(Trigger.Request())
             left = begin + number * PERIOD - time.monotonic_ns()
             if left > 0:
                 time.sleep(left * 1e-9)
@@ -357,6 +371,8 @@ def main() -> None:
         plan(Path(arguments[0]), arguments[1], int(arguments[2]))
     elif role == 'measure':
         measure(*arguments)
+    elif role == 'weigh':
+        measure(*arguments, 'measured', asked=arguments[0])
     elif role == 'sway':
         sway(*arguments)
     else:

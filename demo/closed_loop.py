@@ -280,6 +280,6 @@ def demonstration(command: str) -> Iterator[None]:
 
 
 def progress_bar(seconds: float) -> tqdm[Any]:
-    """Return a bar of the simulated time of all runs [s]."""
-    return tqdm(total=seconds, unit='s', ncols=79, mininterval=0.5,
+    """Return a bar of the simulated time of all runs [s], on a terminal only."""
+    return tqdm(total=seconds, unit='s', ncols=79, mininterval=0.5, disable=None,
                 bar_format='{desc} {bar} {n:.1f} of {total:.1f} s')

@@ -50,6 +50,8 @@ class Parameter(NamedTuple):
     sizes : tuple of int
         The lengths that an array may have, empty for a single value; an array of length 1 or 6
         may also be given as a single value, for all legs.
+    repeated : bool
+        Whether an array has any number of rows, one after the other, of its one length each.
     minimum, maximum : float
         Bounds of every entry.
     above : bool
@@ -68,6 +70,7 @@ class Parameter(NamedTuple):
     default: Any = None
     required: bool = False
     sizes: tuple[int, ...] = ()
+    repeated: bool = False
     minimum: float = -math.inf
     maximum: float = math.inf
     above: bool = False
@@ -79,7 +82,16 @@ class Parameter(NamedTuple):
         """Return the name of the type in ROS, as in the documents."""
         if not self.sizes:
             return self.kind
-        return f'{self.kind}[{" or ".join(map(str, self.sizes))}]'
+        return f'{self.kind}[{self.lengths}]'
+
+    @property
+    def lengths(self) -> str:
+        """Return the lengths that an array may have, as text."""
+        return f'{self.sizes[0]} n' if self.repeated else ' or '.join(map(str, self.sizes))
+
+    def accepts(self, length: int) -> bool:
+        """Return whether an array may have this length."""
+        return length % self.sizes[0] == 0 if self.repeated else length in self.sizes
 
     @property
     def rule(self) -> str:
@@ -108,8 +120,8 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
         raise _broken(parameter, value, source, f'must be an array of {parameter.sizes[0]}')
     if not entries and parameter.default == ():
         return None
-    if is_array and len(entries) not in parameter.sizes:
-        has = f'must have {" or ".join(map(str, parameter.sizes))} entries, has {len(entries)}'
+    if is_array and not parameter.accepts(len(entries)):
+        has = f'must have {parameter.lengths} entries, has {len(entries)}'
         if parameter.kind == 'double' and len(entries) > min(parameter.sizes) and any(
                 type(entry) is int for entry in entries):  # [0,5, 1,5]
             has += '; decimal commas? write 0.5, not 0,5'
@@ -121,7 +133,10 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
     if not parameter.sizes:
         return entries[0]
     array = np.array(entries * 6 if len(entries) == 1 else entries)
-    array = array.reshape(6, 3) if len(array) == 18 else array
+    if parameter.repeated:
+        array = array.reshape(-1, parameter.sizes[0])
+    elif len(array) == 18:
+        array = array.reshape(6, 3)
     array.setflags(write=False)
     return array
 

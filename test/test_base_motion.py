@@ -357,6 +357,8 @@ def test_a_base_of_another_type_or_shape_is_rejected(call: str) -> None:
                 with pytest.raises(MotionError) as error:
                     getattr(platform, call)(some, None, wrong)
                 assert text in str(error.value)
+    with pytest.raises(MotionError, match='wrench: a value of type BaseMotion: .* argument base'):
+        getattr(platform, call)(motion[0], base[0])
     with pytest.raises(MotionError) as error:
         getattr(platform, call)(motion, None, BaseMotion([0.0, 0.0, 0.0], [1e308] * 3,
                                                          [1e200, 0.0, 0.0]))

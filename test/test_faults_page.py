@@ -24,7 +24,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = ('test_faults', 'test_dynamics_node', 'test_simulator_node',
-           'test_external_wrench_node', 'test_base_node')
+           'test_external_wrench_node', 'test_base_node', 'test_payload_node')
 
 
 def rows() -> list[list[str]]:

@@ -45,6 +45,13 @@ MOTIONS = {
         'motion.amplitude': [0.1, 0.2, 0.05, 0.3, 0.2, 0.5],
         'motion.frequency': [0.5, 0.3, 1.0, 0.7, 0.4, 0.6],
         'motion.phase': [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]},
+    'fourier': {
+        'motion.type': 'fourier', 'motion.initial': INITIAL, 'motion.duration': 3.0,
+        'motion.fourier.frequency': 0.5, 'motion.fourier.fade': 1.2,
+        'motion.fourier.cosine': [
+            0.01, 0.02, 0.01, 0.02, -0.03, 0.05, 0.0, -0.01, 0.01, 0.0, 0.02, 0.03],
+        'motion.fourier.sine': [
+            0.02, 0.0, 0.01, 0.05, 0.03, -0.08, 0.01, 0.01, 0.0, -0.03, 0.0, 0.05]},
     'hold': {'motion.type': 'hold', 'motion.initial': INITIAL, 'motion.duration': 3.0},
 }
 POINT_TO_POINT = ('paper', 'quintic')
@@ -143,6 +150,69 @@ def test_quintic_turns_by_half_a_turn() -> None:
     assert pose_matches(motion_at(p, 3.0), [0.0] * 5 + [np.pi])
 
 
+def test_fourier_is_its_series_between_the_fades() -> None:
+    p = parameters('fourier')
+    times = np.linspace(1.2, 1.8, 7)
+    angle = 2.0 * np.pi * 0.5 * times[:, None]
+    cosine, sine = np.reshape([p['motion.fourier.cosine'], p['motion.fourier.sine']], (2, 2, 6))
+    pose = np.array(INITIAL) + sum(
+        cosine[k] * np.cos((k + 1) * angle) + sine[k] * np.sin((k + 1) * angle) for k in (0, 1))
+    motion = motion_at(p, times)
+    np.testing.assert_allclose(motion.position, pose[:, :3], rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(
+        motion.rotation, rotations.from_euler(pose[:, 3:]), rtol=0.0, atol=1e-14)
+
+
+def test_fourier_begins_and_ends_at_rest_in_initial() -> None:
+    p = parameters('fourier')
+    for time in (-1.0, 0.0, 3.0, 3.001):
+        assert at_rest(motion_at(p, time)) and pose_matches(motion_at(p, time), INITIAL), time
+    # Nearby, too: the acceleration has no step.
+    near = motion_at(p, [1e-6, 3.0 - 1e-6]).rows[:, 12:]
+    assert 0.0 < np.abs(near).max() < 1e-4
+
+
+def test_fourier_looped_is_periodic_after_the_fade() -> None:
+    p = parameters('fourier', loop=True, **{'motion.fourier.fade': 2.9})
+    assert at_rest(motion_at(p, 0.0))
+    times = np.linspace(2.9, 4.9, 31)
+    rows = motion_at(p, times).rows
+    np.testing.assert_allclose(motion_at(p, times + 2.0).rows, rows, atol=1e-13)
+    np.testing.assert_allclose(motion_at(p, times + 2e6).rows, rows, atol=1e-8)
+
+
+def test_of_a_fourier_series_one_kind_of_coefficients_is_enough() -> None:
+    both, times = parameters('fourier'), np.linspace(0.0, 3.0, 9)
+    parts = [motion_at(parameters('fourier', **{f'motion.fourier.{without}': None}), times)
+             for without in ('cosine', 'sine')]
+    np.testing.assert_allclose(
+        parts[0].position + parts[1].position - INITIAL[:3], motion_at(both, times).position,
+        rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize(('changes', 'text'), [
+    ({'cosine': [0.1] * 7}, r'motion.fourier.cosine: .* must have 6 n entries, has 7'),
+    ({'cosine': 0.1}, 'motion.fourier.cosine: 0.1 m, rad: must be an array of 6'),
+    ({'cosine': [0.1] * 18}, 'sine: 12 entries: must be as many as of motion.fourier.cosine, 18'),
+    ({'cosine': None, 'sine': []}, 'cosine, motion.fourier.sine: missing, motion.type fourier '),
+    ({'fade': 1.6}, 'fade: 1.6 s: must be at most half of motion.duration, 1.5 s'),
+    ({'fade': 0.0}, 'fade: 0.0 s: must be more than 0'),
+    ({'frequency': 0.0}, 'frequency: 0.0 Hz: must be at least 1e-06'),
+])
+def test_a_broken_rule_of_a_series_is_named(changes: dict[str, object], text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        parameters('fourier', **{f'motion.fourier.{name}': value
+                                 for name, value in changes.items()})
+
+
+def test_a_series_of_three_harmonics_is_not_taken_for_joints(tmp_path: Path) -> None:
+    three = np.arange(18.0) * 1e-3
+    p = parameters('fourier', **{'motion.fourier.cosine': three, 'motion.fourier.sine': None})
+    assert p['motion.fourier.cosine'].tolist() == three.reshape(3, 6).tolist()
+    p.to_yaml(tmp_path / 'file.yaml')
+    assert ReferenceMotionParameters.from_yaml(tmp_path / 'file.yaml') == p
+
+
 @pytest.mark.parametrize('name', POINT_TO_POINT)
 def test_loop_runs_back_the_same_way(name: str) -> None:
     p, times = parameters(name, loop=True), np.linspace(0.0, 3.0, 31)
@@ -188,7 +258,7 @@ def test_samples_are_spaced_exactly() -> None:
 @pytest.mark.parametrize(('changes', 'text'), [
     ({'motion.final': None}, 'motion.final: missing, motion.type paper needs it'),
     ({'motion.initial': None}, 'motion.initial: missing'),
-    ({'motion.type': 'cubic'}, 'must be one of paper, quintic, sine, hold'),
+    ({'motion.type': 'cubic'}, 'must be one of paper, quintic, sine, fourier, hold'),
     ({'motion.final': [0.0, 1.0]}, 'must have 6 entries, has 2'),
     ({'motion.duration': 0.0}, 'must be more than 0'),
     ({'rate': 0.0}, 'must be at least 0.001'), ({'rate': 1e15}, 'at most 10000'),

@@ -52,6 +52,10 @@ stewart_trajectory:
       initial: [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
       final: [0.2, -0.15, 1.15, 0.2, -0.15, 0.8]
       amplitude: [0.1, 0.1, 0.08, 0.12, 0.12, 0.25]
+      fourier:
+        frequency: 0.8
+        sine: [0.1, 0.1, 0.08, 0.12, 0.12, 0.25, 0.0, 0.02, 0.02, 0.05, 0.0, 0.1]
+        fade: 0.7
 """
 
 
@@ -183,7 +187,8 @@ def _expected(parameters: ReferenceMotionParameters, times: Any) -> NDArray[np.f
 
 
 @pytest.mark.parametrize('output, kind', [
-    ('separate', 'paper'), ('separate', 'quintic'), ('separate', 'sine'), ('combined', 'paper')])
+    ('separate', 'paper'), ('separate', 'quintic'), ('separate', 'sine'), ('combined', 'paper'),
+    ('combined', 'fourier')])
 def test_the_motion_is_published_and_then_it_ends(
         begin: Start, tmp_path: Path, output: str, kind: str) -> None:
     trajectory = begin(MOTION.format(kind=kind, more=f'output: {output}'), ENDS)
@@ -204,7 +209,7 @@ def test_the_motion_is_published_and_then_it_ends(
     assert_only_log_lines(trajectory.program.stderr)
 
 
-@pytest.mark.parametrize('kind', ['quintic', 'sine'])
+@pytest.mark.parametrize('kind', ['quintic', 'sine', 'fourier'])
 def test_the_final_pose_is_held_until_a_signal(begin: Start, tmp_path: Path, kind: str) -> None:
     trajectory = begin(MOTION.format(kind=kind, more='output: combined'), 'use_sim_time:=true')
     parameters = ReferenceMotionParameters.from_yaml(tmp_path / 'trajectory.yaml')
@@ -330,7 +335,7 @@ BROKEN = {
     'integer': ('rate: 200.0', 'rate: 200', 'rate: 200: is an integer, must be a double'),
     'zero': ('rate: 200.0', 'rate: 0.0', 'rate: 0.0 Hz: must be '),
     'no choice': ('type: quintic', 'type: jump',
-                  "motion.type: 'jump': must be one of paper, quintic, sine, hold"),
+                  "motion.type: 'jump': must be one of paper, quintic, sine, fourier, hold"),
     'length': ('[0.2, -0.15, 1.15, 0.2, -0.15, 0.8]', '[0.2, -0.15, 1.15]',
                'motion.final: [0.2, -0.15, 1.15]: must have 6 entries, has 3'),
     'not YAML': ('motion:', 'motion: }', 'not YAML: '),

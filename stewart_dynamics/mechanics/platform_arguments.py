@@ -44,6 +44,8 @@ def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
            ) -> tuple[Array, Array, Array, tuple[int, ...]]:
     """Return rows of motion, of wrenches and of the base (one if for all), and the shape."""
     check_kind(motion, Motion)
+    if isinstance(wrench, BaseMotion):
+        raise wrong_type('wrench', wrench, "six numbers; a base's motion is the argument base")
     load = optional_array('wrench', wrench, (WRENCH,))
     bases = base_rows(base)
     shape = common_shape(motion=motion.shape, wrench=load.shape[:-1], base=bases.shape[:-1])

@@ -67,10 +67,18 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
       ends.
     - sine: each coordinate as initial + amplitude sin(2 pi frequency t + phase), from the first
       sample on: it starts at full speed where the phase is zero.
+    - fourier: each coordinate as initial + w(t) sum_k (cosine_k cos(k omega t) + sine_k
+      sin(k omega t)), k = 1 to n, the excitation of J. Swevers et al. (Optimal robot excitation
+      and identification, IEEE Trans. Robotics and Automation 13, 1997, 730-740,
+      doi:10.1109/70.631234). The window w(t) is 10 u^3 - 15 u^4 + 6 u^5 with u = t / fade at the
+      start, then 1, and at the end the same backward, so that position, velocity and
+      acceleration begin and end as at rest, whatever the coefficients are. Looped it is 1 from
+      the fade on.
     - hold: at rest in initial.
 
     paper and quintic are at rest in initial before their start and in final after their end;
-    looped they run back and forth, each direction in the duration.
+    looped they run back and forth, each direction in the duration. fourier is at rest in initial
+    before its start and after its end.
     """
     time = np.asarray(times, dtype=float)
     kind, initial = parameters['motion.type'], parameters['motion.initial']
@@ -83,6 +91,9 @@ def motion_at(parameters: ReferenceMotionParameters, times: ArrayLike) -> Motion
         return _euler_motion(
             initial + amplitude * np.sin(angle), amplitude * omega * np.cos(angle),
             -amplitude * omega ** 2 * np.sin(angle))
+    if kind == 'fourier':
+        offset, rate, acceleration = _series(parameters, time)
+        return _euler_motion(initial + offset, rate, acceleration)
     s, ds, dds = (each[..., None] for each in _progress(parameters, time))
     final = parameters['motion.final']
     if kind == 'paper':
@@ -117,6 +128,34 @@ def _progress(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array
     else:
         s, ds, dds = quintic(u)
     return s, sign * moving * ds / duration, moving * dds / duration ** 2
+
+
+def _series(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
+    """Return the Fourier series in its window (..., 6), and its time derivatives."""
+    cosine, sine = (parameters[f'motion.fourier.{name}'] for name in ('cosine', 'sine'))
+    cosine = np.zeros_like(sine) if cosine is None else cosine
+    sine = np.zeros_like(cosine) if sine is None else sine
+    turn = 2.0 * np.pi * np.mod(time * parameters['motion.fourier.frequency'], 1.0)[..., None]
+    x, dx, ddx = np.zeros((3, *time.shape, 6))
+    # Not by a matrix product: its last bits depend on the number of times.
+    for k, (a, b) in enumerate(zip(cosine, sine, strict=True), start=1):
+        omega = 2.0 * np.pi * parameters['motion.fourier.frequency'] * k
+        c, s = np.cos(k * turn), np.sin(k * turn)
+        x += a * c + b * s
+        dx += omega * (b * c - a * s)
+        ddx -= omega ** 2 * (a * c + b * s)
+    w, dw, ddw = (each[..., None] for each in _window(parameters, time))
+    return w * x, dw * x + w * dx, ddw * x + 2.0 * dw * dx + w * ddx
+
+
+def _window(parameters: ReferenceMotionParameters, time: Array) -> tuple[Array, Array, Array]:
+    """Return the window of a Fourier series and its time derivatives [1, 1/s, 1/s^2]."""
+    fade, duration = parameters['motion.fourier.fade'], parameters['motion.duration']
+    ends = not parameters['loop'] and time > duration / 2.0
+    sign = np.where(ends, -1.0, 1.0)
+    u = np.clip(np.where(ends, duration - time, time) / fade, 0.0, 1.0)
+    w, dw, ddw = quintic(u)
+    return w, sign * dw / fade, ddw / fade ** 2
 
 
 def quintic(u: Array) -> tuple[Array, Array, Array]:

@@ -118,8 +118,8 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
     when = 'only while unconfigured' if has_lifecycle else 'only when the node starts'
     if parameter.while_active:
         when = 'also while active'
-    sizes = ' or '.join(map(str, parameter.sizes))
-    constraints = [f'{sizes} entries' if sizes else '', parameter.rule, f'set {when}']
+    constraints = [f'{parameter.lengths} entries' if parameter.sizes else '', parameter.rule,
+                   f'set {when}']
     unit = f' [{parameter.unit}]' if parameter.unit else ''
     in_range = math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum)
     # A parameter of one number or six has the type of its present value.

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 import gc
 import math
@@ -31,10 +32,12 @@ from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.compilation.preparation import Preparation
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.nodes import parameter_changes
 from stewart_dynamics.nodes.declared_parameters import declare_parameters
 from stewart_dynamics.nodes.diagnostics_publisher import DiagnosticsPublisher
 from stewart_dynamics.nodes.markers_publisher import MarkersPublisher
+from stewart_dynamics.nodes.payload_service import inertia_message, PayloadService
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.nodes.rclpy_workarounds import (
     answer_impossible_transitions, set_parameters_together, take_waiting_messages)
@@ -42,16 +45,17 @@ from stewart_dynamics.nodes.repeated_log import RepeatedLog
 from stewart_dynamics.nodes.run import run
 from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
 from stewart_dynamics.nodes.signals import SIGNALS
-from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, QUEUE, Topics
+from stewart_dynamics.nodes.topics import LEG_TRAJECTORY, MARKERS, PAYLOAD, QUEUE, Topics
 from stewart_dynamics.parameter_files import is_of_ros
 from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime import base_wrench, external_wrench, planned_trajectory
+from stewart_dynamics.runtime import base_wrench, external_wrench, payload, planned_trajectory
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.base_wrench import BASE_WRENCH, BaseWrench
 from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWrench
 from stewart_dynamics.runtime.input_topics import WRENCH
+from stewart_dynamics.runtime.leg_history import LegHistory
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs, NOT_COMPILED
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import NOT_EXCLUSIVE, Rejection
@@ -104,6 +108,7 @@ class DynamicsNode(LifecycleNode):
         self._base_wrench_read = False  # somebody subscribes to it
         self._planned = PlannedTrajectoryQueue(
             timer.reset, timer.cancel, self._planned_code, self._on_outcome)
+        self._payload = PayloadService(self, self._identify_payload, self._on_payload)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.create_timer(TICK, self._on_tick, clock=steady)
         answer_impossible_transitions(
@@ -136,8 +141,10 @@ class DynamicsNode(LifecycleNode):
         """Begin to answer; earlier messages do not matter."""
         parameters, models = self._settings, self._models
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
+        self._history = LegHistory(parameters['payload.window'])
         self._measured_legs = MeasuredLegs(
-            parameters, models.external_wrench, self._on_rejection, self._on_notice)
+            parameters, models.external_wrench, self._on_rejection, self._on_notice,
+            self._history)
         self._diagnostics = DynamicsDiagnostics(
             parameters, self._setpoints.topics, self._setpoints.base.topics, time.monotonic())
         self._queue = SetpointQueue(
@@ -151,7 +158,7 @@ class DynamicsNode(LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more."""
         self._active = False
-        self._drop_planned_trajectories()
+        self._drop_work()
         self._log.write_last()
         return TransitionCallbackReturn.SUCCESS
 
@@ -163,7 +170,7 @@ class DynamicsNode(LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer no more and close the topics."""
         self._active = False
-        self._drop_planned_trajectories()
+        self._drop_work()
         self._close()
         return TransitionCallbackReturn.SUCCESS
 
@@ -183,6 +190,7 @@ class DynamicsNode(LifecycleNode):
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
+        self._payload.make()
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
         self._exclusive = self._settings['setpoint.exclusive']
         self._configured = True
@@ -195,6 +203,7 @@ class DynamicsNode(LifecycleNode):
     def _close(self) -> None:
         self._configured = False
         self._topics.destroy()
+        self._payload.destroy()
 
     # -- setpoints --------------------------------------------------------------------------
 
@@ -296,6 +305,24 @@ class DynamicsNode(LifecycleNode):
         if diagnostics.estimated(estimate, target, now):
             self._report()
 
+    def _identify_payload(self) -> Iterator[payload.Outcome | None] | payload.Outcome:
+        if not self._active:
+            return payload.Outcome('the node is not active')
+        silence = self._diagnostics.external_wrench.silence(time.monotonic())
+        if self._settings['setpoint.timeout'] < silence < math.inf:
+            return payload.Outcome(f'measured_legs silent for {silence:.1f} s')
+        # Parameters are those of now, whatever changes meanwhile.
+        return payload.identify(self._history, StewartPlatform(self._settings))
+
+    def _on_payload(self, outcome: payload.Outcome, seconds: float) -> None:
+        if not self._active:
+            return
+        if outcome.payload:
+            self._topics.publishers[PAYLOAD].publish(
+                inertia_message(outcome.payload, self._settings['platform_frame']))
+        self._diagnostics.payload.done(outcome, seconds)
+        self._report()
+
     def _on_trajectory(self, data: bytes) -> None:
         if not self._active:
             return
@@ -315,7 +342,8 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics.planned_trajectory.done(outcome, time.monotonic() - came)
         self._report()
 
-    def _drop_planned_trajectories(self) -> None:
+    def _drop_work(self) -> None:
+        self._payload.drop('the node is deactivated')
         if number := self._planned.drop():
             self.get_logger().warning(
                 f'planned trajectories dropped, because the node is deactivated: {number}')
@@ -339,7 +367,8 @@ class DynamicsNode(LifecycleNode):
         if not self._active:
             return
         for topic, code in ((planned.INPUT, self._planned_code),
-                            (MEASURED_LEGS, self._external_wrench_code)):
+                            (MEASURED_LEGS, self._external_wrench_code),
+                            (MEASURED_LEGS, self._payload.code)):
             if not code.ready and self._topics.writers_of(topic):
                 code.begin()  # the first message will come soon
         reads = self._topics.publishers[BASE_WRENCH].get_subscription_count() > 0

@@ -21,7 +21,8 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+from geometry_msgs.msg import (
+    AccelStamped, InertiaStamped, PoseStamped, TwistStamped, WrenchStamped)
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
@@ -40,7 +41,8 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 # Publishers, beside those of OUTPUT_TYPES.
-DIAGNOSTICS, MARKERS, LEG_TRAJECTORY = 'diagnostics', 'markers', planned.OUTPUT
+DIAGNOSTICS, MARKERS, LEG_TRAJECTORY, PAYLOAD = (
+    'diagnostics', 'markers', planned.OUTPUT, 'payload')
 
 # So many messages of a topic may wait in the middleware.
 QUEUE = 1000
@@ -104,11 +106,11 @@ class Topics:
             What gets the bytes of a message on the other topics.
 
         """
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for topic, name in OUTPUT_TYPES.items():
-            latched = topic == 'singularity_warning'
-            self._publish(topic, _TYPES[name], QoSProfile(
-                depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL) if latched else
-                QoSProfile(depth=10))
+            self._publish(topic, _TYPES[name], latched if topic == 'singularity_warning' else
+                          QoSProfile(depth=10))
+        self._publish(PAYLOAD, InertiaStamped, latched)
         self._publish(EXTERNAL_WRENCH, WrenchStamped, QoSProfile(depth=10))
         self._publish(LEG_TRAJECTORY, JointTrajectory, QoSProfile(depth=LENGTH))
         self._publish(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), '/diagnostics')

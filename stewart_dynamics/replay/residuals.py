@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Residuals: measured minus computed leg forces, and contacts.
+Residuals: measured minus computed leg forces.
 
 Measured efforts are interpolated linearly in time onto the setpoints' stamps, between samples at
 most ``setpoint.timeout`` apart, and compared with the demanded forces: residual = measured -
@@ -167,7 +167,8 @@ class Comparison:
         # legs and axes first: sums along contiguous memory are many times as fast
         measured, computed, loads = map(np.ascontiguousarray, (
             compared.measured.T, compared.computed.T, wrench.T))
-        self._legs.add(seconds, measured - computed)
+        residual = measured - computed
+        self._legs.add(seconds, residual)
         self._wrench.add(seconds, loads)
         self._measured_squares += np.sum(measured ** 2, axis=1)
         self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
@@ -186,13 +187,20 @@ class Comparison:
             'samples_out_of_order': self._samples.out_of_order,
             'samples_jumped_back': max(self._samples.pass_number, 0),
             'gap_limit_s': self._gap * 1e-9,
-            **self._whole(),
+            **self._of_all_legs(),
             'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
             'external_wrench': {axis: self._wrench.named(number, '', unit)
                                 for number, (axis, unit) in enumerate(
                                     zip(AXES, _UNITS, strict=True))},
             'contacts': self._contacts(),
         }
+
+    def _of_all_legs(self) -> dict[str, float | None]:
+        number = 6 * self._legs.count
+        residual, measured = float(np.sum(self._legs.squares)), float(
+            np.sum(self._measured_squares))
+        return {'residual_rms_n': float(np.sqrt(residual / number)) if number else None,
+                'residual_share': float(np.sqrt(residual / measured)) if measured else None}
 
     def _leg(self, leg: int) -> dict[str, float | None]:
         number = self._legs.count
@@ -209,17 +217,6 @@ class Comparison:
             (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0))
         return {**named, 'measured_rms_n': rms[0], 'computed_rms_n': rms[1],
                 'correlation': correlation}
-
-    def _whole(self) -> dict[str, Any]:
-        """Return the residual of all legs together, and the worst leg."""
-        number = 6 * self._legs.count
-        if not number:
-            return {'residual_rms_n': None, 'residual_share': None, 'worst_leg': None}
-        squares = float(np.sum(self._legs.squares))
-        efforts = float(np.sum(self._measured_squares))
-        return {'residual_rms_n': float(np.sqrt(squares / number)),
-                'residual_share': float(np.sqrt(squares / efforts)) if efforts else None,
-                'worst_leg': self._parameters['joints'][int(np.argmax(self._legs.squares))]}
 
     def _contacts(self) -> dict[str, Any]:
         number = max(self._legs.count, 1)

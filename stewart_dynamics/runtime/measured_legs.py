@@ -31,6 +31,7 @@ from stewart_dynamics.messages.joint_state import JointStateError, JointStateRea
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.base_input import BaseInput
 from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.runtime.leg_history import LegHistory
 from stewart_dynamics.runtime.rejections import (
     BASE_NOT_KNOWN, MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
 
@@ -60,19 +61,22 @@ class MeasuredLegs:
         Called with each rejection and its details.
     noticed : callable
         Called with texts for the log: a restart.
+    history : LegHistory, optional
+        Gets the measurements that are used.
 
     """
 
     def __init__(
             self, parameters: Parameters, step: ExternalWrench,
             rejected: Callable[[Rejection, str], None],
-            noticed: Callable[[str], None]) -> None:
+            noticed: Callable[[str], None], history: LegHistory | None = None) -> None:
         self.step = step
         self._reader = JointStateReader(parameters['joints'])
         self._zero_lengths = tuple(parameters['geometry.zero_length'].tolist())
         self._timeout = round(parameters['setpoint.timeout'] * 1e9)
         self._rejected = rejected
         self._noticed = noticed
+        self._history = history
         self._last: Estimate | None = None
 
     def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
@@ -102,6 +106,8 @@ class MeasuredLegs:
         except StewartError as exc:
             self._reject(_OF_ERROR[type(exc)], str(exc))
             return None
+        if self._history is not None:
+            self._history.add(measurement.forces, self._last, known)
         return self._last
 
     def _reject(self, reason: str, details: str) -> None:

@@ -22,6 +22,7 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.base import BaseDiagnostics
 from stewart_dynamics.runtime.diagnostics.external_wrench import ExternalWrenchDiagnostics
 from stewart_dynamics.runtime.diagnostics.limits import LimitsDiagnostics
+from stewart_dynamics.runtime.diagnostics.payload import PayloadDiagnostics
 from stewart_dynamics.runtime.diagnostics.periodic_report import Report, TICK
 from stewart_dynamics.runtime.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
 from stewart_dynamics.runtime.diagnostics.setpoints import Answers, SetpointDiagnostics
@@ -58,9 +59,10 @@ class DynamicsDiagnostics:
         self.timing = TimingDiagnostics(self._answers, now)
         self.planned_trajectory = PlannedTrajectoryDiagnostics()
         self.external_wrench = ExternalWrenchDiagnostics(parameters)
+        self.payload = PayloadDiagnostics()
         self.report = Report([
             self.setpoints, self.singularity, self.limits, self.base, self.timing,
-            self.planned_trajectory, self.external_wrench], now)
+            self.planned_trajectory, self.external_wrench, self.payload], now)
 
     def answered(self, output: Output, came: float, now: float) -> bool:
         """

@@ -63,6 +63,10 @@ class ExternalWrenchDiagnostics:
         if self._begun == _NEVER:
             self._begun = now
 
+    def silence(self, now: float) -> float:
+        """Return how long no message has come [s]."""
+        return now - self._heard
+
     def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection."""
         self._rejections[rejection] += 1

@@ -1,0 +1,321 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The payload from measured legs: against Pinocchio, its intervals, what cannot be told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from referees import PinocchioReferee, random_base_motion, relative, rng, ROOT
+
+from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.mechanics.body_fit import about
+from stewart_dynamics.mechanics.linear_parameters import about_origin
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.mechanics.rows import NO_BASE
+from stewart_dynamics.runtime.external_wrench import Estimate
+from stewart_dynamics.runtime.leg_history import HIGHEST_RATE, LegHistory
+from stewart_dynamics.runtime.payload import identify, NAMES, numbers_of, Outcome, Payload
+
+Array = NDArray[np.float64]
+
+HEXAPOD = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+LOADED = HEXAPOD.replaced({
+    'platform.mass': 172.0, 'platform.center_of_mass': [0.05, 0.02, 0.16],
+    'platform.inertia': [15.0, 0.1, -0.6, 15.5, 0.3, 23.0]})
+TRUE = np.array([LOADED['platform.mass'], *LOADED['platform.center_of_mass'],
+                 *LOADED['platform.inertia']])
+SECOND = 1_000_000_000
+HOME = Motion([0.0, 0.0, 1.1], np.eye(3))
+
+
+class Noise(NamedTuple):
+    """Standard deviations of the measurements."""
+
+    rate: float = 0.0
+    """[m/s]"""
+    force: float = 0.0
+    """[N]"""
+
+
+SENSORS = Noise(1e-3, 5.0)
+
+
+def excited(seconds: Any) -> Motion:
+    """Return a motion of all six coordinates at times [s]."""
+    return motion_at(ReferenceMotionParameters.from_yaml(
+        ROOT / 'config' / 'trajectory_fourier.yaml').replaced({'loop': True}), seconds)
+
+
+def at_rest(seconds: Any) -> Motion:
+    """Return the hexapod at home at times [s]."""
+    many = len(seconds)
+    return Motion(np.tile(HOME.position, (many, 1)), np.tile(HOME.rotation, (many, 1, 1)))
+
+
+def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Noise = SENSORS,
+             seed: int = 1, true: Parameters = LOADED, **more: Any) -> LegHistory:
+    """
+    Return what is measured of a hexapod in motion, its forces those of its own parameters.
+
+    Parameters
+    ----------
+    moves : callable
+        Gives the motion at times [s]; the forces are those of the middle between two samples.
+    seconds, rate
+        How long, and how often.
+    noise, seed
+        Of the measurements.
+    true : Parameters
+        Of the hexapod.
+    more
+        ``wrench`` on the platform, of which ``known`` is known; ``base`` at times [s], ``offset``
+        of the forces [N].
+
+    """
+    random = rng(seed)
+    times = 2.0 + np.arange(round(seconds * rate) + 1) / rate
+    motion, middle = moves(times), moves(times - 0.5 / rate)
+    base, wrench = more.get('base'), more.get('wrench')
+    result = StewartPlatform(true).inverse_dynamics(
+        middle, wrench, None if base is None else base(times - 0.5 / rate))
+    forces = result.forces + more.get('offset', 0.0) + noise.force * random.normal(
+        size=result.forces.shape)
+    jacobians = StewartPlatform(true).inverse_jacobian(motion)
+    rows = motion.rows.copy()
+    rows[:, 12:18] += np.linalg.solve(
+        jacobians, noise.rate * random.normal(size=(len(times), 6, 1)))[..., 0]
+    bases = [NO_BASE] * len(times) if base is None else [
+        tuple(row) for row in base(times).rows.tolist()]
+    history = LegHistory(HEXAPOD['payload.window'])
+    for stamp, row, force, of_base in zip(
+            np.rint(times * 1e9).astype(int).tolist(), rows.tolist(), forces.tolist(), bases,
+            strict=True):
+        history.add(tuple(force), Estimate(stamp, tuple(row), None, None, of_base),
+                    more.get('known', NO_WRENCH))
+    return history
+
+
+def outcome_of(history: LegHistory, given: Parameters = HEXAPOD) -> Outcome:
+    """Return the outcome of all pieces of the work."""
+    *pieces, last = identify(history, StewartPlatform(given))
+    assert not any(pieces) and last is not None
+    return last
+
+
+def payload_of(history: LegHistory, given: Parameters = HEXAPOD) -> Payload:
+    """Return the payload, which must have been identified."""
+    outcome = outcome_of(history, given)
+    assert outcome.payload is not None, outcome.message
+    return outcome.payload
+
+
+def errors(payload: Payload, true: Array = TRUE) -> Array:
+    """Return the errors by half of the 95 % intervals (10,)."""
+    fitted = payload.fitted
+    parts: Array = np.where(fitted.known, np.array(numbers_of(fitted.body)) - true, 0.0)
+    return parts / np.where(fitted.known, fitted.half_widths, 1.0)
+
+
+def known(payload: Payload) -> list[str]:
+    """Return the names of what is known."""
+    return [name for name, is_known in zip(NAMES, payload.fitted.known, strict=True) if is_known]
+
+
+def test_mass_center_and_inertia_are_those_of_pinocchio() -> None:
+    """The forces are another program's; the noise is that of good sensors."""
+    random, rate, many = rng(3), 100.0, 500
+    times = 2.0 + np.arange(many) / rate
+    motion, middle = excited(times), excited(times - 0.5 / rate)
+    referee, history = PinocchioReferee(LOADED, random), LegHistory(10.0)
+    for stamp, row, at in zip(np.rint(times * 1e9).astype(int).tolist(), motion.rows.tolist(),
+                              range(many), strict=True):
+        forces = referee.forces(middle[at], np.zeros(6)) + 0.3 * random.normal(size=6)
+        history.add(tuple(forces), Estimate(stamp, tuple(row), None, None), NO_WRENCH)
+    payload = payload_of(history)
+    assert known(payload) == list(NAMES) and payload.fitted.consistent
+    assert np.abs(errors(payload)).max() < 1.5
+    assert payload.fitted.half_widths[0] < 0.1
+    assert payload.stamp == history.stamps(many - 1, many)[0]
+    assert payload.seconds == pytest.approx((many - 1) / rate)
+
+
+def test_about_moves_a_body() -> None:
+    center, mass, offset = np.array([0.1, -0.2, 0.3]), 7.0, np.array([0.05, 0.02, -0.1])
+    inertia = np.array([1.0, 0.1, 0.2, 1.5, -0.1, 2.0])
+    there = np.array([mass, *(mass * offset), *(inertia + about_origin(
+        mass, offset, np.zeros(6)))])
+    whole = center + offset
+    expected = [mass, *(mass * whole), *about_origin(mass, whole, inertia)]
+    np.testing.assert_allclose(about(center) @ there, expected, rtol=1e-14)
+
+
+def test_the_intervals_hold() -> None:
+    """The errors of all ten are as large as the intervals say."""
+    quiet = Noise(rate=3e-4, force=2.0)
+    parts = np.array([errors(payload_of(recorded(
+        excited, rate=200.0, noise=quiet, seed=seed))) for seed in range(20)])
+    spread = np.sqrt(np.mean(parts ** 2, axis=0)) * 1.96
+    assert np.all(spread > 0.5) and np.all(spread < 1.6), spread
+    assert np.mean(np.abs(parts) < 1.0) > 0.9
+
+
+def test_noise_in_the_rates_makes_no_inertia_smaller() -> None:
+    """As it would be without the correction: then the largest of these is 1.4."""
+    rough = Noise(rate=2e-3, force=0.1)
+    parts = [payload_of(recorded(excited, noise=rough, seed=seed)) for seed in range(5)]
+    assert all(known(each) == list(NAMES) for each in parts)
+    assert np.abs(np.mean([errors(each) for each in parts], axis=0)).max() < 0.9
+
+
+def test_at_rest_mass_and_horizontal_center_are_told_and_nothing_is_invented() -> None:
+    payload = payload_of(recorded(at_rest))
+    assert known(payload) == ['mass', 'center of mass x', 'center of mass y']
+    body, given = payload.fitted.body, payload.given
+    assert body.center[2] == given.center[2]
+    assert body.inertia.tolist() == given.inertia.tolist()
+    assert np.abs(errors(payload)[:3]).max() < 1.0
+    message = outcome_of(recorded(at_rest)).message
+    assert 'not identified, as in the parameters: center of mass z, inertia ixx, ' in message
+
+
+def test_at_rest_the_interval_has_what_coulomb_friction_can_hold() -> None:
+    """Legs that stopped after they extended carry less, as far as friction can hold them."""
+    friction = HEXAPOD['actuator.coulomb_friction']
+    for sign in (-1.0, 1.0):
+        payload = payload_of(recorded(at_rest, noise=Noise(), offset=0.7 * sign * friction))
+        error = payload.fitted.body.mass - TRUE[0]
+        assert abs(error) > 5.0
+        assert abs(errors(payload)[0]) < 2.0
+    without = HEXAPOD.replaced({'actuator.coulomb_friction': 0.0})
+    of_none = payload_of(recorded(at_rest, noise=Noise()), without)
+    assert of_none.fitted.half_widths[0] < 0.01
+
+
+def test_a_wrong_friction_costs_width_and_no_error() -> None:
+    true = LOADED.replaced({'actuator.coulomb_friction': 35.0,
+                            'actuator.viscous_friction': 400.0})
+    payload = payload_of(recorded(excited, true=true))
+    assert np.abs(errors(payload)).max() < 2.0
+    assert abs(payload.fitted.body.mass - TRUE[0]) < 0.2
+
+
+def test_a_known_load_and_a_moving_base_are_no_payload() -> None:
+    load = (40.0, -30.0, -200.0, 10.0, 20.0, -5.0)
+    random = rng(5)
+    shaken = random_base_motion(LOADED, random, 1)
+
+    def base(seconds: Any) -> BaseMotion:
+        swing = np.sin(1.3 * np.asarray(seconds))[:, None]
+        return BaseMotion(
+            np.tile([0.0, 0.0, -9.80665], (len(seconds), 1)),
+            0.05 * swing * shaken.linear_acceleration, 0.05 * swing * shaken.angular_velocity,
+            0.05 * 1.3 * np.cos(1.3 * np.asarray(seconds))[:, None] * shaken.angular_velocity)
+
+    payload = payload_of(recorded(excited, base=base, wrench=load, known=load))
+    assert np.abs(errors(payload)).max() < 2.0
+    # It is 200 N, where nobody knows it.
+    heavier = payload_of(recorded(excited, wrench=load))
+    assert heavier.fitted.body.mass - TRUE[0] == pytest.approx(200.0 / 9.80665, abs=2.0)
+
+
+def test_what_the_message_says_can_be_a_parameter_file(tmp_path: Any) -> None:
+    outcome = outcome_of(recorded(excited))
+    assert outcome.message.startswith('mass 17') and ' +- 0.0' in outcome.message
+    assert 'platform.mass +2' in outcome.message
+    _, _, text = outcome.message.rpartition('; platform: ')
+    file = tmp_path / 'payload.yaml'
+    file.write_text(f'/**:\n  ros__parameters:\n    platform: {text}\n', encoding='utf-8')
+    Parameters.check_file(file)
+    assert text.startswith('{mass: 17')
+
+
+def test_an_inertia_that_no_body_has_is_not_given() -> None:
+    """A moment of inertia larger than the sum of the other two."""
+    flat = LOADED.replaced({'platform.inertia': [8.0, 0.1, -0.6, 8.0, 0.3, 23.0]})
+    outcome = outcome_of(recorded(excited, noise=Noise(force=0.1), true=flat))
+    assert outcome.payload is not None and not outcome.payload.fitted.consistent
+    assert 'no real body has the inertia that fits best' in outcome.message
+    assert outcome.payload.fitted.body.inertia.tolist() == (
+        HEXAPOD['platform.inertia'].tolist())
+
+
+@pytest.mark.parametrize(('history', 'said'), [
+    (LegHistory(10.0), 'no measured legs'),
+    (recorded(excited, seconds=1.5), 'too short: 1.5 s of measured legs, 2.0 s without gaps '),
+    (recorded(excited, seconds=8.0, rate=8.0), 'too short: 8.0 s of measured legs, '),
+], ids=['none', 'short', 'gaps'])
+def test_where_there_is_too_little_it_says_why(history: LegHistory, said: str) -> None:
+    outcome = outcome_of(history)
+    assert outcome.payload is None
+    assert outcome.message.startswith(said)
+
+
+def test_forces_of_the_wrong_sign_are_named() -> None:
+    history, wrong = recorded(excited), LegHistory(10.0)
+    for row in history.rows(0, history.count):
+        wrong.add(tuple(-row[19:25]), Estimate(
+            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
+    outcome = outcome_of(wrong)
+    assert outcome.payload is None
+    assert outcome.message.startswith('the measured forces are -1.')
+    assert outcome.message.endswith('likely they have another sign')
+
+
+def test_after_a_restart_only_what_follows_counts() -> None:
+    history = recorded(excited, true=HEXAPOD)
+    for row in recorded(excited, seconds=4.0).rows(0, 2001):
+        history.add(tuple(row[19:25]), Estimate(
+            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
+    payload = payload_of(history)
+    assert payload.seconds == 4.0
+    assert abs(payload.fitted.body.mass - TRUE[0]) < 0.5
+
+
+def add(history: LegHistory, stamps: Sequence[int]) -> None:
+    """Add measurements with these stamps, which are their forces as well."""
+    for stamp in stamps:
+        history.add((float(stamp),) * 6, Estimate(
+            stamp, tuple(map(float, range(24))), None, None), NO_WRENCH)
+
+
+def test_the_history_is_a_ring_and_keeps_stamps_exact() -> None:
+    history = LegHistory(0.01)
+    assert history.capacity == round(0.01 * HIGHEST_RATE)
+    begin = 1_700_000_000_000_000_000
+    add(history, range(begin, begin + 7))
+    assert (history.first, history.count) == (0, 7)
+    add(history, range(begin + 7, begin + 50))
+    assert (history.first, history.count) == (30, 50)
+    assert history.stamps(30, 50).tolist() == list(range(begin + 30, begin + 50))
+    rows = history.rows(30, 50)
+    assert rows[:, 1:19].tolist() == [list(map(float, range(18)))] * 20
+    assert relative(rows[:, 19:25], np.arange(begin + 30, begin + 50)[:, None]) < 1e-15
+
+
+def test_what_is_overwritten_while_it_works_is_left_out() -> None:
+    history = recorded(excited, seconds=10.0, rate=HIGHEST_RATE)
+    work = identify(history, StewartPlatform(HEXAPOD))
+    next(work)
+    add(history, range(12 * SECOND, 12 * SECOND + history.capacity // 2))
+    *_, outcome = work
+    assert outcome is not None and outcome.payload is not None
+    assert abs(outcome.payload.fitted.body.mass - TRUE[0]) < 0.2
