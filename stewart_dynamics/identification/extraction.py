@@ -126,7 +126,7 @@ class Extraction:
             window.efforts[self._wide.half:-self._wide.half], self._narrow.taps(order), self.step)
             for order in range(ORDERS)], axis=-1)
         wrong, stops = self._wrong(window)
-        times = (self.margin + self.step * np.arange(many)) * self._period
+        times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
         at = half + self.step * np.arange(many)
         return Extract(times, regressor, known, efforts, ~wrong[:many], rates[at], deviations,
                        stops, Pose.of_rows(found.rows[-1]))

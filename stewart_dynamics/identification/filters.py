@@ -78,10 +78,10 @@ class LowPass(NamedTuple):
 
     def fused(self, order: int, deviation: float, rate_deviation: float) -> tuple[Array, Array]:
         """Return the numbers for positions and for rates, by their standard deviations."""
-        def of_positions(w: Array) -> Array:
+        def of_positions(w: Array) -> Any:
             return rate_deviation ** 2 / (rate_deviation ** 2 + (w * deviation) ** 2)
 
-        def of_rates(w: Array) -> Array:
+        def of_rates(w: Array) -> Any:
             return -1j * w * deviation ** 2 / (rate_deviation ** 2 + (w * deviation) ** 2)
 
         return (self._sampled(lambda w: (1j * w) ** order * of_positions(w)),
@@ -97,7 +97,7 @@ class LowPass(NamedTuple):
         many = 8 * self.half + 8
         circle = np.zeros(many)
         circle[lags] = pulse
-        w = 2.0 * np.pi * np.fft.rfftfreq(many, self.period)
+        w = np.asarray(2.0 * np.pi * np.fft.rfftfreq(many, self.period), dtype=np.float64)
         impulse = np.fft.irfft(np.fft.rfft(circle) * response(w), many)
         # y(t) = sum h(k) x(t - k): the newest sample, k = -half, last
         taps: Array = impulse[lags[::-1]]
@@ -110,8 +110,8 @@ class LowPass(NamedTuple):
         of_parts = np.array([parts.sum(axis=0), wave @ parts])
         system = np.array([of_parts[0].real, of_parts[1].real, of_parts[1].imag])
         off = should * np.array([1.0, pulse @ wave]) - is_now
-        return taps + parts @ np.linalg.solve(
-            system, np.array([off[0].real, off[1].real, off[1].imag]))
+        right: Array = np.linalg.solve(system, np.array([off[0].real, off[1].real, off[1].imag]))
+        return taps + parts @ right
 
 
 def convolved(signal: Array, taps: Array) -> Array:
@@ -129,7 +129,7 @@ def decimated(signal: Array, taps: Array, step: int) -> Array:
     blocks = -(-len(taps) // step)
     padded = np.zeros(blocks * step)
     padded[:len(taps)] = taps
-    flat = signal.reshape(len(signal), -1)
+    flat: Array = signal.reshape(len(signal), -1)
     short = (many + blocks - 1) * step - len(flat)
     if short > 0:
         flat = np.concatenate([flat, np.zeros((short, flat.shape[1]))])
@@ -143,4 +143,5 @@ def decimated(signal: Array, taps: Array, step: int) -> Array:
 def white_deviation(signal: Array) -> Array:
     """Return the standard deviation of the white noise in a smooth signal (N, k), by columns."""
     # Fourth differences remove the signal; 1 4 6 4 1 have the sum of squares 70.
-    return np.sqrt(np.mean(np.diff(signal, 4, axis=0) ** 2, axis=0) / 70.0)
+    deviations: Array = np.sqrt(np.mean(np.diff(signal, 4, axis=0) ** 2, axis=0) / 70.0)
+    return deviations

@@ -38,6 +38,11 @@ _STEPS = 30
 _DONE = 1e-10
 # Taylor's series of the delay hold up to this change in one step [s].
 LONGEST_DELAY = 0.02
+# The derivative of the efforts tells a delay if it is so many times that of noise, squared.
+_TIMES_NOISE = 10.0
+# Unknowns of which less than this part is told are not told at all.
+LEAST_TOLD = 0.1
+_HELD = 1e-6
 # Below this variance [N^2] efforts are exact.
 _SMALLEST_VARIANCE = 1e-12
 
@@ -55,7 +60,7 @@ class Fit(NamedTuple):
     delays : (B,)
         Of the efforts of each bag [s], + later than the positions.
     delay_errors : (B,)
-        Their standard errors, for white noise.
+        Their standard errors, for white noise; 0 where the motion does not tell the delay.
     variances : (B, 6)
         Of the residuals [N^2].
     identifiability : Identifiability
@@ -78,7 +83,7 @@ class Fit(NamedTuple):
 
 
 def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float | None = None,
-        with_delay: bool = True, largest_error: float = LARGEST_ERROR) -> Fit:
+        cutoffs: Array | None = None, largest_error: float = LARGEST_ERROR) -> Fit:
     """
     Return the unknowns that fit the samples best.
 
@@ -92,26 +97,39 @@ def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float
         The sums of the noise in the regressor alone.
     prior : float, optional
         The file's values are as good as this part of the unknowns' scales: they count as well.
-    with_delay : bool
-        Find delays; otherwise they are zero.
+    cutoffs : (B,), optional
+        Of the filter of each bag [Hz]; find delays. By default they are zero.
     largest_error : float
         Of a direction that is known, see ``least_squares``.
 
     """
+    found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs, largest_error)
+    not_told = found.identifiability.told < LEAST_TOLD
+    if not not_told.any():
+        return found
+    # What is hardly told is held at the file's value, not moved by what is told of it.
+    found = _fit(sums, unknowns, np.where(not_told, _HELD, 1.0) * unknowns.scales, noise, prior,
+                 cutoffs, largest_error)
+    return found._replace(values=np.where(not_told, unknowns.start, found.values))
+
+
+def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, prior: float | None,
+         cutoffs: Array | None, largest_error: float) -> Fit:
     values = unknowns.start.copy()
     bags = len(sums.counts)
-    delays, errors = np.zeros(bags), np.zeros(bags)
+    delays: Array = np.zeros(bags)
+    errors: Array = np.zeros(bags)
     variances = _variances(sums, unknowns, values, delays)
     solution = None
     for _ in range(_STEPS):
         information, steps, of_noise = _information(
-            sums, unknowns, values, delays, variances, noise, with_delay)
+            sums, unknowns, values, delays, variances, noise, cutoffs)
         if prior is not None:
             strength = np.diag((prior * unknowns.scales) ** -2.0)
             information = information._replace(
                 matrix=information.matrix + strength,
                 vector=information.vector + strength @ unknowns.start)
-        solution = solve(information, unknowns.start, unknowns.scales, of_noise, largest_error)
+        solution = solve(information, unknowns.start, scales, of_noise, largest_error)
         change = solution.values - values
         largest = float(np.max(np.abs(change) / unknowns.scales, initial=0.0))
         # A mass far from the file's: its products are linear in a part of the way only.
@@ -122,6 +140,7 @@ def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float
         values = values + change
         for bag, (step, along, error) in enumerate(steps):
             delays[bag] += float(np.clip(step + along @ change, -LONGEST_DELAY, LONGEST_DELAY))
+            delays[bag] *= error > 0.0
             errors[bag] = error
         delays = np.clip(delays, -LONGEST_DELAY, LONGEST_DELAY)
         variances = _variances(sums, unknowns, values, delays)
@@ -129,8 +148,8 @@ def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float
             break
     assert solution is not None
     information, steps, of_noise = _information(
-        sums, unknowns, values, delays, variances, noise, with_delay)
-    final = solve(information, unknowns.start, unknowns.scales, of_noise, largest_error)
+        sums, unknowns, values, delays, variances, noise, cutoffs)
+    final = solve(information, unknowns.start, scales, of_noise, largest_error)
     bounded, at_bound = consistent(unknowns, values, information, final.identifiability)
     return Fit(bounded, final.covariance, delays, errors, variances, final.identifiability,
                information.matrix, at_bound)
@@ -154,15 +173,19 @@ def without_delay(normal: Array) -> Array:
 
 
 def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, variances: Array,
-                 noise: Array | None, with_delay: bool,
+                 noise: Array | None, cutoffs: Array | None,
                  ) -> tuple[Information, list[tuple[float, Array, float]], Array | None]:
     """Return what the sums tell, how each delay follows, and what noise alone seems to tell."""
     theta, derivative = unknowns.theta(values), unknowns.derivative(values)
     total, steps = nothing(len(values)), []
     for bag, delay in enumerate(delays):
         c = residual_of(theta, delay)
-        e = directions(unknowns, values, delay, with_delay)
         gram = np.tensordot(1.0 / variances[bag], sums.grams[bag], axes=1)
+        by_delay = delayed_by(theta, delay)
+        # By its weighted residuals' own: what white noise up to the cut-off makes of it.
+        told = cutoffs is not None and by_delay @ gram @ by_delay > (
+            _TIMES_NOISE * sums.counts[bag].sum() * (2.0 * np.pi * cutoffs[bag]) ** 2 / 3.0)
+        e = directions(unknowns, values, delay, told)
         normal, vector = e.T @ gram @ e, e.T @ gram @ c
         along = without_delay(normal)
         alone = float(vector[-1] / normal[-1, -1]) if normal[-1, -1] > 0.0 else 0.0
@@ -171,7 +194,7 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
         total = total.plus(Information(
             matrix, of_values + matrix @ values, float(c @ gram @ c),
             int(sums.counts[bag].sum())))
-        steps.append((alone, along, float(normal[-1, -1] ** -0.5) if alone else 0.0))
+        steps.append((alone, along, float(normal[-1, -1] ** -0.5) if told else 0.0))
     if noise is None:
         return total, steps, None
     mean = np.average(1.0 / variances, axis=0, weights=np.maximum(sums.counts.sum(axis=1), 1))
@@ -182,4 +205,5 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
 def _variances(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
     squares = sums.squares(unknowns.theta(values), delays)
     used = np.maximum(sums.counts - len(values) / 6.0, 1.0)
-    return np.maximum(squares / used, _SMALLEST_VARIANCE)
+    variances: Array = np.maximum(squares / used, _SMALLEST_VARIANCE)
+    return variances

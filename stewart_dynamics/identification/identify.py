@@ -229,7 +229,7 @@ class Identification:
 
     def result(self) -> Identified:
         """Return what the bags tell."""
-        options, unknowns, bags = self._options, self.unknowns, len(self.bags)
+        options, unknowns = self._options, self.unknowns
         if self.extracts.samples < _FEWEST:
             raise BagError(f'{self.bags[0].path}: {self.extracts.samples} samples are left after '
                            f'the filters: must be at least {_FEWEST}')
@@ -238,21 +238,20 @@ class Identification:
         unsound = sum(int(np.count_nonzero(~each)) for each in self.chosen)
         sums = self._sums()
         likely = list(of_efforts(sums, unknowns, self.parameters, options.motor_torque))
-        found = fit(sums, unknowns, noise, options.prior, options.delay)
+        found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
         outliers = self._leave_out_outliers(found)
         if outliers:
             sums = self._sums()
-            found = fit(sums, unknowns, noise, options.prior, options.delay)
+            found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
         errors = errors_of(self.extracts, sums, unknowns, found, self.chosen, options.prior)
         after = _rms(sums, unknowns, found.values, found.delays)
         measured = _measured(sums)
         if not likely:
             assert self._first is not None
             likely += of_kinematics(self.parameters, unknowns, *self._first, found, float(
-                np.sqrt(np.mean(after ** 2) / max(np.mean(measured ** 2), 1e-300))))
-        values = np.where(found.identifiability.shares < 1.0 - 1e-9, found.values, unknowns.start)
+                np.sqrt(np.mean(after ** 2) / (np.mean(measured ** 2) + 1e-300))))
         return Identified(
-            unknowns.parameters(values), unknowns, found, errors, tuple(self.bags),
+            unknowns.parameters(found.values), unknowns, found, errors, tuple(self.bags),
             self.extracts.samples, outliers, unsound,
             _rms(sums, unknowns, unknowns.start, found.delays), after, measured,
             self._validation(noise) if options.hold_out else None, tuple(likely))
@@ -261,8 +260,11 @@ class Identification:
         return sums_of(self.extracts, len(self.bags),
                        chosen or (lambda block: self.chosen[block.number]))
 
+    def _cutoffs(self) -> Array | None:
+        return np.array([bag.cutoff for bag in self.bags]) if self._options.delay else None
+
     def residuals(self, found: Fit) -> Sequence[Array]:
-        """Return the residuals (N, 6) of each block [N]."""
+        """Return the residuals of each block, (N, 6) [N]."""
         theta = self.unknowns.theta(found.values)
         return [block.columns @ residual_of(theta, found.delays[block.bag])
                 for block in self.extracts]
@@ -296,7 +298,7 @@ class Identification:
         train = self._sums(lambda block: self.chosen[block.number] & ~held_out(block))
         if min(test.counts.sum(axis=0)) < _FEWEST or min(train.counts.sum(axis=0)) < _FEWEST:
             return None
-        found = fit(train, self.unknowns, noise * (1.0 - part), options.prior, options.delay)
+        found = fit(train, self.unknowns, noise * (1.0 - part), options.prior, self._cutoffs())
         return Validation(
             _rms(test, self.unknowns, self.unknowns.start, found.delays),
             _rms(test, self.unknowns, found.values, found.delays), _measured(test),

@@ -79,4 +79,3 @@ def motions(platform: StewartPlatform, poses: Pose, rates: Array, accelerations:
              + across / lengths)
     rows[:, ACCELERATION] = np.linalg.solve(j_inv, (accelerations - drift)[..., None])[..., 0]
     return rows
-

@@ -36,7 +36,7 @@ from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.least_squares import information, Information, nothing, solve
+from stewart_dynamics.mechanics.least_squares import Information, information, nothing, solve
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.parameters import Parameters
 
@@ -47,12 +47,17 @@ _FAR = 2.0
 _FACTORS = ((1e-3, 'kN in place of N'), (1.0 / 9.80665, 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 # A residual above this part of the efforts calls for a search.
-_SUSPICIOUS = 0.05
+_SUSPICIOUS = 0.03
 # What is found must make it smaller by this.
 _BETTER = 0.5
+# Part of the samples that must be sound for a comparison.
+_FEWEST = 0.5
+# For a zero length it need not become so much smaller: it is told well.
+_SMALL_GAIN = 0.85
 # Recorded samples of the search at most.
 _PIECE = 12_000
-_ZERO_LENGTHS = (-0.3, -0.2, -0.1, -0.05, -0.02, 0.02, 0.05, 0.1, 0.2, 0.3)  # [m]
+# Of geometry.zero_length: a change that is tried [m], the smallest that is named, steps.
+_CHANGE, _NAMED, _STEPS = 1e-3, 2e-3, 6
 
 
 class Likely(NamedTuple):
@@ -127,7 +132,7 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
 def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
                   guess: Pose, fit: Fit, residual: float) -> Iterator[Likely]:
     """
-    Yield likely mistakes of legs and lengths, if the residual is a large part of the efforts.
+    Yield likely mistakes of zero length, and of legs where the residual is a large part.
 
     Parameters
     ----------
@@ -145,13 +150,20 @@ def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, win
         RMS of the residuals, as a part of that of the efforts.
 
     """
-    if residual < _SUSPICIOUS:
-        return
     piece = _piece(window, extraction)
-    now = _misfit(unknowns, extraction(piece, pose_near(
-        extraction.platform, piece.positions[0] + p['geometry.zero_length'])), fit)
-    found = [(now, '', '')]
+    now = _tried(p, unknowns, extraction, piece, fit)
     joints = p['joints']
+    found = [(now, '', '')]
+    suspicious = residual > _SUSPICIOUS
+    for legs, what in ((range(6), ''), *(([n], f' of {joints[n]}') for n in range(6)
+                                         if suspicious)):
+        offset, misfit = _zero_length(p, unknowns, extraction, piece, fit, list(legs))
+        if abs(offset) > _NAMED:
+            found.append((misfit / _SMALL_GAIN * _BETTER, 'zero_length', (
+                f'geometry.zero_length{what} looks wrong: {1e3 * offset:+.1f} mm fit')))
+    if not suspicious:
+        yield from _best(found, now)
+        return
     for a, b in combinations(range(6), 2):
         order = list(range(6))
         order[a], order[b] = b, a
@@ -166,15 +178,47 @@ def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, win
             misfit = _tried(p, unknowns, extraction, swapped, fit)
             found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} look '
                                              'swapped'))
-    for offset in _ZERO_LENGTHS:
-        shifted = piece._replace(positions=piece.positions + offset)
-        misfit = _tried(p, unknowns, extraction, shifted, fit)
-        found.append((misfit, 'zero_length', 'geometry.zero_length looks wrong by about '
-                                             f'{offset:+g} m (add it)'))
-    best = min(found)
-    if best[1] and best[0] < _BETTER * now:
-        yield Likely(best[1], f'{best[2]}: the residual becomes {best[0] / now:.2f} times as '
-                              'large')
+    yield from _best(found, now)
+
+
+def _best(found: list[tuple[float, str, str]], now: float) -> Iterator[Likely]:
+    misfit, what, text = min(found)
+    if what and misfit < _BETTER * now:
+        part = misfit / now * (_SMALL_GAIN / _BETTER if what == 'zero_length' else 1.0)
+        yield Likely(what, f'{text}: the residual becomes {part:.2f} times as large')
+
+
+def _zero_length(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
+                 fit: Fit, legs: list[int]) -> tuple[float, float]:
+    """Return the change of the zero length of some legs that fits [m], and the residual [N]."""
+    shift = np.zeros(6)
+    shift[legs] = 1.0
+    offset, last = 0.0, float('inf')
+    for _ in range(_STEPS):
+        try:
+            extracts = [extraction(moved, pose_near(
+                extraction.platform, moved.positions[0] + p['geometry.zero_length']))
+                for moved in (window._replace(positions=window.positions + change * shift)
+                              for change in (offset, offset + _CHANGE))]
+        except (PoseError, SingularityError):
+            break
+        misfit, theta, _ = _fitted(unknowns, extracts[0], fit)
+        if not misfit < last:
+            break
+        last = misfit
+        first, second = extracts
+        by_offset = ((second.regressor - first.regressor) @ theta
+                     + second.known - first.known) / _CHANGE
+        both = first._replace(regressor=np.concatenate(
+            [first.regressor, by_offset[..., None]], axis=-1))
+        _, values, error = _fitted(unknowns, both, fit)
+        step = float(np.clip(values[-1], -0.1, 0.1))
+        if not error < _CHANGE:  # the motion does not tell it
+            return 0.0, float('inf')
+        if abs(step) < 0.1 * _NAMED:
+            break
+        offset += step
+    return offset, last
 
 
 def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, float]:
@@ -232,13 +276,13 @@ def _tried(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
            ) -> float:
     try:
         guess = pose_near(extraction.platform, window.positions[0] + p['geometry.zero_length'])
-        return _misfit(unknowns, extraction(window, guess), fit)
+        return _fitted(unknowns, extraction(window, guess), fit)[0]
     except (PoseError, SingularityError):
         return float('inf')
 
 
-def _misfit(unknowns: Unknowns, extract: Extract, fit: Fit) -> float:
-    """Return the RMS residual of a fit of all linear parameters to an extract [N]."""
+def _fitted(unknowns: Unknowns, extract: Extract, fit: Fit) -> tuple[float, Array, float]:
+    """Return the RMS residual [N], the linear parameters that fit, and the last one's error."""
     shifts = residual_of(np.zeros(0), float(fit.delays[0]))[1:]
     efforts = extract.efforts @ shifts - extract.known
     samples = information(extract.regressor, efforts, extract.sound.astype(float))
@@ -246,4 +290,9 @@ def _misfit(unknowns: Unknowns, extract: Extract, fit: Fit) -> float:
     scaled = samples._replace(matrix=samples.matrix / np.outer(sizes, sizes),
                               vector=samples.vector / sizes)
     found = solve(scaled, np.zeros(len(sizes)), np.ones(len(sizes)), largest_error=1e4)
-    return float(np.sqrt(scaled.residual_squares(found.values) / max(samples.rows, 1)))
+    if samples.rows < _FEWEST * extract.sound.size:
+        return float('inf'), found.values, float('inf')
+    misfit = float(np.sqrt(scaled.residual_squares(found.values) / samples.rows))
+    error = float(misfit * np.sqrt(found.covariance[-1, -1]) / sizes[-1]) if (
+        found.identifiability.identifiable[-1]) else float('inf')
+    return misfit, found.values / sizes, error

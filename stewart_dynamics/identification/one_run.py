@@ -23,8 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
-
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.options import Options
@@ -36,12 +34,13 @@ from stewart_dynamics.replay import mcap_scan, message_blocks
 from stewart_dynamics.replay.bags import bytes_of
 from stewart_dynamics.replay.results_folder import (
     check_free, remove_abandoned, whole_folder, write_json)
+from tqdm import tqdm
 
 PARAMETERS, RESULT, REPORT = 'identified.yaml', 'identification.json', 'report.html'
 
 # The machine code that every identification needs.
-FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors, *message_blocks.FUNCTIONS,
-             mcap_scan.scan)
+FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
+             *message_blocks.FUNCTIONS, mcap_scan.scan)
 
 
 def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Options,

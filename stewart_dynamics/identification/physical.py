@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import Identifiability, Information
 from stewart_dynamics.mechanics.pseudo_inertia import (
@@ -55,7 +55,7 @@ def consistent(unknowns: Unknowns, values: Array, information: Information,
     # What is not told is held as firmly as its scale; it decides where nothing else does.
     matrix = information.matrix + np.diag(unknowns.scales ** -2.0)
     beyond: list[str] = []
-    free = np.ones(len(values), dtype=bool)
+    free: Flags = np.ones(len(values), dtype=bool)
     found = values
     for _ in range(len(values)):
         negative = [n for n in unknowns.not_negative() if found[n] < 0.0 and free[n]]
@@ -71,7 +71,7 @@ def consistent(unknowns: Unknowns, values: Array, information: Information,
     return found, tuple(beyond)
 
 
-def _held(matrix: Array, values: Array, free: Array) -> Array:
+def _held(matrix: Array, values: Array, free: Flags) -> Array:
     """Return the values with some at zero and the others where the information wants them."""
     at_zero = np.where(free, values, 0.0)
     change = at_zero - values

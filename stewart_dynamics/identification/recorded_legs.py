@@ -35,6 +35,7 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 _WINDOW = 1 << 16
 # Larger than any position [m] or force [N]: squares would overflow.
 _END = 1e100
+_SECOND = 1_000_000_000
 _LEGS, _EFFORTS = 'legs', 'efforts'
 
 
@@ -184,11 +185,12 @@ class RecordedLegs:
             inner = Signal(legs.stamps[part], legs.values[part]).between(0, end)
             if len(inner.stamps) < 8:
                 continue
-            pushes = efforts.between(int(inner.stamps[0]) - 10 ** 9, int(inner.stamps[-1]) + 10 ** 9)
+            pushes = efforts.between(
+                int(inner.stamps[0]) - _SECOND, int(inner.stamps[-1]) + _SECOND)
             window = uniform(inner, pushes, self.period, bool(self.rates))
             if window is not None:
                 yield window
-        keep = end if last else end - int(self._overlap * 1e9)
+        keep = end if last else end - round(self._overlap * _SECOND)
         self._legs.keep_from(keep)
         self._efforts.keep_from(keep)
 

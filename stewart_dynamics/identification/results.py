@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.identification.fit import LEAST_TOLD
 from stewart_dynamics.identification.identify import Identified
 from stewart_dynamics.identification.intervals import TWO_SIDED
 from stewart_dynamics.identification.options import Options
@@ -62,8 +63,8 @@ def document(found: Identified, options: Options) -> dict[str, Any]:
             'samples_at_stops': bag.stops, 'samples_outliers': bag.outliers,
             'noise_of_lengths_m': bag.deviations[0], 'noise_of_rates_m_s': _plain(
                 bag.deviations[1]),
-            'delay_s': float(delay) if options.delay else None,
-            'delay_standard_error_s': float(error) if options.delay else None,
+            'delay_s': float(delay) if error else None,
+            'delay_standard_error_s': float(error) if error else None,
             'missing': bag.missing, 'notices': bag.notices,
         } for bag, delay, error in zip(
             found.bags, found.fit.delays, found.errors.delays, strict=True)],
@@ -90,9 +91,8 @@ def document(found: Identified, options: Options) -> dict[str, Any]:
 
 def _states(found: Identified) -> list[str]:
     what = found.fit.identifiability
-    told = np.sqrt(np.sum(what.directions[:, :what.rank] ** 2, axis=1))
-    return [IDENTIFIED if known else IN_COMBINATION if part > 0.1 else NOT_TOLD
-            for known, part in zip(what.identifiable, told, strict=True)]
+    return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_TOLD else NOT_TOLD
+            for known, part in zip(what.identifiable, what.told, strict=True)]
 
 
 def _errors(found: Identified) -> Array:
@@ -109,11 +109,11 @@ def _combinations(found: Identified) -> list[dict[str, Any]]:
     for each in combinations(found.fit.identifiability):
         places = list(each.parameters)
         c = each.coefficients
-        variance = c @ found.errors.covariance[np.ix_(places, places)] @ c
+        variance = float(c @ found.errors.covariance[np.ix_(places, places)] @ c)
         result.append({
             'parameters': [u.names[n] for n in places], 'coefficients': c.tolist(),
             'unit': u.units[places[0]], 'value': float(c @ values[places]),
-            'standard_error': float(math.sqrt(max(variance, 0.0))),
+            'standard_error': math.sqrt(max(variance, 0.0)),
             'words': in_words(c, [u.names[n] for n in places])})
     return result
 

@@ -91,7 +91,7 @@ def _not_told(result: Mapping[str, Any]) -> list[str]:
     not_told = [each['name'] for each in result['parameters'] if each['state'] == NOT_TOLD]
     lines = []
     if not_told:
-        lines += ['', 'the motion does not tell (the file\'s values are kept):',
+        lines += ['', "the motion does not tell (the file's values are kept):",
                   *(f'  {name}' for name in grouped(not_told))]
     if result['combinations']:
         lines += ['', 'of these it tells only combinations:']

@@ -102,7 +102,7 @@ class Unknowns:
         names = names_of(p)
         self.names = (*(_PLATFORM[n] for n in self._platform), *(names[n] for n in legs))
         self.units = (*(_PLATFORM_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs))
-        self._of_file = np.concatenate([
+        self._of_file: Array = np.concatenate([
             [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia']])
         self.start: Array = np.concatenate([self._of_file[self._platform], self._theta[legs]])
         of_kinds = np.concatenate([_platform_scales(p)[self._platform], _leg_scales(p)[legs]])
@@ -122,10 +122,12 @@ class Unknowns:
 
     def theta(self, values: Array) -> Array:
         """Return the linear parameters (n,) of values (k,)."""
-        return np.concatenate([_inertial(self._whole(values)), values[self.many_of_platform:]])
+        theta: Array = np.concatenate(
+            [_inertial(self._whole(values)), values[self.many_of_platform:]])
+        return theta
 
     def derivative(self, values: Array) -> Array:
-        """Return the derivative (n, k) of the linear parameters."""
+        """Return the derivative of the linear parameters, (n, k)."""
         d: Array = np.zeros((len(self.linear), len(values)))
         d[:PLATFORM, :self.many_of_platform] = _inertial_derivative(
             self._whole(values))[:, self._platform]

@@ -30,7 +30,8 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 
 # A longer time between two samples, in periods, is a gap.
 GAP = 4.0
-# A sample is an outlier if it is so many deviations off the median of the five around it.
+# A sample is an outlier if it is so many deviations off the cubic through its neighbours, and
+# half as many off the median of the five around it.
 _OUTLIER = 12.0
 # At most so many neighbours are replaced; more of them are no outlier but a step.
 _LONGEST = 3
@@ -101,11 +102,11 @@ def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> W
     many = int((end - begin) * 1e-9 / period + 1e-6) + 1
     if many < 8:
         return None
-    at = np.arange(many) * period
+    at = period * np.arange(many, dtype=float)
     (positions, replaced), (pushes, replaced_too) = (
         _without_outliers(each) for each in (legs.values[:, :6], efforts.values))
-    of_legs = (legs.stamps - begin) * 1e-9
-    of_efforts = (efforts.stamps - begin) * 1e-9
+    of_legs, of_efforts = (1e-9 * (each.stamps - begin).astype(float)
+                           for each in (legs, efforts))
     outliers = _near(of_legs, replaced, at, period) | _near(of_efforts, replaced_too, at, period)
     # Where efforts are missing there is nothing to fit.
     after = np.clip(np.searchsorted(of_efforts, at), 1, len(of_efforts) - 1)
@@ -137,10 +138,11 @@ def interpolated(times: Array, values: Array, at: Array) -> Array:
 def _without_outliers(values: Array) -> tuple[Array, Flags]:
     """Return values (N, k) with single wild ones replaced by their neighbours, and which."""
     five = np.stack([np.roll(values, shift, axis=0) for shift in range(-2, 3)])
-    off = np.abs(values - np.median(five, axis=0))
-    off[:2] = off[-2:] = 0.0
-    usual = np.maximum(np.median(off, axis=0) / 0.6745, 1e-12 + 1e-9 * np.abs(values).max(axis=0))
-    wild = off > _OUTLIER * np.maximum(usual, 2.0 * off.mean(axis=0))
+    off = np.abs(values - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0)
+    usual = np.median(off, axis=0) / 0.6745 + 1e-9 * np.abs(values).max(axis=0)
+    wild = (off > _OUTLIER * usual) & (
+        np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual)
+    wild[:2] = wild[-2:] = False
     if not wild.any():
         return values, wild
     clean = values.copy()

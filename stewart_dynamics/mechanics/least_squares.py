@@ -110,6 +110,12 @@ class Identifiability(NamedTuple):
         return self.shares <= LARGEST_SHARE
 
     @property
+    def told(self) -> Array:
+        """Return the share (n,) of the known directions in each parameter, 0 to 1."""
+        told: Array = np.sqrt(np.sum(self.directions[:, :self.rank] ** 2, axis=1))
+        return told
+
+    @property
     def known(self) -> Array:
         """Return the known directions (n, rank) in the parameters' units."""
         return self.scales[:, None] * self.directions[:, :self.rank]

@@ -21,7 +21,7 @@ function layout(y, more) {
 const columns = data.curves.map(numbers);
 const times = columns[0];
 const line = (name, y, color, width, dash) => (
-  {x: times, y, name, type: 'scattergl', mode: 'lines', line: {color, width, dash}, connectgaps: false});
+  {x: times, y, name, type: 'scatter', mode: 'lines', line: {color, width, dash}, connectgaps: false});
 const less = (a, b) => a.map((each, n) => each - b[n]);
 
 // Forces and residuals of one leg.

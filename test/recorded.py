@@ -1,0 +1,171 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Recorded legs for tests and benchmarks: motions, forces by Pinocchio, noise, and bags of them.
+
+The forces are not this package's: they are those of ``referees.PinocchioReferee``, in a file of
+the temporary folder between the tests of one run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from referees import PinocchioReferee, rng, rotation_about
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
+
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.messages.joint_state import JointStateWriter
+
+Array = NDArray[np.float64]
+
+TOPIC = '/stewart_dynamics/measured_legs'
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+START = 1_700_000_000_000_000_000
+HOME = np.array([0.0, 0.0, 1.1])
+AMPLITUDES = np.array([0.09, 0.09, 0.06, 0.12, 0.12, 0.15])  # RMS [m, rad]
+MotionAt = Callable[[Array], Motion]
+
+
+class Recorded(NamedTuple):
+    """What was recorded of the legs, N samples."""
+
+    times: Array
+    positions: Array
+    rates: Array | None
+    efforts: Array
+
+
+class Noise(NamedTuple):
+    """Standard deviations, and the delay of the efforts."""
+
+    length: float = 1e-5
+    rate: float = 1e-3
+    effort: float = 5.0
+    coloured: float = 2.0
+    """Correlated over 50 ms."""
+    delay: float = 3e-3
+
+
+def fourier(seed: int, base: float = 0.1, harmonics: int = 12) -> MotionAt:
+    """Return a periodic motion around the home of config/platform.yaml."""
+    a = rng(seed).normal(size=(2, harmonics, 6))
+    a *= AMPLITUDES / np.sqrt(np.sum(a ** 2, axis=(0, 1)))
+    w = 2.0 * np.pi * base * np.arange(1, harmonics + 1)[:, None]
+
+    def at(times: Array) -> Motion:
+        phase = np.asarray(times)[:, None, None] * w
+        s, c = np.sin(phase), np.cos(phase)
+        x, v, acc = (np.sum(each, axis=1) for each in (
+            a[0] * s + a[1] * c, w * (a[0] * c - a[1] * s), -w ** 2 * (a[0] * s + a[1] * c)))
+        return Motion.from_euler(x[:, :3] + HOME, x[:, 3:], v[:, :3], v[:, 3:], acc[:, :3],
+                                 acc[:, 3:])
+
+    return at
+
+
+def at_rest(times: Array) -> Motion:
+    """Return the home pose at rest."""
+    return Motion(np.tile(HOME, (len(times), 1)), np.tile(np.eye(3), (len(times), 1, 1)))
+
+
+def about(axis: Sequence[float], amplitude: float = 0.15, frequency: float = 0.5) -> MotionAt:
+    """Return turning to and fro about one axis through the platform's origin."""
+    unit = np.array(axis) / np.linalg.norm(axis)
+    w = 2.0 * np.pi * frequency
+
+    def at(times: Array) -> Motion:
+        s, c = np.sin(w * times)[:, None], np.cos(w * times)[:, None]
+        still = np.zeros((len(times), 3))
+        return Motion(HOME + still, [rotation_about(unit, amplitude * each) for each in s[:, 0]],
+                      still, amplitude * w * c * unit, still, -amplitude * w * w * s * unit)
+
+    return at
+
+
+def pinocchio_forces(p: Parameters, motion: Motion) -> Array:
+    """Return the forces (N, 6) of a motion by Pinocchio."""
+    referee = PinocchioReferee(p, rng(1))
+    still = np.zeros(6)
+    return np.array([referee.forces(motion[n], still) for n in range(len(motion))])
+
+
+def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed: int,
+             noise: Noise = Noise(), forces: Array | None = None, with_rates: bool = True,
+             ) -> Recorded:
+    """
+    Return a recording of a motion of a hexapod.
+
+    Parameters
+    ----------
+    p : Parameters
+        Of the true hexapod.
+    motion : callable
+        Of times [s].
+    seconds, rate : float
+        Length [s] and samples per second.
+    seed : int
+        Of the noise.
+    noise : Noise
+        What is added.
+    forces : (N, 6), optional
+        True forces of the motion, begun ``noise.delay`` earlier; by default Pinocchio's.
+    with_rates : bool
+        Rates are measured.
+
+    """
+    random = rng(1000 + seed)
+    times = np.arange(round(seconds * rate)) / rate
+    found = StewartPlatform(p).inverse_dynamics(motion(times))
+    if forces is None:
+        forces = pinocchio_forces(p, motion(times - noise.delay))
+    return Recorded(
+        times, found.lengths - p['geometry.zero_length']
+        + noise.length * random.normal(size=(len(times), 6)),
+        found.rates + noise.rate * random.normal(size=(len(times), 6)) if with_rates else None,
+        forces + noise.effort * random.normal(size=forces.shape)
+        + noise.coloured * coloured(random, len(times), 0.05 * rate))
+
+
+def coloured(random: np.random.Generator, many: int, correlation: float) -> Array:
+    """Return noise (many, 6) of deviation 1, correlated over so many samples."""
+    size = 1 << (2 * many - 1).bit_length()
+    w = 2.0 * np.pi * np.fft.rfftfreq(size)
+    shape = 1.0 / np.sqrt(1.0 + (w * correlation) ** 2)
+    white = np.fft.rfft(random.normal(size=(size, 6)), axis=0)
+    noise = np.fft.irfft(shape[:, None] * white, size, axis=0)[:many]
+    power = (2.0 * np.sum(shape ** 2) - shape[0] ** 2 - shape[-1] ** 2) / size
+    found: Array = noise / np.sqrt(power)
+    return found
+
+
+def write_bag(folder: Path, given: Recorded, joints: Sequence[str], topic: str = TOPIC,
+              start: int = START) -> Path:
+    """Write a bag with the recording, in MCAP."""
+    writer = JointStateWriter(joints)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        to = bag.add_connection(topic, JOINT_STATE, typestore=store)
+        stamps = start + np.round(given.times * 1e9).astype(np.int64)
+        rates: Any = given.rates if given.rates is not None else np.zeros((len(stamps), 6))
+        for n, stamp in enumerate(stamps.tolist()):
+            data = writer.write(stamp, given.positions[n], rates[n], given.efforts[n])
+            bag.write(to, stamp, data)
+    return folder

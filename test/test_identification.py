@@ -1,0 +1,214 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Identification from bags whose forces are Pinocchio's: values, intervals, what is not told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from recorded import about, at_rest, fourier, MotionAt, Noise, Recorded, recorded, write_bag
+from referees import ROOT
+
+from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.identification.command_line import main
+from stewart_dynamics.identification.unknowns import Unknowns
+
+Array = NDArray[np.float64]
+
+FILE = ROOT / 'config' / 'platform.yaml'
+GIVEN = Parameters.from_yaml(FILE)
+TRUE = GIVEN.replaced({
+    'platform.mass': 180.0, 'platform.center_of_mass': [0.03, -0.02, 0.15],
+    'platform.inertia': [14.0, 0.5, -0.3, 16.0, 0.4, 24.0],
+    'actuator.viscous_friction': 400.0, 'actuator.coulomb_friction': 50.0})
+RATE = 200.0
+SECONDS = 20.0
+# Of 200 samples per second with the mean of five samples at 1 kHz.
+NOISE = Noise(length=5e-6, rate=5e-4, effort=2.5, coloured=2.0, delay=3e-3)
+Change = Callable[[Recorded], Recorded]
+
+
+@pytest.fixture(scope='module')
+def motions() -> dict[str, Recorded]:
+    """Return recordings of the true hexapod."""
+    given: dict[str, tuple[MotionAt, float]] = {
+        'fourier': (fourier(3), SECONDS), 'rest': (at_rest, 6.0),
+        'diagonal': (about([1.0, 1.0, 0.0]), 10.0)}
+    return {name: recorded(TRUE, motion, seconds, RATE, 1, NOISE)
+            for name, (motion, seconds) in given.items()}
+
+
+@pytest.fixture
+def identified(motions: dict[str, Recorded], tmp_path: Path,
+               capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
+    """Return a function that identifies from a recording: exit code, document, output."""
+    def run(name: str, *options: str, change: Change = lambda given: given,
+            params: Path = FILE) -> tuple[int, Any, str, str]:
+        bag = tmp_path / 'a bag'
+        if not bag.exists():
+            write_bag(bag, change(motions[name]), GIVEN['joints'])
+        code = main([str(bag), '--params', str(params), '--output', str(tmp_path / 'found'),
+                     *options])
+        path = tmp_path / 'found' / 'identification.json'
+        out, err = capsys.readouterr()
+        return code, json.loads(path.read_text()) if path.exists() else None, out, err
+
+    return run
+
+
+def values_of(result: Any, key: str = 'value') -> dict[str, Any]:
+    """Return a value of each parameter by name."""
+    return {each['name']: each[key] for each in result['parameters']}
+
+
+def test_the_true_hexapod_is_found_within_its_intervals(
+        identified: Callable[..., Any], tmp_path: Path) -> None:
+    code, result, out, err = identified('fourier')
+    assert (code, err) == (0, '')
+    assert 'platform.mass ' in out
+    truth = Unknowns(TRUE)
+    assert set(values_of(result, 'state').values()) == {'identified'}
+    off = []
+    for name, true, value, error in zip(
+            truth.names, truth.start, values_of(result).values(),
+            values_of(result, 'standard_error').values(), strict=True):
+        off.append((value - true) / error)
+        kind = name.rpartition('.')[0]
+        allowed = {'platform': 0.002 * 180.0, 'platform.center_of_mass': 1e-3,
+                   'platform.inertia': 0.02 * 24.0, 'actuator.viscous_friction': 12.0,
+                   'actuator.coulomb_friction': 1.5}[kind]
+        assert value == pytest.approx(true, abs=allowed), name
+    assert np.max(np.abs(off)) < 4.0
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
+    (bag,) = result['bags']
+    assert bag['delay_s'] == pytest.approx(3e-3, abs=2e-4)
+    assert bag['noise_of_lengths_m'] == pytest.approx(5e-6, rel=0.05)
+    held = result['validation']
+    assert held['after_rms_n'] < 0.05 * held['before_rms_n']
+
+    written = tmp_path / 'found' / 'identified.yaml'
+    found = Parameters.from_yaml(written)
+    assert found['platform.mass'] == pytest.approx(values_of(result)['platform.mass'], abs=1e-3)
+    for name in GIVEN:
+        if name not in ('platform.mass', 'platform.center_of_mass', 'platform.inertia',
+                        'actuator.viscous_friction', 'actuator.coulomb_friction'):
+            assert np.array_equal(found[name], GIVEN[name]), name
+    assert f'identified {result["date"][:10]}, 95 %: +-' in written.read_text()
+    assert StewartPlatform.from_yaml(written).check() == ()
+    report = (tmp_path / 'found' / 'report.html').read_text()
+    assert '22 of 22 parameters identified' in report
+
+
+def test_at_rest_weight_is_told_and_nothing_else(identified: Callable[..., Any],
+                                                 tmp_path: Path) -> None:
+    code, result, out, _ = identified('rest', '--no-report', '--strict')
+    assert code == 1  # not everything that was asked for
+    states = values_of(result, 'state')
+    told = {name for name, state in states.items() if state == 'identified'}
+    assert told == {'platform.mass', 'platform.center_of_mass.x', 'platform.center_of_mass.y'}
+    assert set(states.values()) == {'identified', 'not_told'}
+    assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.002)
+    assert values_of(result)['platform.center_of_mass.x'] == pytest.approx(0.03, abs=1e-3)
+    assert result['bags'][0]['delay_s'] is None
+    found = Parameters.from_yaml(tmp_path / 'found' / 'identified.yaml')
+    assert found['platform.center_of_mass'][2] == GIVEN['platform.center_of_mass'][2]
+    for name in ('platform.inertia', 'actuator.viscous_friction', 'actuator.coulomb_friction'):
+        np.testing.assert_array_equal(found[name], GIVEN[name])
+    assert 'platform.inertia: xx xy xz yy yz zz' in out
+    assert not (tmp_path / 'found' / 'report.html').exists()
+
+
+def test_turning_about_one_axis_tells_the_inertia_about_it(identified: Callable[..., Any],
+                                                           ) -> None:
+    # I n of n = (1, 1, 0): its three components are told, each a sum of two products.
+    _, result, out, _ = identified('diagonal', '--no-report')
+    states = values_of(result, 'state')
+    assert states['platform.inertia.zz'] == 'not_told'
+    assert {name for name, state in states.items() if state == 'in_combination'} == {
+        f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz')}
+    sums = {frozenset(each['parameters']): each for each in result['combinations']}
+    truth = Unknowns(TRUE)
+    true = dict(zip(truth.names, truth.start, strict=True))
+    for pair in (('xx', 'xy'), ('xz', 'yz'), ('yy', 'xy')):
+        names = [f'platform.inertia.{axes}' for axes in pair]
+        found = sums.pop(frozenset(names))
+        assert found['coefficients'] == pytest.approx([1.0, 1.0], abs=0.01)
+        assert abs(found['value'] - sum(true[name] for name in names)) < (
+            4.0 * found['standard_error'])
+        assert found['words'] in out
+    assert not sums
+
+
+def _swapped(given: Recorded) -> Recorded:
+    order = [0, 2, 1, 3, 4, 5]
+    assert given.rates is not None
+    return Recorded(given.times, given.positions[:, order], given.rates[:, order],
+                    given.efforts[:, order])
+
+
+@pytest.mark.parametrize(('change', 'named'), [
+    (lambda given: given._replace(efforts=-given.efforts), 'opposite sign: + must push'),
+    (lambda given: given._replace(efforts=1e-3 * given.efforts), 'likely kN in place of N'),
+    (lambda given: given._replace(efforts=given.efforts * 0.02 / (2.0 * np.pi)),
+     'likely torques of the motors'),
+    (_swapped, 'positions and efforts of leg_2 and leg_3 look swapped'),
+    (lambda given: given._replace(positions=given.positions - 0.02),
+     'geometry.zero_length looks wrong: +'),
+    (lambda given: given._replace(positions=1e3 * given.positions),
+     'lengths belong to no pose of this hexapod'),
+], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])
+def test_likely_mistakes_are_named_and_nothing_is_written(
+        identified: Callable[..., Any], tmp_path: Path, change: Change, named: str) -> None:
+    code, result, out, err = identified('fourier', '--no-report', change=change)
+    assert (code, result, out) == (2, None, '')
+    assert named in err
+    assert err.startswith('stewart_identify: ')
+    assert err.count('\n') == 1
+    assert not (tmp_path / 'found').exists()
+
+
+def test_motor_torques_need_the_right_lead(identified: Callable[..., Any], tmp_path: Path) -> None:
+    def torques(given: Recorded) -> Recorded:
+        return given._replace(efforts=given.efforts * 0.01 / (2.0 * np.pi))
+
+    params = tmp_path / 'with lead.yaml'
+    GIVEN.replaced({'actuator.screw_lead': 0.01}).to_yaml(params)
+    code, result, _, _ = identified('fourier', '--no-report', '--motor-torque', change=torques,
+                                    params=params)
+    assert code == 0
+    assert values_of(result)['platform.mass'] == pytest.approx(180.0, rel=0.002)
+    GIVEN.replaced({'actuator.screw_lead': 0.04}).to_yaml(params)
+    code, _, _, err = identified('fourier', '--force', '--motor-torque', params=params)
+    assert code == 2
+    assert 'likely actuator.screw_lead, 0.04 m, is wrong: about 0.0' in err
+    code, _, _, err = identified('fourier', '--force', '--motor-torque')
+    assert code == 2
+    assert 'actuator.screw_lead: has no value: --motor-torque needs it' in err
+
+
+def test_mistakes_may_be_accepted(identified: Callable[..., Any]) -> None:
+    code, result, _, err = identified(
+        'rest', '--no-report', '--accept-mistakes',
+        change=lambda given: given._replace(efforts=1e-3 * given.efforts))
+    assert code == 0
+    assert 'warning: the efforts are' in err
+    assert result['likely_mistakes'][0]['what'] == 'unit'
+    assert result['identified']['platform.mass'] > 0.0
