@@ -52,6 +52,7 @@ extras_require = {
         'numpydoc>=1.6',
         'sphinx>=7.2',
     ],
+    'mujoco': ['mujoco>=3.2'],
     'parquet': ['pyarrow>=14'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
@@ -75,6 +76,7 @@ extras_require = {
         'matplotlib',
         'mcap',
         'mcap-ros2-support',
+        'mujoco',
         'mypy',
         'packaging',
         'pin',
@@ -118,6 +120,7 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
+            'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.nodes.console_scripts:dynamics',
             'stewart_identify = stewart_dynamics.identification:main',
             'stewart_replay = stewart_dynamics.replay:main',

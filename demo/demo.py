@@ -40,7 +40,8 @@ from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES, LENGTHS, MOTION, RATES, RESULT
+from stewart_dynamics.mechanics.rows import (
+    DETERMINANT, FORCES, JOINT_ANGLES, LENGTHS, MOTION, RATES, RESULT)
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.summary import Summary
@@ -148,7 +149,8 @@ def report(demo: Demo, parameters: Parameters) -> str:
         (stamps - stamps[0]) * 1e-9,
         Batch(stamps, np.full((many, MOTION), np.nan), np.zeros((1, 6)), none,
               stamps),
-        Outputs(every, stamps, results, forces, states, none, none), np.full((many, 6), np.nan))
+        Outputs(every, stamps, results, forces, states, none, none,
+                np.full((many, JOINT_ANGLES), np.nan)), np.full((many, 6), np.nan))
     return '\n'.join(summary_lines(summary.values(), parameters))
 
 

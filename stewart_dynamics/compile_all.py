@@ -28,9 +28,9 @@ from stewart_dynamics.compilation.machine_code import folder_to_write, HINT
 
 MODULES = (
     'mechanics.inverse_dynamics', 'mechanics.forward_dynamics', 'mechanics.forward_kinematics',
-    'mechanics.base_wrench', 'mechanics.friction', 'mechanics.plant_dynamics',
-    'mechanics.regressor', 'runtime.step',
-    'runtime.external_wrench', 'replay.message_blocks', 'replay.mcap_scan')
+    'mechanics.base_wrench', 'mechanics.friction', 'mechanics.joint_angles',
+    'mechanics.plant_dynamics', 'mechanics.regressor', 'runtime.step', 'runtime.external_wrench',
+    'replay.message_blocks', 'replay.mcap_scan')
 """Those with functions that Python calls."""
 
 

@@ -20,7 +20,8 @@ The check, the node's declaration, ``--help`` and the documents are all made fro
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+import math
 from types import MappingProxyType
 from typing import Any
 
@@ -42,6 +43,20 @@ def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -
     return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
 
 
+def _meshes() -> Iterator[Parameter]:
+    for part, body in (('base', 'base'), ('platform', 'platform'), ('cylinder', 'each cylinder'),
+                       ('piston', 'each piston')):
+        axes = {'base': 'base frame', 'platform': 'platform frame'}.get(
+            part, 'z along the leg, from the ' + (
+                'base joint' if part == 'cylinder' else 'platform joint'))
+        yield Parameter(f'meshes.{part}', 'string', f'file of the mesh of {body}, as '
+                        'stewart_describe writes it; empty: a simple shape', default='')
+        yield Parameter(f'meshes.{part}_offset', 'double', 'x y z, and roll pitch yaw, of this '
+                        f'mesh; {axes}', 'm, rad', (0.0,) * 6, sizes=(6,))
+    yield Parameter('meshes.scale', 'double', 'scale of all meshes; 0.001 for files in mm', '',
+                    1.0, minimum=0.0, above=True)
+
+
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
     Parameter('platform_frame', 'string', 'frame that moves with the platform',
@@ -54,6 +69,12 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('geometry.platform_joints', 'double',
               'x y z of the six platform joints, in the same order, platform frame', 'm',
               required=True, sizes=(18,)),
+    Parameter('geometry.base_joint_axes', 'double', 'x y z of the direction from which the angle '
+              'of each base joint is measured, toward the platform, of any length, base axes; '
+              'none: of the leg at the home pose', '', (), sizes=(18,)),
+    Parameter('geometry.platform_joint_axes', 'double', 'likewise of each platform joint, from '
+              'the base toward the platform, platform axes; none: of the leg at the home pose', '',
+              (), sizes=(18,)),
     _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
           minimum=0.0),
     Parameter('platform.mass', 'double', 'mass of the platform with its payload', 'kg',
@@ -92,6 +113,12 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('limits.force_max',
           'maximum force of a leg, to which forces are clipped; none: not checked', 'N', (),
           minimum=0.0, above=True),
+    _legs('limits.base_joint_angle_max', 'maximum angle between a leg and its '
+          'geometry.base_joint_axes; none: not checked', 'rad', (), minimum=0.0, above=True,
+          maximum=math.pi),
+    _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
+          'geometry.platform_joint_axes; none: not checked', 'rad', (), minimum=0.0, above=True,
+          maximum=math.pi),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),
@@ -149,6 +176,7 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               above=True, while_active=True),
     Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
               'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
+    *_meshes(),
     Parameter('visualization_rate', 'double', 'maximum rate of ~/markers; 0: off', 'Hz', 30.0,
               minimum=0.0),
     Parameter('autostart', 'bool', 'configure and activate the node when it starts', default=True),
@@ -195,6 +223,11 @@ class Parameters(ParameterSet):
                 f'{source}: geometry.platform_joints: all six are at one point')
         if self['singularity.characteristic_length'] is None:
             self._values['singularity.characteristic_length'] = size
+        for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes'):
+            axes = self[name]
+            if axes is not None and not axes.any(axis=1).all():
+                raise ParameterError(
+                    f'{source}: {name}: {axes.tolist()}: a direction must not be 0, 0, 0')
 
 
 def inertia_matrix(six: ArrayLike) -> Any:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 import json
 import math
 from pathlib import Path
@@ -39,8 +40,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
     assert_only_log_lines, bits, DynamicsNode, executable, HOME, LATCHED, log_lines, nanoseconds,
-    NODE, OUTPUTS, participants, Peer, PLATFORM, raw, rejected, ROOT, Sample, SEPARATE,
-    wrench_message)
+    NODE, NodeProcess, OUTPUTS, participants, Peer, PLATFORM, raw, rejected, ROOT, Sample,
+    SEPARATE, wrench_message)
 from std_msgs.msg import Bool
 
 from stewart_dynamics import Parameters, Pose, StewartPlatform
@@ -451,6 +452,27 @@ def test_other_limits_are_reported_and_the_answer_is_published(node: DynamicsNod
         assert 'clipped' not in node.status('limits').message
     node.answer(MOVING)
     node.until_counted()
+
+
+def test_angles_of_joints_above_their_limit_are_reported(shared: NodeProcess) -> None:
+    tilted = HOME._replace(quaternion=(math.sin(0.2), 0.0, 0.0, math.cos(0.2)))
+    limits = {'limits.base_joint_angle_max': 0.1, 'limits.platform_joint_angle_max': 0.3}
+    with closing(DynamicsNode(shared, *(f'{k}:={v}' for k, v in limits.items()))) as node:
+        node.until_active()
+        angles = node.platform.joint_angles(
+            Pose.from_quaternion(tilted.position, tilted.quaternion))
+        node.answer(tilted)
+        message = node.until_status('limits', ERROR, '')
+        for each, joint, bound in zip(angles, ('base', 'platform'), limits.values(), strict=True):
+            assert (each > bound).any()
+            for leg, angle in enumerate(each):
+                words = (f'leg_{leg + 1}: {joint} joint angle {angle:.6g} rad is '
+                         f'{angle - bound:.6g} rad above limits.{joint}_joint_angle_max')
+                assert (words in message) is bool(angle > bound)
+                assert node.values('limits')[
+                    f'leg_{leg + 1}: {joint} joint angle (rad)'] == f'{angle:.6g}'
+        node.answer(HOME)
+        node.until_status('limits', OK, '')
 
 
 def test_a_warning_states_its_reason(node: DynamicsNode) -> None:

@@ -57,7 +57,8 @@ def outputs_of(results: NDArray[np.float64], forces: NDArray[np.float64],
     states = np.zeros((len(stamps), STATE))
     states[:, CAUSE] = warnings
     flags = np.zeros(len(stamps), dtype=bool)
-    return Outputs(~flags, stamps, results, forces, states, flags, flags)
+    return Outputs(~flags, stamps, results, forces, states, flags, flags,
+                   np.empty((len(stamps), 0)))
 
 
 def bits(values: Any) -> list[int]:

@@ -22,12 +22,13 @@ import pytest
 from referees import rng, symmetric_parameters
 
 from stewart_dynamics.mechanics.limits import (
-    any_exceeded, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, TOLERANCE,
-    VELOCITY_MAX)
+    ANGLES, any_exceeded, BASE_ANGLE_MAX, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS,
+    Limits, OF_JOINTS, OF_RESULTS, PLATFORM_ANGLE_MAX, TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, RATES, RESULT
 
 GIVEN = {LENGTH_MIN: [0.9, 0.91, 0.92, 0.93, 0.94, 0.95], LENGTH_MAX: 1.5, VELOCITY_MAX: 0.5,
-         FORCE_MAX: 6000.0}
+         FORCE_MAX: 6000.0, BASE_ANGLE_MAX: 0.5,
+         PLATFORM_ANGLE_MAX: [0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}
 PLACES = {LENGTH_MIN: LENGTHS, LENGTH_MAX: LENGTHS, VELOCITY_MAX: RATES, FORCE_MAX: FORCES}
 
 
@@ -38,7 +39,7 @@ def row() -> NDArray[np.float64]:
     return result
 
 
-@pytest.mark.parametrize('limit', LIMITS)
+@pytest.mark.parametrize('limit', OF_RESULTS)
 @pytest.mark.parametrize('leg', range(6))
 def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
     limits = Limits(symmetric_parameters().replaced(GIVEN))
@@ -50,8 +51,8 @@ def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: i
         for sign in signs:
             result = row()
             result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + excess * outward)
-            assert any_exceeded(limits.thresholds.ravel(), result) is exceeded
-            for other in LIMITS:
+            assert any_exceeded(limits.thresholds[:4].ravel(), result) is exceeded
+            for other in OF_RESULTS:
                 expected = [exceeded and other == limit and n == leg for n in range(6)]
                 assert limits.exceeds(other, result[PLACES[other]]).tolist() == expected
             of_sample = (tuple(result[at].tolist()) for at in (LENGTHS, RATES, FORCES))
@@ -59,11 +60,28 @@ def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: i
                 (Exceedance(limit, leg, value, bound),) if exceeded else ())
 
 
+@pytest.mark.parametrize('limit', OF_JOINTS)
+@pytest.mark.parametrize('leg', range(6))
+def test_sample_and_array_agree_on_the_angle_of_each_joint(limit: str, leg: int) -> None:
+    limits = Limits(symmetric_parameters().replaced(GIVEN))
+    bound = float(limits.bounds[limit][leg])
+    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+                             (2.0 * TOLERANCE, True), (0.1, True)):
+        angles = np.zeros(12)
+        angles[ANGLES[limit].start + leg] = value = bound * (1.0 + excess)
+        for other in OF_JOINTS:
+            expected = [exceeded and other == limit and n == leg for n in range(6)]
+            assert limits.exceeds(other, angles[ANGLES[other]]).tolist() == expected
+        assert limits.exceeded_angles(tuple(angles.tolist())) == (
+            (Exceedance(limit, leg, value, bound),) if exceeded else ())
+
+
 def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
     limits = Limits(symmetric_parameters())
     huge = rng().choice([-1e300, 1e300], (5, 6))
     assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
     assert limits.exceeded((1e300,) * 6, (-1e300,) * 6, (1e300,) * 6) == ()
+    assert limits.exceeded_angles((3.14,) * 12) == ()
     assert np.isinf(limits.force_max).all() and not limits.bounds
 
 
@@ -71,12 +89,14 @@ def test_unknown_forces_exceed_no_limit() -> None:
     limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
     result = row()
     result[FORCES] = np.nan
-    assert not any_exceeded(limits.thresholds.ravel(), result)
+    assert not any_exceeded(limits.thresholds[:4].ravel(), result)
     assert limits.exceeded((1.2,) * 6, (0.0,) * 6, None) == ()
 
 
 @pytest.mark.parametrize(('exceedance', 'words'), [
     (Exceedance(LENGTH_MIN, 0, 0.9, 0.95), 'a: length 0.9 m is 0.05 m below limits.length_min'),
+    (Exceedance(PLATFORM_ANGLE_MAX, 2, 0.75, 0.5),
+     'c: platform joint angle 0.75 rad is 0.25 rad above limits.platform_joint_angle_max'),
     (Exceedance(LENGTH_MAX, 1, 1.75, 1.5), 'b: length 1.75 m is 0.25 m above limits.length_max'),
     (Exceedance(VELOCITY_MAX, 2, -0.75, 0.5),
      'c: rate -0.75 m/s is 0.25 m/s above limits.velocity_max'),

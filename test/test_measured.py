@@ -26,10 +26,11 @@ from hypothesis import strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
-from referees import random_base_motion, random_parameters, rng, size_of
+from referees import random_parameters, rng, size_of
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.replay.residuals import Comparison
+from stewart_dynamics.replay.summary_text import measured_headline
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
@@ -164,27 +165,6 @@ def test_a_load_in_the_model_leaves_no_residual() -> None:
     assert comparison.values()['contacts']['count'] == 0
 
 
-def test_a_mass_on_a_base_that_moves_is_found_by_its_acceleration_in_the_world() -> None:
-    case = case_of()
-    base = random_base_motion(case.parameters, rng(1), 500)
-    batch = case.setpoints._replace(bases=base.rows)
-    outputs = Step(case.parameters).many(batch, None)
-    heavier = StewartPlatform(case.parameters.replaced({
-        'platform.mass': case.parameters['platform.mass'] + 3.0,
-        'platform.center_of_mass': [0.0, 0.0, 0.0]}))
-    centered = StewartPlatform(case.parameters.replaced(
-        {'platform.center_of_mass': [0.0, 0.0, 0.0]}))
-    forces = outputs.demanded_forces + (
-        heavier.inverse_dynamics(case.motion, base=base).forces
-        - centered.inverse_dynamics(case.motion, base=base).forces)
-    comparison = Comparison(case.parameters)
-    compared(comparison, Case(case.parameters, case.motion, case.seconds, batch, outputs),
-             (batch.stamps, forces))
-    mass = comparison.values()['mass']
-    assert mass['unmodelled_kg'] == pytest.approx(3.0, rel=1e-9)
-    assert mass['share'] == pytest.approx(1.0, rel=1e-9)
-
-
 def test_a_contact_may_last_for_nearly_half_of_the_bag() -> None:
     case = case_of(many=1000)
     comparison = Comparison(case.parameters)
@@ -200,47 +180,22 @@ def test_a_contact_may_last_for_nearly_half_of_the_bag() -> None:
     assert contacts['strongest'][0]['from_s'] == pytest.approx(3.0, abs=0.02)
     assert contacts['strongest'][0]['to_s'] == pytest.approx(7.0, abs=0.02)
     assert contacts['strongest'][0]['force_n'][2] == pytest.approx(-200.0, rel=0.2)
-    # and no friction is made of it
-    assert all(leg['viscous_friction_n_s_m'] is None for leg in values['legs'].values())
 
 
-def test_missing_friction_is_found() -> None:
+def test_the_headline_names_the_difference_and_the_leg_where_it_is_largest() -> None:
     case = case_of()
-    given = case.parameters
-    more = given.replaced({
-        'actuator.coulomb_friction': given['actuator.coulomb_friction'] + [3, 6, 9, 12, 15, 0],
-        'actuator.viscous_friction': given['actuator.viscous_friction'] + [90, 70, 50, 30, 0, 9]})
-    comparison = Comparison(given)
-    compared(comparison, case, (case.setpoints.stamps,
-                                case.forces(parameters=more) + [1.0, 0.0, -2.0, 0.0, 0.0, 0.0]))
-    legs = list(comparison.values()['legs'].values())
-    for leg, coulomb, viscous, offset in zip(
-            legs, [3, 6, 9, 12, 15, 0], [90, 70, 50, 30, 0, 9], [1, 0, -2, 0, 0, 0], strict=True):
-        assert leg['coulomb_friction_n'] == pytest.approx(coulomb, abs=1e-8)
-        assert leg['viscous_friction_n_s_m'] == pytest.approx(viscous, abs=1e-7)
-        assert leg['offset_n'] == pytest.approx(offset, abs=1e-8)
-        assert leg['friction_share'] == pytest.approx(1.0, abs=1e-9)
-
-
-def test_a_missing_payload_is_found() -> None:
-    case = case_of()
-    given = case.parameters
-    # about the platform's origin: the mass there, the center of mass and inertia made up for it
-    mass, at = given['platform.mass'], given['platform.center_of_mass']
-    heavier = given.replaced({
-        'platform.mass': mass + 35.0, 'platform.center_of_mass': at * mass / (mass + 35.0)})
-    shift = mass * 35.0 / (mass + 35.0)
-    square = shift * (at @ at * np.eye(3) - np.outer(at, at))
-    heavier = heavier.replaced({
-        'platform.inertia': given['platform.inertia'] + square[np.triu_indices(3)]})
-    comparison = Comparison(given)
-    _, _, _, wrench = compared(
-        comparison, case, (case.setpoints.stamps, case.forces(parameters=heavier)))
-    found = comparison.values()['mass']
-    assert found['unmodelled_kg'] == pytest.approx(35.0, rel=1e-9)
-    assert found['share'] == pytest.approx(1.0, rel=1e-9)
-    # heavier: the external force has the direction of gravity
-    assert np.mean(wrench[:, :3] @ given['gravity']) > 0.0
+    offsets = np.array([1.0, 0.0, -2.0, 0.0, 20.0, 0.0])
+    measured = case.forces() + offsets
+    comparison = Comparison(case.parameters)
+    compared(comparison, case, (case.setpoints.stamps, measured))
+    values = comparison.values()
+    rms = np.sqrt(np.mean(offsets ** 2))
+    share = rms / np.sqrt(np.mean(measured ** 2))
+    assert values['residual_rms_n'] == pytest.approx(rms, rel=1e-9)
+    assert values['residual_share'] == pytest.approx(share, rel=1e-9)
+    assert measured_headline(values) == (
+        f'measured and computed forces differ by {rms:.3g} N RMS, {100.0 * share:.3g} % of the '
+        'measured force; most in leg_5, by 20 N')
 
 
 # Contacts
@@ -364,11 +319,12 @@ def test_nothing_compared_gives_null() -> None:
     assert values['legs']['leg_1'] == dict.fromkeys(values['legs']['leg_1'])
     force = values['external_wrench']['force_x']
     assert force == dict.fromkeys(force)
-    assert values['mass'] == {'unmodelled_kg': None, 'share': None}
+    assert values['residual_rms_n'] is None and values['residual_share'] is None
+    assert measured_headline(values) == 'no setpoint could be compared'
     assert values['contacts']['count'] == 0
 
 
-def test_standing_still_gives_no_friction() -> None:
+def test_standing_still_gives_no_correlation() -> None:
     case = case_of(many=1)
     still = Motion(case.motion.position, case.motion.rotation)
     rows = np.repeat(still.rows, 50, axis=0)
@@ -380,7 +336,6 @@ def test_standing_still_gives_no_friction() -> None:
     comparison.add_measured(stamps, np.full((50, 6), 100.0))
     comparison.finish()
     leg = json.loads(json.dumps(comparison.values(), allow_nan=False))['legs']['leg_1']
-    assert leg['coulomb_friction_n'] is None and leg['friction_share'] is None
     assert leg['correlation'] is None
     assert leg['measured_rms_n'] == pytest.approx(100.0)
 

@@ -34,7 +34,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
-EXECUTABLES = ('stewart_dynamics', 'stewart_replay', 'stewart_simulator', 'stewart_trajectory')
+EXECUTABLES = ('stewart_dynamics', 'stewart_describe', 'stewart_replay', 'stewart_simulator',
+               'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
             'package.xml', 'pyproject.toml', 'setup.cfg', 'setup.py')
 SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', NAME)
@@ -43,7 +44,8 @@ SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', N
 KEYS = {
     'dask': '', 'distributed': '', 'docutils': 'python3-docutils',
     'hypothesis': 'python3-hypothesis', 'jinja2': 'python3-jinja2', 'lz4': '',
-    'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'numba': 'python3-numba',
+    'matplotlib': 'python3-matplotlib', 'mcap': '', 'mcap_ros2': '', 'mujoco': '',
+    'numba': 'python3-numba',
     'llvmlite': 'python3-numba',
     'numpy': 'python3-numpy', 'orjson': 'python3-orjson', 'packaging': 'python3-packaging',
     'pinocchio': 'pinocchio', 'playwright': '', 'plotly': '', 'pyarrow': '',
@@ -251,7 +253,7 @@ def test_flake8_has_the_settings_of_ament_and_no_milder_ones() -> None:
         'extend-ignore': 'B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202',
         'import-order-style': 'google', 'max-line-length': '99', 'show-source': 'true',
         'statistics': 'true', 'docstring-convention': 'all', 'property-decorators': '',
-        'exclude': '.cache,.git,.venv,build,install,log'}
+        'exclude': '.cache,.git,.venv,.venv-*,build,install,log'}
 
 
 def test_no_module_has_the_name_of_one_of_python() -> None:
@@ -273,7 +275,7 @@ def test_contributing_is_the_text_that_ament_copyright_knows() -> None:
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_entry_point_loads(distribution: importlib.metadata.Distribution, name: str) -> None:
     """The function behind each executable exists."""
-    if name != 'stewart_replay':
+    if name not in ('stewart_describe', 'stewart_replay'):
         pytest.importorskip('rclpy')
     point, = distribution.entry_points.select(name=name)
     assert callable(point.load())

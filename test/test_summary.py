@@ -52,7 +52,9 @@ LIMITS = {
     'limits.length_min': [0.5, 0.6, 0.7, 0.5, 0.6, 0.0],
     'limits.length_max': [1.5, 1.4, 1.3, 1.5, 1.4, 9.0],
     'limits.velocity_max': [0.9, 0.8, 0.7, 0.9, 0.8, 9.0],
-    'limits.force_max': [90.0, 80.0, 70.0, 90.0, 80.0, 900.0]}
+    'limits.force_max': [90.0, 80.0, 70.0, 90.0, 80.0, 900.0],
+    'limits.base_joint_angle_max': [0.5, 0.4, 0.3, 0.5, 0.4, 3.0],
+    'limits.platform_joint_angle_max': [0.9, 0.8, 0.7, 0.9, 0.8, 3.0]}
 
 
 def hexapod(**changes: Any) -> Parameters:
@@ -90,6 +92,7 @@ class Samples:
         self.demanded = numbers('demanded', 6)
         self.forces = numbers('forces', 6, default=math.nan)
         self.forces = np.where(np.isnan(self.forces), self.demanded, self.forces)
+        self.joint_angles = numbers('joint_angles', 12, default=0.1)
         self.forces[numbers('suppressed', default=0.0) > 0.0] = math.nan
         self.unit_load = numbers('unit_load', 6)
         self.det, self.condition = numbers('det'), numbers('condition')
@@ -110,7 +113,8 @@ class Samples:
         states = np.zeros((many, STATE))
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         flags = np.zeros(many, dtype=bool)
-        outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags)
+        outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags,
+                          self.joint_angles)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs
@@ -175,7 +179,8 @@ def random_samples(seed: int, many: int) -> Samples:
         unit_load=random.integers(1, 9, (many, 6)), det=random.integers(-2, 3, many),
         condition=condition, base_wrenches=base_wrenches, base_unknown=base_unknown,
         warnings=random.random(many) < 0.4,
-        time_to_crossing=random.choice([0.1, 0.2, 3.0, math.inf], many))
+        time_to_crossing=random.choice([0.1, 0.2, 3.0, math.inf], many),
+        joint_angles=random.integers(0, 12, (many, 12)) * 0.1)
 
 
 # The same again, sample by sample
@@ -239,6 +244,12 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'length_margin_m': min(min(length) - low, high - max(length)),
             'rate_margin_m_s': fastest - max(map(abs, rate)),
             'force_margin_n': None if none else strongest - abs(peak[0])}
+        for joint, first in (('base', 0), ('platform', 6)):
+            widest, at = first_peak(s.joint_angles[:, first + leg].tolist(), t)
+            legs[name] |= {
+                f'{joint}_joint_angle_max_rad': widest, f'{joint}_joint_angle_max_at_s': at,
+                f'{joint}_joint_angle_margin_rad':
+                    p[f'limits.{joint}_joint_angle_max'][leg] - widest}
         breakdown[name] = {}
         for n, source in enumerate(SOURCES[:7 if p['base.source'] != 'fixed' else 6]):
             forces = s.breakdown[:, n, leg].tolist()
@@ -249,7 +260,11 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             ('limits.length_min', lambda x, bound: x < bound * (1.0 - 1e-9), s.lengths),
             ('limits.length_max', lambda x, bound: x > bound * (1.0 + 1e-9), s.lengths),
             ('limits.velocity_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.rates),
-            ('limits.force_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.demanded)):
+            ('limits.force_max', lambda x, bound: abs(x) > bound * (1.0 + 1e-9), s.demanded),
+            ('limits.base_joint_angle_max', lambda x, bound: x > bound * (1.0 + 1e-9),
+             s.joint_angles[:, :6]),
+            ('limits.platform_joint_angle_max', lambda x, bound: x > bound * (1.0 + 1e-9),
+             s.joint_angles[:, 6:])):
         for leg, name in enumerate(p['joints']):
             bound = p[limit][leg]
             found = [n for n, x in enumerate(numbers[:, leg]) if broken(x, bound)]

@@ -47,6 +47,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.home_pose import homes, level_axes
+from stewart_dynamics.mechanics.rotation import to_euler
 from stewart_dynamics.parameters import Parameters
 
 PLATFORM_JOINTS = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
@@ -116,20 +117,14 @@ class TreeJoints:
 
         """
         at, r = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
-        gamma = np.arctan2(r[..., 1, 0], r[..., 0, 0])
-        c, s = np.cos(gamma), np.sin(gamma)
-        beta = np.arctan2(-r[..., 2, 0], np.hypot(r[..., 0, 0], r[..., 1, 0]))
-        alpha = np.arctan2(s * r[..., 0, 2] - c * r[..., 1, 2],
-                           c * r[..., 1, 1] - s * r[..., 0, 1])
         legs = at[..., None, :] + self._platform @ r.swapaxes(-1, -2) - self._base
         x, y, z = np.moveaxis(np.einsum('iba,...ib->...ia', self.mounts, legs), -1, 0)
         across = np.hypot(y, z)
         of_legs = np.stack([np.arctan2(-y, z), np.arctan2(x, across),
                             np.hypot(x, across) - self._zero_length], axis=-1)
         shape = of_legs.shape[:-2]
-        of_platform = np.stack(np.broadcast_arrays(gamma, beta, alpha), axis=-1)
         return np.concatenate([
-            np.broadcast_to(at, (*shape, 3)), np.broadcast_to(of_platform, (*shape, 3)),
+            np.broadcast_to(at, (*shape, 3)), np.broadcast_to(to_euler(r)[..., ::-1], (*shape, 3)),
             of_legs.reshape(*shape, 18)], axis=-1)
 
     def of_sample(self, pose: Sequence[float]) -> list[float]:

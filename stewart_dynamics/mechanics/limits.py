@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The limits of the legs: which there are, and when one is exceeded."""
+"""The limits of the legs and their joints: which there are, and when one is exceeded."""
 
 from __future__ import annotations
 
@@ -25,20 +25,30 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Six
 from stewart_dynamics.compilation.functions import inlined
-from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, RATES
+from stewart_dynamics.mechanics.rows import (
+    BASE_JOINT_ANGLES, consecutive, FORCES, LENGTHS, PLATFORM_JOINT_ANGLES, RATES)
 from stewart_dynamics.parameters import Parameters
 
-LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = LIMITS = (
+LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
     'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
+    'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
+LIMITS = OF_RESULTS + OF_JOINTS
 
 # A value exceeds a limit only by more than this part of it: rounding errors are below.
 TOLERANCE = 1e-9
 
-# Thresholds in a row, in the order of LIMITS.
+# Thresholds in a row, in the order of OF_RESULTS.
 _SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 
-_QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
-               VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N')}
+QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
+              VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N'),
+              BASE_ANGLE_MAX: ('base joint angle', 'rad'),
+              PLATFORM_ANGLE_MAX: ('platform joint angle', 'rad')}
+"""Of each limit: what it limits, and the unit."""
+
+ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
+"""Where in a row of joint angles the values of a limit are."""
 
 
 class Exceedance(NamedTuple):
@@ -52,7 +62,7 @@ class Exceedance(NamedTuple):
 
     def words(self, joints: Sequence[str]) -> str:
         """Return which leg exceeds the limit, and by how much."""
-        quantity, unit = _QUANTITIES[self.limit]
+        quantity, unit = QUANTITIES[self.limit]
         excess = abs(abs(self.value) - self.bound)
         how = 'below' if self.limit == LENGTH_MIN else 'above'
         return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {excess:.6g} {unit} '
@@ -71,9 +81,11 @@ class Limits:
     Attributes
     ----------
     bounds : dict of str to (6,)
-        Of each limit that is given [m, m/s, N].
-    thresholds : (4, 6)
+        Of each limit that is given [m, m/s, N, rad].
+    thresholds : (6, 6)
         Of each of LIMITS, above (or below) which it is exceeded; infinite where it is not given.
+    of_joints : tuple of str
+        Those of OF_JOINTS that are given.
     force_max : (6,)
         To which forces are clipped [N]; infinite where it is not given.
 
@@ -85,10 +97,14 @@ class Limits:
             np.full(6, -math.inf if name == LENGTH_MIN else math.inf)
             if name not in self.bounds else self.bounds[name] * (
                 1.0 - TOLERANCE if name == LENGTH_MIN else 1.0 + TOLERANCE) for name in LIMITS])
+        self.of_joints = tuple(name for name in OF_JOINTS if name in self.bounds)
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
         self._of_samples = [
             (name, self.bounds[name].tolist(), self.thresholds[n].tolist())
-            for n, name in enumerate(LIMITS) if name in self.bounds]
+            for n, name in enumerate(OF_RESULTS) if name in self.bounds]
+        self._of_angles = [
+            (name, ANGLES[name], self.bounds[name].tolist(),
+             self.thresholds[LIMITS.index(name)].tolist()) for name in self.of_joints]
 
     def exceeds(self, limit: str, values: Array) -> Flags:
         """Return where values (..., 6) of its quantity exceed a limit; nan never does."""
@@ -96,17 +112,29 @@ class Limits:
         return exceeding
 
     def exceeded(self, lengths: Six, rates: Six, forces: Six | None) -> tuple[Exceedance, ...]:
-        """Return all limits that one sample exceeds; unknown forces (None) exceed none."""
-        found = []
+        """Return all of OF_RESULTS that one sample exceeds; unknown forces (None) exceed none."""
+        found: list[Exceedance] = []
         for limit, bounds, thresholds in self._of_samples:
             values = (rates if limit == VELOCITY_MAX else forces if limit == FORCE_MAX
                       else lengths)
             if values is None:
                 continue
-            for leg, value in enumerate(values):
-                if _exceeds(limit, value, thresholds[leg]):
-                    found.append(Exceedance(limit, leg, value, bounds[leg]))
+            _add_exceeding(found, limit, values, bounds, thresholds)
         return tuple(found)
+
+    def exceeded_angles(self, angles: Sequence[float]) -> tuple[Exceedance, ...]:
+        """Return all of OF_JOINTS that the joint angles (JOINT_ANGLES,) of one sample exceed."""
+        found: list[Exceedance] = []
+        for limit, where, bounds, thresholds in self._of_angles:
+            _add_exceeding(found, limit, angles[where], bounds, thresholds)
+        return tuple(found)
+
+
+def _add_exceeding(found: list[Exceedance], limit: str, values: Sequence[float],
+                   bounds: Sequence[float], thresholds: Sequence[float]) -> None:
+    for leg, value in enumerate(values):
+        if _exceeds(limit, value, thresholds[leg]):
+            found.append(Exceedance(limit, leg, value, bounds[leg]))
 
 
 def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
@@ -116,7 +144,7 @@ def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
 
 @inlined
 def any_exceeded(thresholds: Array, result: Array) -> bool:
-    """Return whether a row of a result exceeds one of the thresholds (24,); nan never does."""
+    """Return whether a row of a result exceeds one of OF_RESULTS (24,); nan never does."""
     exceeded = False
     for leg in range(6):
         if (result[LENGTHS.start + leg] < thresholds[_SHORTEST.start + leg]

@@ -29,7 +29,7 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics import lagrange
+from stewart_dynamics.mechanics import joint_axes, lagrange
 from stewart_dynamics.mechanics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -108,6 +108,7 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
             if not sizes:  # else what follows from a wrong unit
                 found += (tuple(_singular(parameters, shape, reach))
                           or _order(parameters, shape, reach))
+                found += joint_axes.likely_mistakes(parameters)
     return tuple(found)
 
 

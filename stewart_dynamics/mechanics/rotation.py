@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.parameters import QUATERNION_TOLERANCE
 
 __all__ = ['euler_rate_matrix', 'euler_rate_matrix_rate', 'from_euler', 'from_quaternion',
-           'is_unit', 'quaternion_length', 'QUATERNION_TOLERANCE', 'to_quaternion']
+           'is_unit', 'quaternion_length', 'QUATERNION_TOLERANCE', 'to_euler', 'to_quaternion']
 
 
 def from_euler(angles: ArrayLike) -> Array:
@@ -43,6 +43,21 @@ def from_euler(angles: ArrayLike) -> Array:
         [cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa],
         [sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa],
         [-sb, cb * sa, cb * ca]])
+
+
+def to_euler(rotation: ArrayLike) -> Array:
+    """
+    Return alpha, beta, gamma (..., 3) [rad] of rotations (..., 3, 3).
+
+    Where beta is 90 degrees only the sum or difference of the others is determined: alpha is
+    computed with gamma as it is found, so that the rotation is exact everywhere.
+    """
+    r = np.asarray(rotation, dtype=float)
+    gamma = np.arctan2(r[..., 1, 0], r[..., 0, 0])
+    beta = np.arctan2(-r[..., 2, 0], np.hypot(r[..., 0, 0], r[..., 1, 0]))
+    c, s = np.cos(gamma), np.sin(gamma)
+    alpha = np.arctan2(s * r[..., 0, 2] - c * r[..., 1, 2], c * r[..., 1, 1] - s * r[..., 0, 1])
+    return np.stack([alpha, beta, gamma], axis=-1)
 
 
 def euler_rate_matrix(angles: ArrayLike) -> Array:

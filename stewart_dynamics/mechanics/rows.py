@@ -49,6 +49,10 @@ UNIT_LOAD_FORCES = slice(18, 24)
 DETERMINANT, DETERMINANT_RATE, CONDITION = 24, 25, 26
 RESULT = 27
 
+# A row of joint angles, see ``joint_angles``.
+BASE_JOINT_ANGLES, PLATFORM_JOINT_ANGLES = slice(0, 6), slice(6, 12)
+JOINT_ANGLES = 12
+
 
 def consecutive(*sizes: int) -> tuple[slice, ...]:
     """Return the slices of consecutive parts of these sizes."""

@@ -33,6 +33,7 @@ from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
+from stewart_dynamics.mechanics.joint_axes import JointAngles
 from stewart_dynamics.mechanics.linear_parameters import LINEAR, names_of
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.platform_arguments import (
@@ -40,8 +41,9 @@ from stewart_dynamics.mechanics.platform_arguments import (
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.regressor import Regressor
 from stewart_dynamics.mechanics.rows import (
-    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, FORCES, GRAVITY,
-    LENGTHS, MOTION, NO_BASE, POSE, POSITION, RESULT, TWIST, WRENCH)
+    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES, FORCES,
+    GRAVITY, JOINT_ANGLES, LENGTHS, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION, RESULT,
+    TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters import Parameters
@@ -83,6 +85,7 @@ class StewartPlatform:
         self._single = SingleSample(self.constants)
         self._breakdown: ForceBreakdownRows | None = None
         self._home: Pose | None = None
+        self._joint_angles: JointAngles | None = None
         self._still = BaseMotion(parameters['gravity'])
 
     def __reduce__(self) -> tuple[type[StewartPlatform], tuple[Parameters]]:
@@ -329,6 +332,27 @@ class StewartPlatform:
         find_unsolvable(rows, self.solve(rows), shape, 'raise')
         forward_kinematics.twists(self.constants, given, rows)
         return check_finite('twist', rows[:, TWIST].reshape(*shape, 6).copy(), len(shape))
+
+    def joint_angles(self, pose: Pose | Motion) -> tuple[Array, Array]:
+        """
+        Return the angles of base joints and platform joints at a pose, (..., 6) each [rad].
+
+        Between each leg and the axis of its joint: ``geometry.base_joint_axes`` and
+        ``geometry.platform_joint_axes``, by default the leg's direction at the home pose. See
+        ``mechanics.joint_angles``.
+
+        Raises
+        ------
+        ParameterError
+            Axes are not given, and there is no home pose.
+
+        """
+        rows = motion_rows(pose)
+        if self._joint_angles is None:
+            self._joint_angles = JointAngles(self.parameters)
+        angles = self._joint_angles(rows).reshape(*pose.shape, JOINT_ANGLES)
+        check_finite('pose', angles, len(pose.shape))
+        return angles[..., BASE_JOINT_ANGLES].copy(), angles[..., PLATFORM_JOINT_ANGLES].copy()
 
     def inverse_jacobian(self, pose: Pose | Motion) -> Array:
         """Return J_inv (..., 6, 6): leg rates = J_inv [v; w], J_inv^T forces = wrench."""

@@ -32,6 +32,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
+from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.singularity_warning import Singularity
 from stewart_dynamics.parameters import Parameters
@@ -181,7 +182,8 @@ class _Run:
         self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters))
         stack.callback(self._bag.abandon)
         self._table: Table = kind_of_table(options.parquet)(
-            folder, parameters['joints'], self._quasi_static)
+            folder, parameters['joints'], self._quasi_static,
+            any(parameters[name] is not None for name in OF_JOINTS))
         stack.callback(self._table.close)
 
     def take(self, messages: Messages) -> int:

@@ -109,8 +109,9 @@ class Report:
         rows[channels.DETERMINANT] = outputs.determinants
         rows[channels.CONDITION] = outputs.conditions
         rows[channels.BASE_WRENCH] = base_wrenches.T
-        parts = rows[channels.BREAKDOWN]
+        parts = rows[channels.BREAKDOWN.start:channels.joint_angles_of(self._parameters).start]
         parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
+        rows[channels.joint_angles_of(self._parameters)] = np.degrees(outputs.joint_angles).T
         self._curves.add(seconds, rows)
         self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
         self._frames.add(seconds, np.concatenate(

@@ -24,6 +24,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.limits import ANGLES as ANGLES_OF, BASE_ANGLE_MAX, OF_JOINTS
+from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.force_sources import sources_of
 from stewart_dynamics.replay.spectrum import Density
@@ -40,7 +42,7 @@ POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
 LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
 DETERMINANT, CONDITION = 42, 43
 BASE_WRENCH = slice(44, 50)
-# The last: how many there are depends on the sources.
+# How many there are depends on the sources. Last, where they have limits, the joints' angles.
 BREAKDOWN = slice(50, 50 + 6 * len(SOURCES))
 
 BASE_SECTION = 'base_wrench'
@@ -52,7 +54,15 @@ COMPARED = 24
 
 def channels_of(parameters: Parameters) -> int:
     """Return the number of channels of a sample."""
-    return BREAKDOWN.start + 6 * len(sources_of(parameters))
+    stop: int = joint_angles_of(parameters).stop
+    return stop
+
+
+def joint_angles_of(parameters: Parameters) -> slice:
+    """Return the channels of the joints' angles; there are none without limits."""
+    first = BREAKDOWN.start + 6 * len(sources_of(parameters))
+    limited = any(parameters[name] is not None for name in OF_JOINTS)
+    return slice(first, first + JOINT_ANGLES * limited)
 
 
 class Curve(NamedTuple):
@@ -129,6 +139,7 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
              'between the joint centers', [
                  *_bounds('length_min', p['limits.length_min']),
                  *_bounds('length_max', p['limits.length_max'])]),
+        *(_of_joints(p, limit) for limit in OF_JOINTS if p[limit] is not None),
         Plot('determinant', '17', 'det(J)', 'm³',
              {'': [Curve('det(J)', COLORS[0], DETERMINANT)]},
              'zero at a singularity', [Bound(0.0, 'singular', '#c00000')],
@@ -146,6 +157,17 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
                   *(Curve(source, _SOURCE_COLORS[source], BREAKDOWN.start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
+
+
+def _of_joints(p: Parameters, limit: str) -> Plot:
+    name = limit.removeprefix('limits.')
+    which, first = ANGLES_OF[limit], joint_angles_of(p).start
+    joint = 'base' if limit == BASE_ANGLE_MAX else 'platform'
+    return Plot(
+        name.removesuffix('_max'), '', f'Angles of the {joint} joints', 'deg',
+        _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
+        f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
+        _bounds(name, np.degrees(p[limit])))
 
 
 def base_wrench_plots() -> list[Plot]:

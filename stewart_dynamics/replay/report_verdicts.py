@@ -30,7 +30,12 @@ Verdict = tuple[str, str]
 """Level (good, warn, bad or none) and title of a card."""
 
 _MARGINS = (('length', 'length_margin_m', 'm'), ('rate', 'rate_margin_m_s', 'm/s'),
-            ('force', 'force_margin_n', 'N'))
+            ('force', 'force_margin_n', 'N'),
+            ('base joint angle', 'base_joint_angle_margin_rad', 'rad'),
+            ('platform joint angle', 'platform_joint_angle_margin_rad', 'rad'))
+
+# Measured forces differ if the residual's RMS is a larger part of theirs.
+_DIFFERENT = 0.05
 
 
 def verdicts(summary: Summary) -> dict[str, Verdict]:
@@ -75,8 +80,7 @@ def _singularity(found: Mapping[str, Any]) -> Verdict:
 def _measured(measured: Mapping[str, Any] | None) -> Verdict:
     if not measured or not measured['setpoints_compared']:
         return 'none', 'Measured forces'
-    if measured['contacts']['count'] or measured['mass']['unmodelled_kg'] is not None or any(
-            leg['coulomb_friction_n'] is not None for leg in measured['legs'].values()):
+    if measured['contacts']['count'] or (measured['residual_share'] or 0.0) > _DIFFERENT:
         return 'warn', 'Measured forces differ'
     return 'good', 'Measured forces'
 
@@ -88,7 +92,7 @@ def rejections(summary: Summary) -> list[dict[str, Any]]:
 
 
 def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
-    """Return the smallest margins of length, rate and force, each with its leg."""
+    """Return the smallest margins of length, rate, force and joint angles, each with its leg."""
     found = []
     for name, key, unit in _MARGINS:
         of_legs = [(leg[key], joint) for joint, leg in summary['legs'].items()

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Residuals: measured minus computed leg forces, and fits to them.
+Residuals: measured minus computed leg forces.
 
 Measured efforts are interpolated linearly in time onto the setpoints' stamps, between samples at
 most ``setpoint.timeout`` apart, and compared with the demanded forces: residual = measured -
@@ -34,10 +34,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Stamps
-from stewart_dynamics.mechanics.friction import friction
-from stewart_dynamics.mechanics.rows import (
-    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY,
-    LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION)
+from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.contacts import WrenchBins
@@ -49,15 +46,11 @@ from stewart_dynamics.runtime.step import Batch, Outputs
 _SETPOINTS_WAITING = 2 ** 15
 _SAMPLES_WAITING = 2 ** 18
 
-# A fit that accounts for a smaller share of the residual is not reported.
-_CONVINCING = 0.5
-
 AXES = ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
 _UNITS = ('n',) * 3 + ('n_m',) * 3
 
 # Columns of the rows kept of setpoints.
-_SECONDS, _POSE, _DRIVE, _RATES, _FORCES = (
-    0, slice(1, 13), slice(13, 16), slice(16, 22), slice(22, 28))
+_SECONDS, _POSE, _FORCES = 0, slice(1, 13), slice(13, 19)
 
 
 class Compared(NamedTuple):
@@ -93,7 +86,6 @@ class Comparison:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._platform = StewartPlatform(parameters)
-        self._gravity = parameters['gravity']
         gap = parameters['setpoint.timeout']
         self._gap = round(gap * 1e9)
         self._setpoints = Waiting(self._gap, _SETPOINTS_WAITING)
@@ -102,10 +94,7 @@ class Comparison:
         self._legs = _Statistics(6)
         self._measured_squares = np.zeros(6)
         self._computed = np.zeros((3, 6))  # sums of it, its squares, its products with measured
-        self._fit = np.zeros((6, 3, 3))
-        self._fitted = np.zeros((6, 3))
         self._wrench = _Statistics(6)
-        self._mass = np.zeros(3)  # sums of d.d, d.F and F.F, d the drive
         self._bins = WrenchBins()
 
     def add_setpoints(self, seconds: Array, setpoints: Batch, outputs: Outputs) -> Compared:
@@ -122,10 +111,8 @@ class Comparison:
             Of these setpoints.
 
         """
-        motions = setpoints.motions
         self._setpoints.add(setpoints.stamps, np.column_stack([
-            seconds, motions[:, POSE], _drive(motions, setpoints.bases, self._gravity),
-            outputs.rates, outputs.demanded_forces]))
+            seconds, setpoints.motions[:, POSE], outputs.demanded_forces]))
         return self._compared()
 
     def add_measured(self, stamps: Stamps, efforts: Array) -> Compared:
@@ -171,34 +158,21 @@ class Comparison:
         compared = Compared(rows[:, _SECONDS], measured, computed, external_wrenches(
             self._platform, rows[:, _POSE], computed, measured))
         if len(rows):
-            self._gather(compared, rows)
+            self._gather(compared)
         return compared
 
-    def _gather(self, compared: Compared, rows: Array) -> None:
+    def _gather(self, compared: Compared) -> None:
         seconds, wrench = compared.seconds, compared.wrench
         self._bins.add(seconds, wrench)
         # legs and axes first: sums along contiguous memory are many times as fast
-        measured, computed, rates, loads, drive = map(np.ascontiguousarray, (
-            compared.measured.T, compared.computed.T, rows[:, _RATES].T, wrench.T,
-            rows[:, _DRIVE].T))
+        measured, computed, loads = map(np.ascontiguousarray, (
+            compared.measured.T, compared.computed.T, wrench.T))
         residual = measured - computed
         self._legs.add(seconds, residual)
         self._wrench.add(seconds, loads)
         self._measured_squares += np.sum(measured ** 2, axis=1)
         self._computed += [np.sum(computed, axis=1), np.sum(computed ** 2, axis=1),
                            np.sum(computed * measured, axis=1)]
-        # terms of the fit: offset, Coulomb and viscous friction with unit coefficients
-        coulomb = np.empty((len(seconds), 6))
-        friction(np.ascontiguousarray(rows[:, _RATES]), np.zeros(6), np.ones(6), coulomb)
-        terms = np.ones_like(rates), np.ascontiguousarray(coulomb.T), rates
-        for row, one in enumerate(terms):
-            self._fitted[:, row] += np.sum(one * residual, axis=1)
-            for column, other in enumerate(terms):
-                self._fit[:, row, column] += np.sum(one * other, axis=1)
-        # weight and inertia of an unmodelled mass
-        force = loads[:3]
-        # not vdot: BLAS threads that wait for a busy processor cost more than the sums
-        self._mass += [np.sum(drive ** 2), np.sum(drive * force), np.sum(force ** 2)]
 
     def values(self) -> dict[str, Any]:
         """Return the part of summary.json."""
@@ -213,13 +187,20 @@ class Comparison:
             'samples_out_of_order': self._samples.out_of_order,
             'samples_jumped_back': max(self._samples.pass_number, 0),
             'gap_limit_s': self._gap * 1e-9,
+            **self._of_all_legs(),
             'legs': {joint: self._leg(leg) for leg, joint in enumerate(joints)},
             'external_wrench': {axis: self._wrench.named(number, '', unit)
                                 for number, (axis, unit) in enumerate(
                                     zip(AXES, _UNITS, strict=True))},
-            'mass': self._unmodelled_mass(),
             'contacts': self._contacts(),
         }
+
+    def _of_all_legs(self) -> dict[str, float | None]:
+        number = 6 * self._legs.count
+        residual, measured = float(np.sum(self._legs.squares)), float(
+            np.sum(self._measured_squares))
+        return {'residual_rms_n': float(np.sqrt(residual / number)) if number else None,
+                'residual_share': float(np.sqrt(residual / measured)) if measured else None}
 
     def _leg(self, leg: int) -> dict[str, float | None]:
         number = self._legs.count
@@ -235,33 +216,7 @@ class Comparison:
         correlation = None if constant else float(np.clip(
             (products * number - total * measured_total) / np.sqrt(spread), -1.0, 1.0))
         return {**named, 'measured_rms_n': rms[0], 'computed_rms_n': rms[1],
-                'correlation': correlation, **self._friction(leg)}
-
-    def _friction(self, leg: int) -> dict[str, float | None]:
-        """Return the friction that fits the residual; None if the leg hardly moved."""
-        names = 'offset_n', 'coulomb_friction_n', 'viscous_friction_n_s_m', 'friction_share'
-        fit, fitted = self._fit[leg], self._fitted[leg]
-        scale = np.sqrt(np.diagonal(fit))
-        if not scale.all() or np.linalg.cond(fit / np.outer(scale, scale)) > 1e8:
-            return dict.fromkeys(names)
-        best = np.linalg.solve(fit / np.outer(scale, scale), fitted / scale) / scale
-        mean_part = fitted[0] ** 2 / fit[0, 0]
-        variance = float(self._legs.squares[leg] - mean_part)
-        if variance <= 1e-12 * float(self._legs.squares[leg]):
-            return dict.fromkeys(names)
-        share = float(np.clip((best @ fitted - mean_part) / variance, 0.0, 1.0))
-        number = self._legs.count
-        noise = 0.05 * np.sqrt(variance / number)
-        if share < _CONVINCING or min(best[1], best[2] * np.sqrt(fit[2, 2] / number)) < -noise:
-            # The residual has another source: these numbers are not friction parameters.
-            return {**dict.fromkeys(names), 'friction_share': share}
-        return dict(zip(names, [*best.tolist(), share], strict=True))
-
-    def _unmodelled_mass(self) -> dict[str, float | None]:
-        drives, products, forces = self._mass.tolist()
-        share = products ** 2 / (drives * forces) if drives and forces else None
-        return {'unmodelled_kg': (products / drives if share and share >= _CONVINCING else None),
-                'share': share}
+                'correlation': correlation}
 
     def _contacts(self) -> dict[str, Any]:
         number = max(self._legs.count, 1)
@@ -281,19 +236,6 @@ class Comparison:
                 {'from_s': each.begin, 'to_s': each.end, 'axis': AXES[each.axis],
                  'force_n': list(each.load[:3]), 'moment_n_m': list(each.load[3:])}
                 for each in strongest]}
-
-
-def _drive(motions: Array, bases: Array | None, gravity: Array) -> Array:
-    """Return gravity less the acceleration of the platform's origin in the world (N, 3)."""
-    relative: Array = motions[:, LINEAR_ACCELERATION]
-    if bases is None:
-        return gravity - relative
-    free_fall, acceleration, spin, spin_rate = (bases[:, part] for part in (
-        GRAVITY, BASE_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION))
-    position, velocity = motions[:, POSITION], motions[:, LINEAR_VELOCITY]
-    drive: Array = free_fall - acceleration - relative - 2.0 * np.cross(spin, velocity) - (
-        np.cross(spin_rate, position) + np.cross(spin, np.cross(spin, position)))
-    return drive
 
 
 class _Statistics:

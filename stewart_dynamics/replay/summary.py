@@ -29,7 +29,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.limits import (
-    FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, VELOCITY_MAX)
+    ANGLES, BASE_ANGLE_MAX, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, PLATFORM_ANGLE_MAX,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay.base_wrench_summary import BaseWrenchSummary
@@ -42,6 +43,8 @@ from stewart_dynamics.runtime.step import Batch, Outputs
 _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
+# Keys of the joints' angles, by their limit.
+_ANGLES = {BASE_ANGLE_MAX: 'base_joint_angle', PLATFORM_ANGLE_MAX: 'platform_joint_angle'}
 _AT_REST = ('gravity', 'wrench', 'base motion')
 
 
@@ -98,6 +101,7 @@ class Summary:
         self._longest = Extreme(6, np.positive)
         self._rate, self._force, self._published, self._power = (
             Extreme(6, np.abs) for _ in range(4))
+        self._angles = {name: Extreme(6, np.positive) for name in ANGLES}
         # squares of the forces; driving power; braking power
         self._means = Integral(18)
         self._nearest = Extreme(1, lambda det: -np.abs(det))
@@ -180,6 +184,9 @@ class Summary:
         self._power.add(seconds, power)
         values = {LENGTH_MIN: lengths, LENGTH_MAX: lengths, VELOCITY_MAX: rates,
                   FORCE_MAX: demanded}
+        for name in self._limits.of_joints:
+            values[name] = outputs.joint_angles[:, ANGLES[name]]
+            self._angles[name].add(seconds, values[name])
         for name, exceeded in self._exceeded.items():
             exceeded.add(seconds, self._limits.exceeds(name, values[name]))
         self._nearest.add(seconds, outputs.determinants[:, None])
@@ -243,7 +250,7 @@ class Summary:
         shortest, longest = self._shortest.values[leg], self._longest.values[leg]
         rate, force = self._rate.values[leg], self._force.values[leg]
         bounds = self._limits.bounds
-        least, most, fastest, strongest = (
+        least, most, fastest, strongest, *widest = (
             bounds[name][leg] if name in bounds else None for name in LIMITS)
         length_margins = [*([] if least is None else [shortest - least]),
                           *([] if most is None else [most - longest])]
@@ -262,11 +269,16 @@ class Summary:
             'rate_margin_m_s': None if fastest is None else _number(fastest - abs(rate)),
             'force_margin_n': None if strongest is None else _number(strongest - abs(force)),
         }
+        for (name, angles), bound in zip(self._angles.items(), widest, strict=True):
+            key, angle = _ANGLES[name], angles.values[leg]
+            found |= {f'{key}_max_rad': _number(angle),
+                      f'{key}_max_at_s': _number(angles.at[leg]),
+                      f'{key}_margin_rad': None if bound is None else _number(bound - angle)}
         return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
 
     def _exceeded_limits(self) -> list[dict[str, Any]]:
-        farthest = dict(zip(LIMITS, (self._shortest, self._longest, self._rate, self._force),
-                            strict=True))
+        farthest = dict(zip(LIMITS, (self._shortest, self._longest, self._rate, self._force,
+                                     *self._angles.values()), strict=True))
         return [{'limit': name, 'leg': self._legs[leg], 'setpoints': int(limit.setpoints[leg]),
                  'worst': _number(farthest[name].values[leg]),
                  'bound': float(self._limits.bounds[name][leg]),

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import math
 import textwrap
 from typing import Any
 
@@ -80,15 +81,15 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
                      'energy are not known')
     lines += _limit_lines(found, any(clipped), any(name.startswith('limits.') and bound is not None
                                                    for name, bound in parameters.items()))
-    lines += _base_lines(found)
+    lines += [*_joint_lines(found['legs']), *_base_lines(found)]
     lines += ['', *_singularity_lines(found['singularity'])]
     return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
             for line in lines]
 
 
-def measured_headline(measured: Mapping[str, Any]) -> list[str]:
+def measured_headline(measured: Mapping[str, Any]) -> str:
     """
-    Return what accounts for the difference between measured and computed forces.
+    Return by how much measured and computed forces differ.
 
     Parameters
     ----------
@@ -97,45 +98,24 @@ def measured_headline(measured: Mapping[str, Any]) -> list[str]:
 
     """
     if not measured['setpoints_compared']:
-        return ['no setpoint could be compared']
-    lines = []
-    if measured['mass']['unmodelled_kg'] is not None:
-        lines.append(f'{measured["mass"]["unmodelled_kg"]:.4g} kg in addition on the platform '
-                     f'account for {100.0 * measured["mass"]["share"]:.0f} % of the residual '
-                     'force')
-    legs = measured['legs'].values()
-    found = [leg for leg in legs if leg['coulomb_friction_n'] is not None]
-    if found:
-        lines.append(f'friction in addition to the parameters, in {len(found)} of {len(legs)} '
-                     f'legs: Coulomb {_span(found, "coulomb_friction_n")} N, viscous '
-                     f'{_span(found, "viscous_friction_n_s_m")} N s/m')
-    if not lines:
-        largest = max(leg['residual_rms_n'] for leg in legs)
-        lines.append('neither a mass on the platform nor friction accounts for half of the '
-                     f'residual; its RMS is at most {largest:.3g} N')
-    return lines
-
-
-def _span(legs: Sequence[Mapping[str, Any]], key: str) -> str:
-    values = [leg[key] for leg in legs]
-    # without the rounding error of zero
-    texts = (f'{round(value, 6) + 0.0:.4g}' for value in (min(values), max(values)))
-    return ' to '.join(dict.fromkeys(texts))
+        return 'no setpoint could be compared'
+    worst, leg = max((leg['residual_rms_n'], name) for name, leg in measured['legs'].items())
+    share = '' if measured['residual_share'] is None else (
+        f', {100.0 * measured["residual_share"]:.3g} % of the measured force')
+    return (f'measured and computed forces differ by {measured["residual_rms_n"]:.3g} N RMS'
+            f'{share}; most in {leg}, by {worst:.3g} N')
 
 
 def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
     """Return the result of the comparison with measured forces, the headline first."""
-    lines = [f'measured: {text}' for text in measured['headline']]
+    lines = [measured['headline']]
     if not measured['setpoints_compared']:
         return lines
-    lines += [f'  {leg}: Coulomb {found["coulomb_friction_n"]:.4g} N, viscous '
-              f'{found["viscous_friction_n_s_m"]:.4g} N s/m'
-              for leg, found in measured['legs'].items()
-              if found['coulomb_friction_n'] is not None]
     rms = ', '.join(f'{leg} {found["residual_rms_n"]:.1f}' for leg, found in
-                    measured['legs'].items() if found['residual_rms_n'] is not None)
-    lines.append(f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
-                 f'force, RMS [N]: {rms or "none"}')
+                    measured['legs'].items())
+    lines += [f'compared {measured["setpoints_compared"]} setpoints; measured minus computed '
+              f'force, RMS [N]: {rms}',
+              'stewart_identify finds the payload and friction that fit the measured forces']
     contacts = measured['contacts']
     lines += [f'contact from t = {each["from_s"]:.2f} to {each["to_s"]:.2f} s: external force '
               f'({", ".join(f"{part:.1f}" for part in each["force_n"])}) N'
@@ -163,6 +143,28 @@ def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) ->
     if limits_given and not lines:
         lines.append('all limits held')
     return lines
+
+
+def _joint_lines(legs: Mapping[str, Mapping[str, float | None]]) -> list[str]:
+    """Return the largest angle of a joint at either end, and the smallest margin."""
+    lines = []
+    for joint in ('base', 'platform'):
+        angle, at, margin = (
+            f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
+        found = {name: leg[angle] for name, leg in legs.items() if leg[angle] is not None}
+        margins = {name: leg[margin] for name, leg in legs.items() if leg[margin] is not None}
+        if found and margins:
+            most = max(found, key=lambda name: found[name] or 0.0)
+            least = min(margins, key=lambda name: margins[name] or 0.0)
+            lines.append(f'{joint} joints: {_angle(found[most])} at most, {most} at t = '
+                         f'{legs[most][at]:.2f} s; margin {_angle(margins[least])}'
+                         + (f', {least}' if least != most else ''))
+    return lines
+
+
+def _angle(radians: float | None) -> str:
+    assert radians is not None
+    return f'{radians:.4g} rad ({math.degrees(radians):.1f} deg)'
 
 
 def _base_lines(found: Mapping[str, Any]) -> list[str]:

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.errors import MotionError
-from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics
+from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics, joint_angles
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
 from stewart_dynamics.mechanics.base_motion import BaseMotion
 from stewart_dynamics.mechanics.cubics import Cubics
@@ -45,7 +45,9 @@ from stewart_dynamics.runtime.planned_trajectory_checks import Checks, Violation
 from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
 
 # The machine code that a check needs.
-FUNCTIONS = inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses
+FUNCTIONS = (
+    inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses,
+    joint_angles.joint_haversines)
 
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
@@ -224,6 +226,7 @@ class _Work:
         legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
         near = many == 1.0
         dips = self._checks.check(times, durations, results, np.ones_like(near), near)
+        self._checks.check_joints(times, durations, motions, near)
         self._count(_PARTS * len(dips))
         closer: deque[_Samples] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
         coarse = _samples(many, self._piece)
@@ -235,6 +238,7 @@ class _Work:
             joined = which[1:] == which[:-1]
             step = np.diff(fraction)
             at, after = times[which] + fraction * durations[which], step * durations[which[1:]]
+            self._checks.check_joints(at, after, rows, joined)
             self._check_legs_path(
                 at, after, legs.selected(which), fraction, durations[which], rows)
             for n in self._checks.check(
@@ -261,7 +265,7 @@ class _Work:
     def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
                          durations: Array, rows: Array) -> None:
         """
-        Check that the platform keeps clear of singularities where the legs' cubics lead it.
+        Check singularities and joint angles where the legs' cubics lead the platform.
 
         Parameters
         ----------
@@ -287,9 +291,10 @@ class _Work:
             forward_kinematics.twists(
                 constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
                 poses)
+            joined = after[:found - 1] > 0.0
             self._legs_checks.check_singularities(
-                times[:found], after[:found - 1], self._platform.solve(poses),
-                after[:found - 1] > 0.0)
+                times[:found], after[:found - 1], self._platform.solve(poses), joined)
+            self._legs_checks.check_joints(times[:found], after[:found - 1], poses, joined)
 
     def _parts_between(self, first: int, between: Interpolation) -> Array:
         """Return in how many parts each interval of points is sampled."""

@@ -15,8 +15,8 @@
 """
 The checks of a planned trajectory: limits and singularities, at samples and between them.
 
-Between two samples, lengths and rates of the legs and det(J) are cubics in time through their
-values and derivatives at both.
+Between two samples, lengths and rates of the legs, det(J) and sin^2(angle / 2) of the joints are
+cubics in time through their values and derivatives at both.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.cubics import Cubics
+from stewart_dynamics.mechanics.joint_axes import angles_to_check
 from stewart_dynamics.mechanics.limits import (
-    Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
+    ANGLES, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -82,6 +83,7 @@ class Checks:
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
         self._joints = parameters['joints']
         self._limits = Limits(parameters)
+        self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
 
     def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
@@ -123,6 +125,36 @@ class Checks:
         self._check_cubics(times, durations, results, joined)
         return self.check_singularities(times, durations, results, near)
 
+    def check_joints(self, times: Array, durations: Array, motions: Array, joined: Flags) -> None:
+        """
+        Check the angles of the joints at samples, and between those that are joined.
+
+        Parameters
+        ----------
+        times, durations, joined : (M,), (M - 1,), (M - 1,)
+            As in ``check``.
+        motions : (M, MOTION)
+            Rows of motion.
+
+        """
+        if self._angles is None:
+            return
+        with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
+            values, rates = self._angles.haversines(motions)
+            cubics = Cubics.between(values, rates, durations[:, None])
+            _, high = cubics.bounds()
+        for limit in self._limits.of_joints:
+            where = ANGLES[limit]
+            at = np.broadcast_to(times[:, None], (len(times), 6))
+            self._check_limit(limit, _angle(values[:, where]), at)
+            suspect = np.flatnonzero(
+                joined & self._limits.exceeds(limit, _angle(high[:, where])).any(axis=1))
+            begin, duration = times[suspect, None], durations[suspect, None]
+            between = Cubics._make(each[suspect, where] for each in cubics)
+            for fraction in between.extrema():
+                self._check_limit(
+                    limit, _angle(between.at(fraction)), begin + fraction * duration)
+
     def check_singularities(self, times: Array, durations: Array, results: Array, near: Flags,
                             ) -> list[int]:
         """Do what ``check`` does, for singularities alone."""
@@ -161,7 +193,7 @@ class Checks:
         low, high = cubics.bounds()
         with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
             middle = np.abs(cubics.middle_rate() / durations[:, None])
-        shortest, longest, fastest, _ = self._limits.thresholds
+        shortest, longest, fastest = self._limits.thresholds[:3]
         suspect = np.flatnonzero(joined & (
             (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
         if not len(suspect):
@@ -210,3 +242,9 @@ class Checks:
         leg = int(np.argmax(result[UNIT_LOAD_FORCES]))
         self.violations.append(Violation(
             float(time), SINGULAR, f': {words}, worst for {self._joints[leg]}', leg))
+
+
+def _angle(haversines: Array) -> Array:
+    """Return angles [rad] of sin^2(angle / 2)."""
+    angles: Array = 2.0 * np.arcsin(np.sqrt(np.clip(haversines, 0.0, 1.0)))
+    return angles

@@ -91,8 +91,11 @@ _OWN = (
 )
 
 # Beginnings of names.
-_OF_THE_NODE = ('autostart', 'external_wrench.', 'limits.velocity_max', 'platform_frame',
-                'setpoint.', 'singularity.', 'trajectory.', 'visualization_rate')
+_OF_THE_NODE = ('autostart', 'external_wrench.', 'geometry.base_joint_axes',
+                'geometry.platform_joint_axes', 'limits.base_joint_angle_max',
+                'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
+                'platform_frame', 'setpoint.', 'singularity.', 'trajectory.',
+                'visualization_rate')
 
 SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
     # The node has no lifecycle: none of the hexapod's may change while it runs either.

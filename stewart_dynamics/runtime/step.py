@@ -31,7 +31,9 @@ from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics import inverse_dynamics
 from stewart_dynamics.mechanics.hexapod_constants import CONSTANTS
-from stewart_dynamics.mechanics.limits import any_exceeded, Exceedance, Limits
+from stewart_dynamics.mechanics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, any_exceeded, Exceedance, Limits, OF_RESULTS)
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
@@ -80,6 +82,8 @@ class Output(NamedTuple):
     singularity: Singularity
     warning_changed: bool
     exceedances: tuple[Exceedance, ...]
+    joint_angles: tuple[float, ...] = ()
+    """A row of joint angles [rad], nan those without a limit; empty where none has one."""
 
     @property
     def solvable(self) -> bool:
@@ -132,6 +136,8 @@ class Outputs(NamedTuple):
     """(N,): the singularity warning is another than before."""
     exceeding: Flags
     """(N,): a limit is exceeded."""
+    joint_angles: Array
+    """Rows of joint angles (N, 12) [rad], or (N, 0), as in Output."""
 
     @property
     def lengths(self) -> Array:
@@ -288,9 +294,12 @@ class Step:
         self._settings = settings = self._numbers[_SETTINGS]
         settings[_THRESHOLDS] = thresholds(parameters)
         settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
-        settings[_LIMITS] = self._limits.thresholds.ravel()
+        settings[_LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
         settings[_FORCE_MAX] = self._limits.force_max
         self._solve = _one.bound(self._numbers)
+        self._angles = angles_to_check(parameters, self._limits.of_joints)
+        self._angles_of_one = (
+            None if self._angles is None else self._angles.of_one(self._numbers[_MOTION]))
 
     def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
         """
@@ -317,13 +326,17 @@ class Step:
         forces = written[_FORCES]
         singularity = Singularity.of(written[_AFTER])
         solved = demanded[0] == demanded[0]
+        exceedances = self._limits.exceeded(
+            lengths, rates, demanded if solved else None) if written[_EXCEEDING.start] else ()
+        angles: tuple[float, ...] = ()
+        if self._angles_of_one is not None:
+            angles = self._angles_of_one()
+            exceedances += self._limits.exceeded_angles(angles)
         return Output(
             stamp, lengths, rates, demanded if solved else None,
             forces if forces[0] == forces[0] else None, written[UNIT_LOAD_FORCES],
             written[DETERMINANT], written[DETERMINANT_RATE], written[CONDITION], singularity,
-            before is None or singularity.warning != before.warning,
-            self._limits.exceeded(lengths, rates, demanded if solved else None)
-            if written[_EXCEEDING.start] else ())
+            before is None or singularity.warning != before.warning, exceedances, angles)
 
     def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
         """Return what setpoints give one after the other; see the call for one."""
@@ -335,12 +348,16 @@ class Step:
         answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
         _watch_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
                     state, results, forces, states, answered, exceeding)
-        stamps = setpoints.stamps
+        stamps, motions = setpoints.stamps, setpoints.motions
         if not answered.all():
-            stamps, results, forces = stamps[answered], results[answered], forces[answered]
+            stamps, motions, results, forces = (
+                stamps[answered], motions[answered], results[answered], forces[answered])
             states, exceeding = states[answered], exceeding[answered]
         warnings = states[:, CAUSE] > 0.0
         changed = np.empty(len(states), dtype=bool)
         changed[:1] = before is None or warnings[:1] != before.warning
         changed[1:] = warnings[1:] != warnings[:-1]
-        return Outputs(answered, stamps, results, forces, states, changed, exceeding)
+        angles = np.empty((len(states), 0)) if self._angles is None else self._angles(motions)
+        for name in self._limits.of_joints:
+            exceeding |= self._limits.exceeds(name, angles[:, ANGLES[name]]).any(axis=1)
+        return Outputs(answered, stamps, results, forces, states, changed, exceeding, angles)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from stewart_dynamics.mechanics.limits import Exceedance, FORCE_MAX, LIMITS
+from stewart_dynamics.mechanics.limits import ANGLES, Exceedance, FORCE_MAX, LIMITS, QUANTITIES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status)
@@ -57,7 +57,7 @@ class LimitsDiagnostics:
     Parameters
     ----------
     parameters : Parameters
-        Names of the legs.
+        Names of the legs, and which limits are given.
     answers : Answers
         The setpoints that were answered.
 
@@ -65,6 +65,7 @@ class LimitsDiagnostics:
 
     def __init__(self, parameters: Parameters, answers: Answers) -> None:
         self._joints: tuple[str, ...] = parameters['joints']
+        self._parameters = parameters
         self._answers = answers
         self._output: Output | None = None
         self._limits = {name: _Limit() for name in LIMITS}
@@ -109,6 +110,12 @@ class LimitsDiagnostics:
         if output.demanded_forces is not None:
             values += [(f'{leg}: force demanded (N)', f'{force:.6g}') for leg, force in
                        zip(self._joints, output.demanded_forces, strict=True)]
+        if output.joint_angles:
+            values += [(f'{leg}: {quantity} ({unit})', f'{angle:.6g}')
+                       for limit, where in ANGLES.items() if self._parameters[limit] is not None
+                       for quantity, unit in [QUANTITIES[limit]]
+                       for leg, angle in zip(
+                           self._joints, output.joint_angles[where], strict=True)]
         if self._largest_force:
             values += [
                 ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),

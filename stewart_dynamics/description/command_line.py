@@ -1,0 +1,124 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The command line of stewart_describe."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+
+from stewart_dynamics.errors import one_line, StewartError
+
+DONE, LIKELY_MISTAKE, BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
+_INTERFACES = ('position', 'velocity', 'effort')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    given = _arguments().parse_args(arguments)
+    try:
+        return _write(given)
+    except StewartError as exc:
+        _complain(one_line(exc))
+        return BAD_INPUT
+    except OSError as exc:
+        where = f'{exc.filename}: ' if exc.filename else ''
+        _complain(f'{where}cannot be written: {exc.strerror or exc}')
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _complain('interrupted')
+        return _INTERRUPTED
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='stewart_describe', formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Write a hexapod as URDF, SDFormat and MJCF.',
+        epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF).\n\n'
+               'exit codes: 0 done; 1 with --strict, where a likely mistake was found; 2 bad '
+               'arguments, parameters or\nfiles; 130 interrupted')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the hexapod, the file that the node takes')
+    parser.add_argument('--output', type=Path, default=Path('.'), metavar='DIR',
+                        help='folder of the results (default: the current one)')
+    parser.add_argument('--name', type=_name, metavar='NAME',
+                        help='name of the model and of the files (default: that of FILE)')
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 where a likely mistake was found')
+    control = parser.add_argument_group('ros2_control', 'a block in the URDF')
+    control.add_argument('--ros2-control', type=_interfaces, metavar='INTERFACES',
+                         help='command interfaces of the legs: effort, velocity or position, or '
+                              'several with commas')
+    control.add_argument('--hardware', default='mock', metavar='PLUGIN',
+                         help='mock (mock_components), topic (joint_state_topic_hardware_'
+                              'interface) or the name of a plugin (default: mock)')
+    return parser
+
+
+def _name(text: str) -> str:
+    if not text or not text.isprintable() or '/' in text or text in ('.', '..'):
+        raise argparse.ArgumentTypeError(f'{text!r}: not a name for files')
+    return text
+
+
+def _interfaces(text: str) -> list[str]:
+    found = text.split(',')
+    for each in found:
+        if each not in _INTERFACES:
+            raise argparse.ArgumentTypeError(
+                f'{each!r}: must be one of {", ".join(_INTERFACES)}')
+    return found
+
+
+def _write(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.description.hexapod import Hexapod
+    from stewart_dynamics.description.mjcf import mjcf
+    from stewart_dynamics.description.sdf import sdf
+    from stewart_dynamics.description.urdf import Ros2Control, urdf
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters import Parameters
+
+    parameters = Parameters.from_yaml(given.params)
+    hexapod, name = Hexapod(parameters), given.name or given.params.stem
+    control = None
+    if given.ros2_control is not None:
+        control = Ros2Control(given.ros2_control, given.hardware)
+    _put(given, {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
+                 f'{name}.xml': mjcf(hexapod, name)})
+    mistakes = likely_mistakes(parameters)
+    for mistake in mistakes:
+        _complain(f'warning: {mistake}')
+    return LIKELY_MISTAKE if mistakes and given.strict else DONE
+
+
+def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
+    """Write all files or none."""
+    paths = {given.output / name: text for name, text in files.items()}
+    for path in paths:
+        if path.exists() and not given.force:
+            raise StewartError(f'{path}: exists; --force replaces it')
+    given.output.mkdir(parents=True, exist_ok=True)
+    for path, text in paths.items():
+        path.write_text(text, encoding='utf-8')
+        print(path)
+
+
+def _complain(what: object) -> None:
+    print(f'stewart_describe: {what}', file=sys.stderr)

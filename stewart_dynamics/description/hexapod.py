@@ -1,0 +1,182 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A hexapod as the writers of all formats need it: names, frames, bodies and shapes.
+
+The axes of a leg's cylinder and piston are those of its mount at home: z along the leg. The origin
+of the cylinder is the base joint, that of the piston the platform joint.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError, shown
+from stewart_dynamics.mechanics.home_pose import homes
+from stewart_dynamics.mechanics.leg_joints import joint_names, mounts
+from stewart_dynamics.parameters import inertia_matrix, Parameters
+
+_WORLD = 'world'  # in SDFormat and MJCF
+
+# A body that a tool simulates needs mass and inertia about each axis. What a parameter file gives
+# as zero is replaced by these: the forces of a hexapod change by about 5e-4 of the largest.
+_LEAST_MASS = 1e-4  # of the platform's
+_LEAST_GYRATION = 0.1  # of the leg at home
+AXIAL_INERTIA = 1e-6
+"""Inertia of a leg's part about its own axis, in terms of the transverse one, where a format
+requires one: in the model it is zero."""
+
+PASSIVE_RATE = 1000.0
+"""What a format that requires a limit of every joint is given for passive ones [m/s, rad/s]."""
+_UNLIMITED_LENGTH = 10.0
+"""Of a leg without a limit, in terms of its length at home."""
+UNLIMITED = 1e9
+"""Force or rate of a leg without a limit, where a format requires one [N, m/s]."""
+
+
+class Body(NamedTuple):
+    """A rigid body."""
+
+    name: str
+    mass: float
+    """[kg]"""
+    center: Array
+    """Center of mass, axes of the body (3,) [m]."""
+    inertia: Array
+    """About the center of mass, axes of the body (3, 3) [kg m^2]."""
+
+
+class Leg(NamedTuple):
+    """A leg: its names, its joints, its two bodies, and what its actuator does."""
+
+    name: str
+    cross: str
+    """Name of the massless body between the joints of the universal joint."""
+    universal: tuple[str, str]
+    """Names of these joints."""
+    ball: str
+    """Name of the joint at the platform, and of the frame on the platform where it is."""
+    base_joint: Array
+    """Base frame (3,) [m]."""
+    platform_joint: Array
+    """Platform frame (3,) [m]."""
+    mount: Array
+    """Axes of the mount to base axes (3, 3)."""
+    zero_length: float
+    home_length: float
+    """[m]"""
+    cylinder: Body
+    piston: Body
+    reflected_mass: float
+    viscous_friction: float
+    coulomb_friction: float
+    limits: Limits
+
+
+class Limits(NamedTuple):
+    """The limits of a leg; none: not checked."""
+
+    length_min: float | None
+    length_max: float | None
+    velocity_max: float | None
+    force_max: float | None
+
+    def lengths(self, home_length: float) -> tuple[float, float]:
+        """Return the shortest and longest length [m]; where not checked, any that makes sense."""
+        return (0.0 if self.length_min is None else self.length_min,
+                _UNLIMITED_LENGTH * home_length if self.length_max is None else self.length_max)
+
+
+class Hexapod:
+    """
+    A hexapod with the names of all its bodies.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+
+    Attributes
+    ----------
+    position, rotation : (3,), (3, 3)
+        The home pose, as ``homes`` gives it; formats of closed loops begin there.
+    base, platform : str
+        Names of these bodies.
+    base_body : str
+        The name of the base where a format has a world of its own, whose name is taken.
+    platform_body : Body
+    legs : tuple of Leg
+
+    Raises
+    ------
+    ParameterError
+        Two joints or two bodies would have the same name.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.joints = joint_names(parameters)
+        positions, rotations = homes(parameters)
+        self.position, self.rotation = positions[0], rotations[0]
+        self.base, self.platform = parameters['base_frame'], parameters['platform_frame']
+        self.base_body = f'{_WORLD}_base' if self.base == _WORLD else self.base
+        self.platform_body = Body(
+            self.platform, parameters['platform.mass'], parameters['platform.center_of_mass'],
+            inertia_matrix(parameters['platform.inertia']))
+        directions = mounts(parameters)
+        self.legs = tuple(self._leg(n, directions[n]) for n in range(6))
+        names = [self.base, self.base_body, self.platform][self.base == self.base_body:]
+        for leg in self.legs:
+            names += [leg.cross, leg.cylinder.name, leg.piston.name, leg.ball]
+        twice = [name for n, name in enumerate(names) if name in names[:n]]
+        if twice:
+            raise ParameterError(
+                f'base_frame: {shown(self.base)}, platform_frame: {shown(self.platform)}, joints: '
+                f'{shown(list(parameters["joints"]))}: two bodies would have the name '
+                f'{shown(twice[0])}')
+
+    def _leg(self, n: int, mount: Array) -> Leg:
+        p = self.parameters
+        name = p['joints'][n]
+        base, platform = p['geometry.base_joints'][n], p['geometry.platform_joints'][n]
+        length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
+        return Leg(
+            name, f'{name}_cross', (f'{name}_universal_x', f'{name}_universal_y'),
+            f'{name}_platform_joint', base, platform, mount,
+            float(p['geometry.zero_length'][n]), length,
+            self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),
+            float(p['actuator.reflected_mass'][n]), float(p['actuator.viscous_friction'][n]),
+            float(p['actuator.coulomb_friction'][n]),
+            Limits(*(None if p[f'limits.{each}'] is None else float(p[f'limits.{each}'][n])
+                     for each in Limits._fields)))
+
+    def _part(self, n: int, part: str, sign: float) -> Body:
+        p = self.parameters
+        across = float(p[f'legs.{part}.inertia'][n])
+        center = sign * float(p[f'legs.{part}.center_of_mass'][n])
+        return Body(f'{p["joints"][n]}_{part}', float(p[f'legs.{part}.mass'][n]),
+                    np.array([0.0, 0.0, center + 0.0]), np.diag([across, across, 0.0]))
+
+    def solid(self, body: Body, leg: Leg) -> Body:
+        """Return a leg's body with mass and inertia about all axes, as tools need it."""
+        mass = body.mass or _LEAST_MASS * self.platform_body.mass
+        across = float(body.inertia[0, 0]) or mass * (_LEAST_GYRATION * leg.home_length) ** 2
+        return body._replace(mass=mass, inertia=np.diag([
+            across, across, AXIAL_INERTIA * across]))

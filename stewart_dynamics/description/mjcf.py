@@ -1,0 +1,175 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A hexapod as MJCF, the format of MuJoCo: its loops closed by ``connect``, a motor for each leg.
+
+Coordinates at the start are those of the home pose. A slide joint has the name and position of its
+leg; ``ctrl`` is the force of each leg in the order of ``joints`` [N]. The world's axes are base
+axes, in which gravity is given: a base that is tilted has a tilted gravity.
+
+Constraints are soft in MuJoCo: at a platform joint they act as springs with a time constant of two
+steps, and leave gaps of micrometres under load. Coulomb friction is such a constraint, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
+from stewart_dynamics.description.shapes import COLORS, Shape, shapes
+from stewart_dynamics.description.xml_text import (
+    add, CARRIED, carried, numbers, text_of, without_limit)
+from stewart_dynamics.mechanics.rotation import to_quaternion
+
+_TIMESTEP = 0.0005  # [s]
+# Of constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and
+# at one of the third number [m].
+_SOLREF = (2.0 * _TIMESTEP, 1.0)
+_SOLIMP = (0.9999, 0.9999, 0.001)
+_TOLERANCE = 1e-12
+_NOT_IN_MJCF = ('limits.velocity_max',)
+_OF_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
+              'legs.piston.inertia')
+_COMMENT = 'It starts at the home pose. ctrl: the forces of the legs in N, a positive one pushes.'
+
+
+def mjcf(hexapod: Hexapod, name: str) -> str:
+    """Return a hexapod as MJCF; ``name`` is that of the model."""
+    root = ET.Element('mujoco', {'model': name})
+    p = hexapod.parameters
+    add(root, 'compiler', angle='radian', autolimits='true')
+    add(root, 'option', timestep=numbers(_TIMESTEP), gravity=numbers(p['gravity']),
+        integrator='implicitfast', solver='Newton', tolerance=numbers(_TOLERANCE))
+    # What is in the hexapod's world collides with it, but not its parts with each other.
+    add(add(root, 'default'), 'geom', contype='1', conaffinity='0', mass='0')
+    looks = shapes(hexapod)
+    _assets(root, looks)
+    world = add(root, 'worldbody')
+    base = add(world, 'body', name=hexapod.base_body)
+    _geoms(base, looks[hexapod.base])
+    for leg in hexapod.legs:
+        _leg(base, hexapod, leg, looks)
+    _platform(world, hexapod, looks[hexapod.platform])
+    _loops(root, hexapod)
+    _actuators(root, hexapod)
+    custom = add(root, 'custom')
+    for each, text in {**carried(p, _carried(hexapod)), 'base_frame': hexapod.base}.items():
+        add(custom, 'text', name=f'{CARRIED}.{each}', data=text)
+    return text_of(root, _COMMENT)
+
+
+def _carried(hexapod: Hexapod) -> list[str]:
+    """Return the names of parameters that are not in the elements of the format."""
+    p = hexapod.parameters
+    return [*_NOT_IN_MJCF, *(name for name in _OF_BODIES if not p[name].all()),
+            *without_limit(p, ('limits.length_min', 'limits.length_max', 'limits.force_max'))]
+
+
+def _leg(base: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],
+         ) -> None:
+    add(base, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
+    cylinder = add(base, 'body', name=leg.cylinder.name, pos=numbers(leg.base_joint),
+                   quat=_quaternion(leg.mount))
+    for joint, axis in zip(leg.universal, ('1 0 0', '0 1 0'), strict=True):
+        add(cylinder, 'joint', name=joint, type='hinge', axis=axis)
+    _inertial(cylinder, hexapod.solid(leg.cylinder, leg))
+    _geoms(cylinder, looks[leg.cylinder.name])
+    piston = add(cylinder, 'body', name=leg.piston.name, pos=numbers([0, 0, leg.home_length]))
+    slide = add(piston, 'joint', name=leg.name, type='slide', axis='0 0 1',
+                ref=numbers(leg.home_length - leg.zero_length),
+                armature=numbers(leg.reflected_mass), damping=numbers(leg.viscous_friction),
+                frictionloss=numbers(leg.coulomb_friction), solreffriction=numbers(_SOLREF),
+                solimpfriction=numbers(_SOLIMP), solreflimit=numbers(_SOLREF))
+    if leg.limits.length_min is not None or leg.limits.length_max is not None:
+        slide.set('range', numbers(
+            np.subtract(leg.limits.lengths(leg.home_length), leg.zero_length)))
+    _inertial(piston, hexapod.solid(leg.piston, leg))
+    _geoms(piston, looks[leg.piston.name])
+    add(piston, 'site', name=f'{leg.name}_tip')
+
+
+def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[Shape]) -> None:
+    platform = add(world, 'body', name=hexapod.platform, pos=numbers(hexapod.position),
+                   quat=_quaternion(hexapod.rotation))
+    add(platform, 'freejoint', name=hexapod.platform)
+    _inertial(platform, hexapod.platform_body)
+    _geoms(platform, looks)
+    for leg in hexapod.legs:
+        add(platform, 'site', name=leg.ball, pos=numbers(leg.platform_joint))
+
+
+def _loops(root: ET.Element, hexapod: Hexapod) -> None:
+    equality = add(root, 'equality')
+    tendons = add(root, 'tendon')
+    for leg in hexapod.legs:
+        add(equality, 'connect', name=leg.ball, site1=f'{leg.name}_tip', site2=leg.ball,
+            solref=numbers(_SOLREF), solimp=numbers(_SOLIMP))
+        # It has no stiffness: it measures the length from joint to joint.
+        length = add(tendons, 'spatial', name=leg.name, rgba='0 0 0 0')
+        add(length, 'site', site=f'{leg.name}_base_joint')
+        add(length, 'site', site=leg.ball)
+
+
+def _actuators(root: ET.Element, hexapod: Hexapod) -> None:
+    actuators = add(root, 'actuator')
+    sensors = add(root, 'sensor')
+    for leg in hexapod.legs:
+        motor = add(actuators, 'motor', name=leg.name, joint=leg.name)
+        if leg.limits.force_max is not None:
+            motor.set('ctrlrange', numbers(-leg.limits.force_max, leg.limits.force_max))
+    for leg in hexapod.legs:
+        add(sensors, 'tendonpos', name=f'{leg.name}_length', tendon=leg.name)
+    for leg in hexapod.legs:
+        add(sensors, 'tendonvel', name=f'{leg.name}_rate', tendon=leg.name)
+    for leg in hexapod.legs:
+        add(sensors, 'actuatorfrc', name=f'{leg.name}_force', actuator=leg.name)
+
+
+def _assets(root: ET.Element, looks: dict[str, tuple[Shape, ...]]) -> None:
+    assets = add(root, 'asset')
+    for color, rgba in COLORS.items():
+        add(assets, 'material', name=color, rgba=numbers(rgba))
+    files = {shape.color: shape for each in looks.values() for shape in each if shape.file}
+    for kind, shape in files.items():
+        add(assets, 'mesh', name=kind, file=shape.file, scale=numbers([shape.scale] * 3))
+
+
+def _geoms(body: ET.Element, looks: Sequence[Shape]) -> None:
+    for shape in looks:
+        geom = add(body, 'geom', type=shape.kind, material=shape.color,
+                   pos=numbers(shape.position), quat=_quaternion(shape.rotation))
+        if shape.kind == 'mesh':
+            geom.set('mesh', shape.color)
+        elif shape.kind == 'sphere':
+            geom.set('size', numbers(shape.radius))
+            geom.set('contype', '0')
+        else:
+            geom.set('size', numbers(shape.radius, 0.5 * shape.length))
+
+
+def _inertial(parent: ET.Element, body: Body) -> None:
+    i = body.inertia
+    add(parent, 'inertial', pos=numbers(body.center), mass=numbers(body.mass),
+        fullinertia=numbers(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
+
+
+def _quaternion(rotation: Array) -> str:
+    x, y, z, w = to_quaternion(rotation)
+    return numbers(w, x, y, z)

@@ -1,0 +1,171 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A hexapod as SDFormat, with closed loops, for Gazebo.
+
+A universal joint at the base and a ball joint at the platform close each loop. SDFormat counts the
+positions of joints from the poses in the file, those of the home pose: the position of a leg's
+joint is its length less that at home, and its limits are counted from there, too.
+
+The model is turned so that gravity, given in base axes, points along the world's -z. What SDFormat
+has no place for stands in elements with the prefix ``stewart_dynamics``, which other readers
+ignore.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
+from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
+from stewart_dynamics.description.xml_text import (
+    add, CARRIED, carried, numbers, text_of, without_limit)
+from stewart_dynamics.mechanics.rotation import to_euler
+
+_VERSION = '1.9'
+_NAMESPACE = 'https://stewart-dynamics.example/sdf'
+_LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+_NOT_IN_SDF = ('gravity', 'geometry.zero_length', 'actuator.reflected_mass')
+_OF_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
+              'legs.piston.inertia')
+_COMMENT = 'Positions of joints are counted from the home pose.'
+
+
+def sdf(hexapod: Hexapod, name: str) -> str:
+    """Return a hexapod as SDFormat; ``name`` is that of the model."""
+    root = ET.Element('sdf', {'version': _VERSION, f'xmlns:{CARRIED}': _NAMESPACE})
+    model = add(root, 'model', name=name, canonical_link=hexapod.base_body)
+    p = hexapod.parameters
+    _pose(model, np.zeros(3), upright(p['gravity']))
+    add(model, 'self_collide', 'false')
+    looks = shapes(hexapod)
+    base = _link(model, hexapod.base_body, '', np.zeros(3), np.eye(3))
+    _shapes(base, looks[hexapod.base])
+    _joint(model, f'{hexapod.base_body}_to_world', 'fixed', 'world', hexapod.base_body)
+    for leg in hexapod.legs:
+        _leg(model, hexapod, leg, looks)
+    platform = _link(model, hexapod.platform, hexapod.base_body, hexapod.position,
+                     hexapod.rotation)
+    _inertial(platform, hexapod.platform_body)
+    _shapes(platform, looks[hexapod.platform])
+    for leg in hexapod.legs:
+        ball = _joint(model, leg.ball, 'ball', leg.piston.name, hexapod.platform)
+        _pose(ball, leg.platform_joint, np.eye(3), hexapod.platform)
+    names = [*_NOT_IN_SDF, *(each for each in _OF_BODIES if not p[each].all()),
+             *without_limit(p, _LIMITS)]
+    for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
+        add(model, f'{CARRIED}:parameter', name=each, value=text)
+    return text_of(root, _COMMENT)
+
+
+def upright(gravity: Array) -> Array:
+    """Return the shortest rotation (3, 3) from base axes to axes in which gravity is along -z."""
+    size = float(np.linalg.norm(gravity))
+    if size == 0.0:
+        return np.eye(3)
+    x, y, z = -gravity / size
+    if z < -1.0 + 1e-12:  # upside down
+        return np.diag([1.0, -1.0, -1.0])
+    # R = 1 + K + K^2 / (1 + z) with K the cross product of (x, y, z) and (0, 0, 1).
+    k = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    turn: Array = np.eye(3) + k + k @ k / (1.0 + z)
+    return turn
+
+
+def _leg(model: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],
+         ) -> None:
+    cylinder = _link(model, leg.cylinder.name, hexapod.base_body, leg.base_joint, leg.mount)
+    _inertial(cylinder, hexapod.solid(leg.cylinder, leg))
+    _shapes(cylinder, looks[leg.cylinder.name])
+    universal = _joint(model, f'{leg.name}_universal', 'universal', hexapod.base_body,
+                       leg.cylinder.name)
+    for tag, along in (('axis', [1, 0, 0]), ('axis2', [0, 1, 0])):
+        add(add(universal, tag), 'xyz', numbers(along))
+    piston = _link(model, leg.piston.name, leg.cylinder.name,
+                   np.array([0.0, 0.0, leg.home_length]), np.eye(3))
+    _inertial(piston, hexapod.solid(leg.piston, leg))
+    _shapes(piston, looks[leg.piston.name])
+    axis = add(_joint(model, leg.name, 'prismatic', leg.cylinder.name, leg.piston.name), 'axis')
+    add(axis, 'xyz', numbers([0, 0, 1]))
+    limits, limit = leg.limits, add(axis, 'limit')
+    for tag, value in (('lower', limits.length_min), ('upper', limits.length_max)):
+        if value is not None:
+            add(limit, tag, numbers(value - leg.home_length))
+    for tag, value in (('effort', limits.force_max), ('velocity', limits.velocity_max)):
+        if value is not None:
+            add(limit, tag, numbers(value))
+    dynamics = add(axis, 'dynamics')
+    add(dynamics, 'damping', numbers(leg.viscous_friction))
+    add(dynamics, 'friction', numbers(leg.coulomb_friction))
+
+
+def _link(model: ET.Element, name: str, relative_to: str, position: Array, rotation: Array,
+          ) -> ET.Element:
+    link = add(model, 'link', name=name)
+    _pose(link, position, rotation, relative_to)
+    return link
+
+
+def _joint(model: ET.Element, name: str, kind: str, parent: str, child: str) -> ET.Element:
+    joint = add(model, 'joint', name=name, type=kind)
+    add(joint, 'parent', parent)
+    add(joint, 'child', child)
+    return joint
+
+
+def _pose(parent: ET.Element, position: Array, rotation: Array, relative_to: str = '') -> None:
+    pose = add(parent, 'pose', numbers(position, to_euler(rotation)))
+    if relative_to:
+        pose.set('relative_to', relative_to)
+
+
+def _inertial(link: ET.Element, body: Body) -> None:
+    inertial = add(link, 'inertial')
+    _pose(inertial, body.center, np.eye(3))
+    add(inertial, 'mass', numbers(body.mass))
+    inertia = add(inertial, 'inertia')
+    for tag, value in zip(('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'),
+                          body.inertia[np.triu_indices(3)], strict=True):
+        add(inertia, tag, numbers(value))
+
+
+def _shapes(link: ET.Element, looks: Sequence[Shape]) -> None:
+    for kind, some in (('visual', looks), ('collision', solids(looks))):
+        for n, shape in enumerate(some, 1):
+            one = add(link, kind, name=f'{kind}_{n}')
+            _pose(one, shape.position, shape.rotation)
+            _geometry(one, shape)
+            if kind == 'visual':
+                material = add(one, 'material')
+                add(material, 'ambient', numbers(COLORS[shape.color]))
+                add(material, 'diffuse', numbers(COLORS[shape.color]))
+
+
+def _geometry(parent: ET.Element, shape: Shape) -> None:
+    geometry = add(parent, 'geometry')
+    if shape.kind == 'mesh':
+        mesh = add(geometry, 'mesh')
+        add(mesh, 'uri', shape.file)
+        add(mesh, 'scale', numbers([shape.scale] * 3))
+        return
+    solid = add(geometry, shape.kind)
+    add(solid, 'radius', numbers(shape.radius))
+    if shape.kind == 'cylinder':
+        add(solid, 'length', numbers(shape.length))

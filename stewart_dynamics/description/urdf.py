@@ -1,0 +1,205 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A hexapod as URDF: a tree whose loops are open at the platform joints.
+
+Its joints, their order and their positions at a pose are those of ``mechanics.leg_joints``. The
+frame ``<leg>_platform_joint`` on the platform is where the origin of ``<leg>_piston`` is while the
+loops are closed. What URDF has no place for stands in a block ``stewart_dynamics``, which other
+readers ignore.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.hexapod import Body, Hexapod, Leg, PASSIVE_RATE, UNLIMITED
+from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
+from stewart_dynamics.description.xml_text import (
+    add, CARRIED, carried, numbers, text_of, without_limit)
+from stewart_dynamics.mechanics.leg_joints import PLATFORM_JOINTS
+from stewart_dynamics.mechanics.rotation import to_euler
+
+_LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+_NOT_IN_URDF = ('gravity', 'actuator.reflected_mass')
+_AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
+# Of the virtual joints of the platform, and the largest angles of their closed form.
+_VIRTUAL = {'yaw': ('z', math.pi), 'pitch': ('y', math.pi / 2), 'roll': ('x', math.pi)}
+_COMMENT = ('The loops of a hexapod are open here; its joints close them where they have the '
+            'positions of one pose, as the topic joint_states gives them.')
+
+MOCK, TOPIC = 'mock', 'topic'
+HARDWARE = {
+    MOCK: 'mock_components/GenericSystem',
+    TOPIC: 'joint_state_topic_hardware_interface/JointStateTopicSystem'}
+
+
+class Ros2Control(NamedTuple):
+    """The block ros2_control."""
+
+    interfaces: Sequence[str]
+    """Command interfaces of each leg: effort, velocity, position."""
+    hardware: str
+    """A key of HARDWARE, or the name of a plugin."""
+
+
+def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str:
+    """
+    Return a hexapod as URDF.
+
+    Parameters
+    ----------
+    hexapod : Hexapod
+        What is described.
+    name : str
+        Of the robot.
+    control : Ros2Control, optional
+        Adds a block ros2_control for the six legs.
+
+    """
+    root = ET.Element('robot', {'name': name})
+    for color, rgba in COLORS.items():
+        add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))
+    looks = shapes(hexapod)
+    _link(root, Body(hexapod.base, 0.0, np.zeros(3), np.zeros((3, 3))), looks[hexapod.base])
+    _platform(root, hexapod, looks[hexapod.platform])
+    for leg in hexapod.legs:
+        _leg(root, hexapod, leg, looks)
+    p = hexapod.parameters
+    block = add(root, CARRIED)
+    for each, text in carried(p, (*_NOT_IN_URDF, *without_limit(p, _LIMITS))).items():
+        add(block, 'parameter', name=each, value=text)
+    if control is not None:
+        _ros2_control(root, hexapod, name, control)
+    return text_of(root, _COMMENT)
+
+
+def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[Shape]) -> None:
+    """Write the chain of virtual joints, the platform and the frames of its joints."""
+    parent = hexapod.base
+    reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
+        hexapod.parameters['geometry.base_joints'],
+        hexapod.parameters['geometry.platform_joints']))
+    reach += max(leg.limits.lengths(leg.home_length)[1] for leg in hexapod.legs)
+    for each, name in zip(PLATFORM_JOINTS, hexapod.joints, strict=False):
+        axis, bound = _VIRTUAL.get(each, (each, reach))
+        child = hexapod.platform if each == PLATFORM_JOINTS[-1] else f'{name}_link'
+        if child == hexapod.platform:
+            _link(root, hexapod.platform_body, looks)
+        else:
+            add(root, 'link', name=child)
+        joint = _joint(root, name, 'revolute' if each in _VIRTUAL else 'prismatic', parent, child)
+        add(joint, 'axis', xyz=numbers(_AXES[axis]))
+        _limit(joint, (-bound, bound), PASSIVE_RATE, 0.0)
+        parent = child
+    for leg in hexapod.legs:
+        add(root, 'link', name=leg.ball)
+        _joint(root, f'{leg.ball}_fixed', 'fixed', hexapod.platform, leg.ball,
+               leg.platform_joint)
+
+
+def _leg(root: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],
+         ) -> None:
+    add(root, 'link', name=leg.cross)
+    _link(root, leg.cylinder, looks[leg.cylinder.name])
+    _link(root, leg.piston, looks[leg.piston.name])
+    first = _joint(root, leg.universal[0], 'revolute', hexapod.base, leg.cross, leg.base_joint,
+                   leg.mount)
+    add(first, 'axis', xyz=numbers(_AXES['x']))
+    _limit(first, (-math.pi, math.pi), PASSIVE_RATE, 0.0)
+    second = _joint(root, leg.universal[1], 'revolute', leg.cross, leg.cylinder.name)
+    add(second, 'axis', xyz=numbers(_AXES['y']))
+    _limit(second, (-math.pi / 2, math.pi / 2), PASSIVE_RATE, 0.0)
+    piston = _joint(root, leg.name, 'prismatic', leg.cylinder.name, leg.piston.name,
+                    np.array([0.0, 0.0, leg.zero_length]))
+    add(piston, 'axis', xyz=numbers(_AXES['z']))
+    shortest, longest = leg.limits.lengths(leg.home_length)
+    _limit(piston, (shortest - leg.zero_length, longest - leg.zero_length),
+           leg.limits.velocity_max or UNLIMITED, leg.limits.force_max or UNLIMITED)
+    add(piston, 'dynamics', damping=numbers(leg.viscous_friction),
+        friction=numbers(leg.coulomb_friction))
+
+
+def _link(root: ET.Element, body: Body, looks: Sequence[Shape]) -> None:
+    link = add(root, 'link', name=body.name)
+    if body.mass or body.inertia.any():
+        inertial = add(link, 'inertial')
+        add(inertial, 'origin', xyz=numbers(body.center))
+        add(inertial, 'mass', value=numbers(body.mass))
+        add(inertial, 'inertia', **{
+            name: numbers(value) for name, value in zip(
+                ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz'),
+                body.inertia[np.triu_indices(3)], strict=True)})
+    for kind in ('visual', 'collision'):
+        for shape in looks if kind == 'visual' else solids(looks):
+            one = add(link, kind)
+            _origin(one, shape.position, shape.rotation)
+            _geometry(one, shape)
+            if kind == 'visual':
+                add(one, 'material', name=shape.color)
+
+
+def _geometry(parent: ET.Element, shape: Shape) -> None:
+    geometry = add(parent, 'geometry')
+    if shape.kind == 'mesh':
+        add(geometry, 'mesh', filename=shape.file, scale=numbers([shape.scale] * 3))
+    elif shape.kind == 'sphere':
+        add(geometry, 'sphere', radius=numbers(shape.radius))
+    else:
+        add(geometry, 'cylinder', radius=numbers(shape.radius), length=numbers(shape.length))
+
+
+def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str,
+           position: Array | None = None, rotation: Array | None = None) -> ET.Element:
+    joint = add(root, 'joint', name=name, type=kind)
+    if position is not None:
+        _origin(joint, position, np.eye(3) if rotation is None else rotation)
+    add(joint, 'parent', link=parent)
+    add(joint, 'child', link=child)
+    return joint
+
+
+def _origin(parent: ET.Element, position: Array, rotation: Array) -> None:
+    add(parent, 'origin', xyz=numbers(position), rpy=numbers(to_euler(rotation)))
+
+
+def _limit(joint: ET.Element, bounds: tuple[float, float], rate: float, force: float) -> None:
+    add(joint, 'limit', lower=numbers(bounds[0]), upper=numbers(bounds[1]),
+        velocity=numbers(rate), effort=numbers(force))
+
+
+def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Control) -> None:
+    system = add(root, 'ros2_control', name=name, type='system')
+    hardware = add(system, 'hardware')
+    add(hardware, 'plugin', HARDWARE.get(control.hardware, control.hardware))
+    if control.hardware == TOPIC:
+        add(hardware, 'param', 'stewart_simulator/commands', name='joint_commands_topic')
+        add(hardware, 'param', 'stewart_simulator/leg_states', name='joint_states_topic')
+    for leg in hexapod.legs:
+        joint = add(system, 'joint', name=leg.name)
+        for interface in control.interfaces:
+            add(joint, 'command_interface', name=interface)
+        for interface in ('position', 'velocity', 'effort'):
+            state = add(joint, 'state_interface', name=interface)
+            if interface == 'position':
+                add(state, 'param', numbers(leg.home_length - leg.zero_length),
+                    name='initial_value')

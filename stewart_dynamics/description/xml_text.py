@@ -1,0 +1,64 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""XML as the writers need it: numbers that read back equal, elements, indented text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics import __version__
+from stewart_dynamics.parameters import Parameters
+
+CARRIED = 'stewart_dynamics'
+"""Name of the block, or prefix of the elements, of parameters that a format has no place for."""
+NOT_CHECKED = 'none'
+"""Value there of a limit that is not checked."""
+
+
+def numbers(*values: Any) -> str:
+    """Return numbers and arrays as text that reads back equal."""
+    return ' '.join(repr(float(each) + 0.0) for value in values for each in np.ravel(value))
+
+
+def add(parent: ET.Element, tag: str, text: str | None = None, **attributes: str) -> ET.Element:
+    """Add an element; a trailing underscore of an attribute's name is dropped."""
+    child = ET.SubElement(parent, tag, {
+        name.rstrip('_'): value for name, value in attributes.items()})
+    child.text = text
+    return child
+
+
+def text_of(root: ET.Element, comment: str) -> str:
+    """Return a document with a comment before its root."""
+    ET.indent(root, '  ')
+    about = f'Written by stewart_describe {__version__}. {comment}'.replace('--', '- -')
+    return (f'<?xml version="1.0"?>\n<!-- {about} -->\n'
+            f'{ET.tostring(root, encoding="unicode")}\n')
+
+
+def carried(parameters: Parameters, names: Iterable[str]) -> Mapping[str, str]:
+    """Return parameters as text, for a block of what a format has no place for."""
+    return {name: NOT_CHECKED if parameters[name] is None else numbers(parameters[name])
+            for name in names}
+
+
+def without_limit(parameters: Parameters, names: Sequence[str]) -> list[str]:
+    """Return which of these limits are not checked."""
+    return [name for name in names if parameters[name] is None]

@@ -1,0 +1,286 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Angles of the joints: their definition, their axes, and where a limit of them is checked."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    Array, random_motion, random_parameters, rng, rotation_about, smooth_motion,
+    symmetric_parameters)
+
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.joint_axes import AXES, BASE_AXES, JointAngles, PLATFORM_AXES
+from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFORM_ANGLE_MAX
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
+from stewart_dynamics.runtime.planned_trajectory_checks import LIMIT
+from stewart_dynamics.runtime.step import Batch, Setpoint, Step
+
+SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1})
+
+
+def between(a: Array, b: Array) -> Array:
+    """Return the angles between vectors (..., 3), of any length, by atan2 of sine and cosine."""
+    sine = np.linalg.norm(np.cross(a, b), axis=-1)
+    return np.arctan2(sine, (a * b).sum(axis=-1))
+
+
+def expected(p: Parameters, motion: Motion, base_axes: Array, platform_axes: Array) -> Array:
+    """Return the angles (N, 2, 6): of base joints, of platform joints."""
+    turned = np.einsum('nij,kj->nki', motion.rotation, p['geometry.platform_joints'])
+    legs = motion.position[:, None] + turned - p['geometry.base_joints']
+    in_platform = np.einsum('nji,nkj->nki', motion.rotation, legs)
+    return np.stack([between(legs, base_axes), between(in_platform, platform_axes)], axis=1)
+
+
+def with_axes(p: Parameters, random: np.random.Generator, **changes: Any) -> Parameters:
+    return p.replaced({BASE_AXES: random.normal(size=18), PLATFORM_AXES: random.normal(size=18),
+                       **changes})
+
+
+# The angles
+
+def test_they_are_the_angles_between_legs_and_given_axes() -> None:
+    random = rng()
+    for _ in range(5):
+        p = with_axes(random_parameters(random), random)
+        motion = random_motion(p, random, 200)
+        base, platform = StewartPlatform(p).joint_angles(motion)
+        truth = expected(p, motion, p[BASE_AXES], p[PLATFORM_AXES])
+        np.testing.assert_allclose(base, truth[:, 0], rtol=0.0, atol=1e-14)
+        np.testing.assert_allclose(platform, truth[:, 1], rtol=0.0, atol=1e-14)
+        assert base.max() > 2.0  # some of them away from their axes
+
+
+def test_by_default_they_are_measured_from_the_legs_at_home() -> None:
+    random = rng()
+    for p in (SYMMETRIC, SYMMETRIC.replaced({  # a home that is turned about the normal
+            'limits.length_min': 1.28, 'limits.length_max': 1.32})):
+        platform = StewartPlatform(p)
+        home = platform.home_pose()
+        legs = home.position + p['geometry.platform_joints'] @ home.rotation.T \
+            - p['geometry.base_joints']
+        for angles in platform.joint_angles(home):
+            assert np.abs(angles).max() < 1e-15
+        motion = random_motion(p, random, 50)
+        truth = expected(p, motion, legs, legs @ home.rotation)
+        for angles, each in zip(platform.joint_angles(motion), truth.swapaxes(0, 1), strict=True):
+            np.testing.assert_allclose(angles, each, rtol=0.0, atol=1e-14)
+
+
+def test_one_pose_and_many_give_the_same_bits() -> None:
+    random = rng()
+    p = with_axes(random_parameters(random), random)
+    platform, motion = StewartPlatform(p), random_motion(p, random, 20)
+    many = np.concatenate(platform.joint_angles(motion), axis=1)
+    for n in range(20):
+        one = platform.joint_angles(Pose(motion.position[n], motion.rotation[n]))
+        assert one[0].shape == (6,)
+        assert np.array_equal(np.concatenate(one), many[n])
+
+
+def test_small_angles_keep_their_digits() -> None:
+    home = StewartPlatform(SYMMETRIC).home_pose()
+    for turn in (1e-3, 1e-6, 1e-9):
+        # About the platform joint of a leg: its direction stays, the platform turns.
+        axis = np.array([0.0, 0.0, 1.0])
+        joint = SYMMETRIC['geometry.platform_joints'][0]
+        rotation = rotation_about(axis, turn)
+        pose = Pose(home.position + joint - rotation @ joint, rotation)
+        base, platform = StewartPlatform(SYMMETRIC).joint_angles(pose)
+        leg = home.position + joint - SYMMETRIC['geometry.base_joints'][0]
+        leg /= np.linalg.norm(leg)
+        wanted = 2.0 * math.asin(math.sin(0.5 * turn) * math.hypot(leg[0], leg[1]))
+        assert platform[0] == pytest.approx(wanted, rel=1e-6)
+        assert base[0] < 1e-15
+
+
+def test_their_haversines_have_the_derivatives_in_time() -> None:
+    random = rng()
+    p = with_axes(random_parameters(random), random)
+    angles, at = JointAngles(p), smooth_motion(p, random)
+    times, step = np.linspace(0.0, 1.0, 30), 1e-5
+    values, rates = angles.haversines(at(times).rows)
+    np.testing.assert_allclose(
+        values, np.sin(0.5 * angles(at(times).rows)) ** 2, rtol=0.0, atol=1e-15)
+    before, after = (angles.haversines(at(times + d).rows)[0] for d in (-step, step))
+    np.testing.assert_allclose(rates, (after - before) / (2.0 * step), rtol=0.0, atol=1e-7)
+    assert np.abs(rates).max() > 0.1
+
+
+@pytest.mark.parametrize('scale', [1e-200, 1e200])
+def test_axes_may_have_any_length(scale: float) -> None:
+    random = rng()
+    p = with_axes(SYMMETRIC, random)
+    scaled = p.replaced({name: scale * p[name] for name in AXES})
+    np.testing.assert_allclose(
+        JointAngles(scaled).axes, JointAngles(p).axes, rtol=0.0, atol=1e-15)
+
+
+# Parameters
+
+@pytest.mark.parametrize(('changes', 'said'), [
+    ({BASE_ANGLE_MAX: 25.0}, 'limits.base_joint_angle_max: 25.0 rad: must be more than 0, at most '
+     '3.14159'),
+    ({PLATFORM_ANGLE_MAX: 0.0}, 'must be more than 0'),
+    ({BASE_AXES: [0.0, 0.0, 1.0] * 5 + [0.0] * 3}, 'geometry.base_joint_axes: [[0.0, 0.0, 1.0]'),
+    ({PLATFORM_AXES: [0.0, 0.0, 1.0]}, 'must have 18 entries, has 3'),
+])
+def test_bad_axes_and_limits_are_rejected(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        SYMMETRIC.replaced(changes)
+    assert said in str(caught.value)
+
+
+def test_a_limit_needs_axes_or_a_home_pose() -> None:
+    homeless = symmetric_parameters()
+    for limit, axes in zip(OF_JOINTS, AXES, strict=True):
+        limited = homeless.replaced({limit: 0.5})
+        with pytest.raises(ParameterError, match=f'{axes}: missing, and home pose: limits'):
+            Step(limited)
+        # The other axes are not needed.
+        Step(limited.replaced({axes: [0.0, 0.0, 1.0] * 6}))
+    Step(homeless)
+    with pytest.raises(ParameterError, match=f'{BASE_AXES}: missing'):
+        StewartPlatform(homeless).joint_angles(Pose([0.0, 0.0, 1.0], np.eye(3)))
+
+
+@pytest.mark.parametrize(('changes', 'said'), [
+    ({BASE_ANGLE_MAX: 2.5}, 'limits.base_joint_angle_max: 2.5 rad, 143 degrees: more than any '
+     'joint of a leg: in degrees?'),
+    ({PLATFORM_AXES: [0.0, 0.0, -1.0] * 6}, 'geometry.platform_joint_axes: at home leg_1 is 2.'),
+    ({BASE_AXES: [0.0, 0.0, 1.0] * 6, BASE_ANGLE_MAX: 0.3},
+     'limits.base_joint_angle_max: 0.3 rad, but at home leg_'),
+])
+def test_likely_mistakes_are_found(changes: dict[str, Any], said: str) -> None:
+    assert likely_mistakes(SYMMETRIC) == ()
+    mistakes = likely_mistakes(SYMMETRIC.replaced(changes))
+    assert [said in each for each in mistakes] == [True], mistakes
+
+
+# Where they are checked
+
+def moved() -> tuple[Motion, Array]:
+    """Return a motion whose angles grow from zero, and its angles."""
+    position = StewartPlatform(SYMMETRIC).home_pose().position
+    turns = np.linspace(0.0, 0.5, 101)
+    motion = Motion(
+        np.broadcast_to(position, (101, 3)),
+        [rotation_about([1.0, 0.0, 0.0], turn) for turn in turns])
+    return motion, np.concatenate(StewartPlatform(SYMMETRIC).joint_angles(motion), axis=1)
+
+
+def test_the_step_reports_angles_above_their_limit_for_one_and_for_many() -> None:
+    motion, angles = moved()
+    base, platform = 0.9 * angles[:, :6].max(), 0.8 * angles[:, 6:].max()
+    step = Step(SYMMETRIC.replaced({BASE_ANGLE_MAX: base, PLATFORM_ANGLE_MAX: platform}))
+    many = step.many(Batch(np.arange(101), motion.rows, np.zeros((1, 6)),
+                           np.zeros(101, dtype=bool), np.arange(101)), None)
+    assert np.array_equal(many.joint_angles, angles)
+    found = 0
+    for n, row in enumerate(motion.rows.tolist()):
+        output = step(Setpoint(n, tuple(row)), None)
+        assert output is not None
+        assert output.joint_angles == tuple(angles[n].tolist())
+        assert [(each.limit, each.leg, each.value, each.bound) for each in output.exceedances] == [
+            *((BASE_ANGLE_MAX, leg, angles[n, leg], base) for leg in range(6)
+              if angles[n, leg] > base),
+            *((PLATFORM_ANGLE_MAX, leg, angles[n, 6 + leg], platform) for leg in range(6)
+              if angles[n, 6 + leg] > platform)]
+        assert many.exceeding[n] == bool(output.exceedances)
+        found += bool(output.exceedances)
+    assert 5 < found < 60
+
+
+def test_the_step_gives_the_same_forces_with_limits_of_angles_and_no_angles_without() -> None:
+    motion, _ = moved()
+    setpoints = Batch(np.arange(101), motion.rows, np.zeros((1, 6)), np.zeros(101, dtype=bool),
+                      np.arange(101))
+    without = Step(SYMMETRIC).many(setpoints, None)
+    limited = Step(SYMMETRIC.replaced({BASE_ANGLE_MAX: 0.1})).many(setpoints, None)
+    assert np.array_equal(without.results, limited.results)
+    assert np.array_equal(without.forces, limited.forces)
+    assert without.joint_angles.shape == (101, 0)
+    assert not without.exceeding.any()
+    assert limited.exceeding.any()
+    output = Step(SYMMETRIC)(Setpoint(0, tuple(motion.rows[100].tolist())), None)
+    assert output is not None
+    assert (output.joint_angles, output.exceedances) == ((), ())
+
+
+def swing(points: int, turn: float = 0.4) -> tuple[Array, Motion, Any]:
+    """Return times and points of a swing about x and back, and the swing as a function."""
+    position = StewartPlatform(SYMMETRIC).home_pose().position
+
+    def at(times: Any) -> Motion:
+        times = np.asarray(times, dtype=float)
+        phase = np.pi * times
+        angle, rate = 0.5 * turn * (1.0 - np.cos(2.0 * phase)), np.pi * turn * np.sin(2.0 * phase)
+        acceleration = 2.0 * np.pi ** 2 * turn * np.cos(2.0 * phase)
+        x = np.array([1.0, 0.0, 0.0])
+        return Motion(np.broadcast_to(position, (*times.shape, 3)),
+                      [rotation_about(x, each) for each in angle],
+                      np.zeros(3), rate[:, None] * x, np.zeros(3), acceleration[:, None] * x)
+
+    times = np.linspace(0.0, 1.0, points)
+    return times, at(times), at
+
+
+@pytest.mark.parametrize('limit', OF_JOINTS)
+def test_a_planned_trajectory_is_rejected_for_an_angle_between_its_points(limit: str) -> None:
+    times, motion, at = swing(4)  # the peak at 0.5 s is between the points
+    first = 0 if limit == BASE_ANGLE_MAX else 6
+    angles = JointAngles(SYMMETRIC)
+    points = angles(motion.rows)[:, first:first + 6].max()
+    dense = np.linspace(0.0, 1.0, 20001)
+    peak = angles(at(dense).rows)[:, first:first + 6]
+    assert points < 0.9 * peak.max()
+    # The motion between the points is not quite the swing; it is nearly as far at the peak.
+    bound = 0.9 * peak.max()
+    result = check_planned_trajectory(
+        StewartPlatform(SYMMETRIC.replaced({limit: bound})), times, motion)
+    assert (result.accepted, result.reason, result.limit) == (False, LIMIT, limit)
+    assert 'joint angle' in result.message
+    assert result.time == pytest.approx(dense[(peak > bound).any(axis=1).argmax()], abs=0.02)
+    accepted = check_planned_trajectory(
+        StewartPlatform(SYMMETRIC.replaced({limit: 1.2 * peak.max()})), times, motion)
+    assert accepted.accepted
+
+
+@pytest.mark.parametrize('limit', OF_JOINTS)
+def test_the_peak_of_an_angle_between_close_points_is_found(limit: str) -> None:
+    # 0.1 ms from the peak at 0.5 s, so near that nothing is sampled between them.
+    _, _, at = swing(2)
+    times = np.array([0.0, 1e-3, 2e-3])
+    motion = at(times - 0.0006 + 0.5)
+    first = 0 if limit == BASE_ANGLE_MAX else 6
+    angles = JointAngles(SYMMETRIC)
+    points = angles(motion.rows)[:, first:first + 6].max()
+    peak = angles(at(np.array([0.5])).rows)[0, first:first + 6].max()
+    assert points < peak * (1.0 - 1e-7)
+    for bound, accepted in ((0.5 * (points + peak), False), (peak * (1.0 + 1e-8), True)):
+        result = check_planned_trajectory(
+            StewartPlatform(SYMMETRIC.replaced({limit: bound})), times, motion)
+        assert result.accepted is accepted, result.message
+        if not accepted:
+            assert result.time == pytest.approx(0.0006, abs=1e-5)
+            assert result.leg == int(angles(at(np.array([0.5])).rows)[
+                0, first:first + 6].argmax())

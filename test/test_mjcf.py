@@ -1,0 +1,195 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The MJCF in MuJoCo: it is accepted, its loops are closed, and its leg forces are the same."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    Array, each_relative, random_motion, random_parameters, relative, rng, smooth_motion)
+
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.mjcf import mjcf
+from stewart_dynamics.mechanics.leg_joints import TreeJoints
+
+mujoco = pytest.importorskip('mujoco')
+
+PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
+LEGS = slice(2, 18, 3)  # the slide joints among the coordinates of the legs
+STATIC, MOVING = 1e-3, 5e-3  # parts of the largest force, as the documents promise
+
+
+class Simulation:
+    """A hexapod in MuJoCo, by its MJCF alone."""
+
+    def __init__(self, p: Parameters) -> None:
+        self.p = p
+        self.model = mujoco.MjModel.from_xml_string(mjcf(Hexapod(p), 'hexapod'))
+        self.data = mujoco.MjData(self.model)
+        self._joints = TreeJoints(p)
+
+    def place(self, motion: Motion) -> Array:
+        """Set pose and twist; return the rates of all coordinates (24, 6) of a platform twist."""
+        data = self.data
+        data.qpos[:18] = self._joints.positions(motion.position, motion.rotation)[6:]
+        data.qpos[18:21] = motion.position
+        data.qpos[21:25] = np.roll(motion.quaternion, 1)
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(self.model, data)
+        loops = self._loops()
+        freedoms = np.vstack([-np.linalg.solve(loops[:, :18], loops[:, 18:]), np.eye(6)])
+        # A free joint's angular velocity is in axes of the body.
+        freedoms[:, 3:] = freedoms[:, 3:] @ motion.rotation.T
+        data.qvel[:] = freedoms @ np.concatenate([motion.linear_velocity,
+                                                  motion.angular_velocity])
+        return freedoms
+
+    def _loops(self) -> Array:
+        """Return the Jacobian (18, 24) of the gaps at the platform joints."""
+        rows = self.data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        return self.data.efc_J.reshape(-1, self.model.nv)[rows].copy()
+
+    def projected_forces(self, motion: Motion) -> Array:
+        """Return leg forces: MuJoCo's inverse dynamics of the tree, its loops by virtual work."""
+        model, data, step = self.model, self.data, 1e-6
+        freedoms = self.place(motion)
+        q, v, loops = data.qpos.copy(), data.qvel.copy(), self._loops()
+        nearby = []
+        for time in (step, -step):
+            data.qpos[:] = q
+            mujoco.mj_integratePos(model, data.qpos, v, time)
+            mujoco.mj_forward(model, data)
+            nearby.append(self._loops())
+        own = np.concatenate([motion.linear_acceleration,
+                              motion.rotation.T @ motion.angular_acceleration])
+        drift = (nearby[0] - nearby[1]) @ v / (2.0 * step)
+        of_legs = np.linalg.solve(loops[:, :18], -drift - loops[:, 18:] @ own)
+        data.qpos[:], data.qvel[:] = q, v
+        data.qacc[:] = np.concatenate([of_legs, own])
+        flags = model.opt.disableflags
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        mujoco.mj_inverse(model, data)
+        model.opt.disableflags = flags
+        pushes = np.linalg.solve(freedoms[LEGS].T, freedoms.T @ data.qfrc_inverse)
+        sliding: Array = pushes + self.p['actuator.coulomb_friction'] * np.sign(v[LEGS])
+        return sliding
+
+    def follow(self, motions: Motion) -> tuple[Motion, Array, Array]:
+        """
+        Simulate under the forces of the motions and a controller of the legs, step by step.
+
+        Return what the platform did, with its accelerations, the forces of its motors, and
+        the rates of the legs.
+        """
+        p, model, data = self.p, self.model, self.data
+        planned = StewartPlatform(p).inverse_dynamics(motions)
+        positions = planned.lengths - p['geometry.zero_length']
+        stiffness = (2.0 * np.pi * 8.0) ** 2 * (
+            p['platform.mass'] / 6.0 + p['legs.piston.mass'] + p['actuator.reflected_mass'])
+        damping = stiffness / (np.pi * 8.0)
+        self.place(motions[0])
+        rows: list[Any] = []
+        forces, rates = [], []
+        for n in range(len(motions)):
+            data.ctrl[:] = (planned.forces[n] + stiffness * (positions[n] - data.qpos[LEGS])
+                            + damping * (planned.rates[n] - data.qvel[LEGS]))
+            mujoco.mj_step1(model, data)
+            state = data.qpos[18:25].copy(), data.qvel[18:24].copy()
+            rates.append(data.qvel[LEGS].copy())
+            mujoco.mj_step2(model, data)
+            rows.append((*state, data.qacc[18:24].copy()))
+            forces.append(data.actuator_force.copy())
+        poses, twists, accelerations = (np.array(each) for each in zip(*rows, strict=True))
+        pose = Motion.from_quaternion(poses[:, :3], np.roll(poses[:, 3:], -1, axis=1))
+        r = pose.rotation
+        done = Motion(pose.position, r, twists[:, :3],
+                      np.einsum('nij,nj->ni', r, twists[:, 3:]), accelerations[:, :3],
+                      np.einsum('nij,nj->ni', r, accelerations[:, 3:]))
+        return done, np.array(forces), np.array(rates)
+
+
+def test_the_model_begins_at_the_home_pose_with_closed_loops_and_the_names_of_the_parameters():
+    p = Parameters.from_yaml(PLATFORM)
+    model = mujoco.MjModel.from_xml_string(mjcf(Hexapod(p), 'hexapod'))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    home = StewartPlatform(p).home_pose()
+    assert data.body('platform').xpos == pytest.approx(home.position, abs=1e-15)
+    assert data.body('base').xpos == pytest.approx([0.0, 0.0, 0.0])
+    for leg in p['joints']:
+        assert data.site(f'{leg}_tip').xpos == pytest.approx(
+            data.site(f'{leg}_platform_joint').xpos, abs=1e-14)
+    lengths = StewartPlatform(p).inverse_kinematics(home)
+    assert tuple(model.actuator(n).name for n in range(6)) == p['joints']
+    assert data.sensordata[:6] == pytest.approx(lengths, abs=1e-14)
+    assert tuple(model.sensor(n).name for n in (0, 6, 12)) == (
+        'leg_1_length', 'leg_1_rate', 'leg_1_force')
+    for n, leg in enumerate(p['joints']):
+        assert data.joint(leg).qpos[0] == pytest.approx(lengths[n] - 0.95, abs=1e-14)
+        assert model.joint(leg).range == pytest.approx([0.0, 0.7])
+        assert model.joint(leg).armature[0] == 30.0
+    assert model.actuator_ctrlrange == pytest.approx(np.tile([-6000.0, 6000.0], (6, 1)))
+    assert model.opt.gravity == pytest.approx(p['gravity'])
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_forces_by_mujocos_inverse_dynamics_are_the_same(seed):
+    p = random_parameters(rng(seed))
+    simulation, motions = Simulation(p), random_motion(p, rng(seed), 20)
+    forces = StewartPlatform(p).inverse_dynamics(motions).forces
+    assert each_relative(
+        [simulation.projected_forces(motion) for motion in motions], forces) < 1e-7
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_legs_that_hold_poses_in_mujoco_have_the_forces_of_statics(seed):
+    p = random_parameters(rng(seed), actuators=False)
+    poses, simulation = random_motion(p, rng(seed), 10), Simulation(p)
+    for pose in poses:
+        still = Motion(np.repeat(pose.position[None], 400, axis=0), pose.rotation)
+        done, forces, _ = simulation.follow(still)
+        statics = StewartPlatform(p).inverse_dynamics(
+            Motion(done.position[-1], done.rotation[-1])).forces
+        assert relative(forces[-1], statics) < STATIC
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('actuators', [True, False], ids=['actuators', 'no_actuators'])
+def test_motions_in_mujoco_need_the_forces_of_inverse_dynamics(seed, actuators):
+    p = random_parameters(rng(seed), actuators)
+    simulation = Simulation(p)
+    times = np.arange(2000) * simulation.model.opt.timestep
+    done, forces, rates = simulation.follow(smooth_motion(p, rng(seed))(times))
+    truth = StewartPlatform(p).inverse_dynamics(done).forces
+    # Coulomb friction changes its sign within 1 mm/s here, and otherwise in MuJoCo.
+    sliding = np.abs(rates).min(axis=1) > (0.01 if actuators else 0.0)
+    assert np.mean(sliding) > 0.7
+    assert relative(forces[sliding], truth[sliding]) < MOVING
+
+
+def test_legs_without_mass_are_given_one_that_changes_forces_by_less_than_their_tolerance():
+    given = random_parameters(rng(0), actuators=False).given
+    p = Parameters({name: value for name, value in given.items() if not name.startswith('legs.')})
+    simulation = Simulation(p)
+    times = np.arange(1000) * simulation.model.opt.timestep
+    done, forces, _ = simulation.follow(smooth_motion(p, rng(0))(times))
+    truth = StewartPlatform(p).inverse_dynamics(done).forces
+    assert relative(forces, truth) < 1e-3
+    assert simulation.model.body('leg_1_piston').mass[0] == pytest.approx(
+        1e-4 * p['platform.mass'])

@@ -1,0 +1,190 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The URDF by Pinocchio's reader: closed loops, and the same leg forces."""
+
+from pathlib import Path
+import shutil
+import subprocess
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from referees import (
+    Array, each_relative, friction, random_motion, random_parameters, rng, rotation_about,
+    smooth_motion)
+
+from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.urdf import Ros2Control, urdf
+from stewart_dynamics.mechanics.leg_joints import TreeJoints
+
+pin = pytest.importorskip('pinocchio')
+
+PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
+CLOSED = 1e-9  # [m]
+FORCES = 1e-9
+
+
+class Tree:
+    """The model that Pinocchio reads, and its frames at the platform joints."""
+
+    def __init__(self, p: Parameters) -> None:
+        self.model = pin.buildModelFromXML(urdf(Hexapod(p), 'hexapod'))
+        self.data = self.model.createData()
+        self.joints = TreeJoints(p)
+        self.places = [self.model.joints[self.model.getJointId(name)].idx_q
+                       for name in self.joints.names]
+        self.pistons = [self.model.getFrameId(f'{leg}_piston') for leg in p['joints']]
+        self.balls = [self.model.getFrameId(f'{leg}_platform_joint') for leg in p['joints']]
+        self.platform = self.model.getFrameId(p['platform_frame'], pin.BODY)
+
+    def configuration(self, row: Array) -> Array:
+        """Return Pinocchio's order of the positions of all joints."""
+        q = np.zeros(self.model.nq)
+        q[self.places] = row
+        return q
+
+    def gap(self, pose: Any, row: Array) -> float:
+        """Return the largest distance of a leg's end from its platform joint [m]."""
+        pin.framesForwardKinematics(self.model, self.data, self.configuration(row))
+        frames = self.data.oMf
+        platform = frames[self.platform]
+        assert np.abs(platform.translation - pose.position).max() < CLOSED
+        assert np.abs(platform.rotation - pose.rotation).max() < CLOSED
+        return float(max(
+            np.linalg.norm(frames[piston].translation - frames[ball].translation)
+            for piston, ball in zip(self.pistons, self.balls, strict=True)))
+
+    def forces(self, p: Parameters, motion: Motion) -> Array:
+        """Return the leg forces of one sample: the tree's, its loops closed by constraints."""
+        model, data = self.model, self.data
+        q = self.configuration(self.joints.positions(motion.position, motion.rotation))
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        full = pin.LOCAL_WORLD_ALIGNED
+        loops = [pin.getFrameJacobian(model, data, piston, full)[:3]
+                 - pin.getFrameJacobian(model, data, ball, full)[:3]
+                 for piston, ball in zip(self.pistons, self.balls, strict=True)]
+        # Closed loops and the platform's twist determine the rates of all joints.
+        all_rows = np.vstack([*loops, pin.getFrameJacobian(model, data, self.platform, full)])
+        twist = np.concatenate([motion.linear_velocity, motion.angular_velocity])
+        freedoms = np.linalg.solve(all_rows, np.vstack([np.zeros((18, 6)), np.eye(6)]))
+        v = freedoms @ twist
+        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+        drift = [pin.getFrameClassicalAcceleration(model, data, piston, full).linear
+                 - pin.getFrameClassicalAcceleration(model, data, ball, full).linear
+                 for piston, ball in zip(self.pistons, self.balls, strict=True)]
+        own = pin.getFrameClassicalAcceleration(model, data, self.platform, full)
+        a = np.linalg.solve(all_rows, np.concatenate([
+            -np.concatenate(drift), motion.linear_acceleration - own.linear,
+            motion.angular_acceleration - own.angular]))
+        model.gravity.linear = np.array(p['gravity'])
+        tau = pin.rnea(model, data, q, v, a)
+        legs = [model.joints[model.getJointId(name)].idx_v for name in p['joints']]
+        pushes = np.linalg.solve(freedoms[legs].T, freedoms.T @ tau)
+        # What URDF has no place for, or Pinocchio's recursion leaves out.
+        forces: Array = pushes + p['actuator.reflected_mass'] * a[legs] + friction(p, v[legs])
+        return forces
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_leg_forces_by_pinocchio_from_the_urdf_are_the_same(seed):
+    p = random_parameters(rng(seed))
+    tree, motions = Tree(p), random_motion(p, rng(seed), 20)
+    forces = StewartPlatform(p).inverse_dynamics(motions).forces
+    assert each_relative([tree.forces(p, motion) for motion in motions], forces) < FORCES
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_the_joints_of_a_motion_close_all_loops_of_the_urdf(seed):
+    p = random_parameters(rng(seed))
+    tree, motions = Tree(p), smooth_motion(p, rng(seed))(np.linspace(0.0, 5.0, 100))
+    rows = tree.joints.positions(motions.position, motions.rotation)
+    assert max(tree.gap(motion, row) for motion, row in zip(motions, rows, strict=True)) < CLOSED
+
+
+@pytest.mark.parametrize('off', [0.0, 1e-14, 1e-9, 1e-5])
+def test_the_loops_are_closed_in_the_singular_direction_of_a_universal_joint(off):
+    p = Parameters.from_yaml(PLATFORM)
+    tree = Tree(p)
+    for leg in range(6):
+        x, y, z = tree.joints.mounts[leg].T
+        tip = p['geometry.base_joints'][leg] + 1.2 * x + off * (y - z)
+        turn = rotation_about([0.0, 0.0, 1.0], 0.3)
+        pose = Pose(tip - turn @ p['geometry.platform_joints'][leg], turn)
+        assert tree.gap(pose, tree.joints.of_sample(pose.rows.tolist())) < CLOSED
+
+
+def test_the_urdf_has_the_joints_of_the_closed_form_and_the_limits_of_the_parameters():
+    p = Parameters.from_yaml(PLATFORM)
+    root = ET.fromstring(urdf(Hexapod(p), 'hexapod'))
+    moving = [joint for joint in root.iter('joint') if joint.get('type') != 'fixed']
+    assert tuple(joint.get('name') for joint in moving) == TreeJoints(p).names
+    leg = next(joint for joint in moving if joint.get('name') == 'leg_1')
+    limit = {name: float(value) for name, value in leg.find('limit').attrib.items()}
+    assert limit == pytest.approx({'lower': 0.0, 'upper': 0.7, 'velocity': 0.5, 'effort': 6000.0})
+
+
+@pytest.mark.skipif(shutil.which('check_urdf') is None, reason='needs check_urdf of urdfdom')
+def test_urdfdom_reads_the_urdf(tmp_path):
+    file = tmp_path / 'hexapod.urdf'
+    file.write_text(urdf(Hexapod(Parameters.from_yaml(PLATFORM)), 'hexapod',
+                         Ros2Control(['effort'], 'mock')), encoding='utf-8')
+    done = subprocess.run(['check_urdf', str(file)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert 'root Link: base has 7 child(ren)' in done.stdout
+    assert 'error' not in (done.stdout + done.stderr).lower()
+
+
+def test_legs_without_mass_have_no_inertial_element():
+    p = Parameters.from_yaml(PLATFORM).replaced(
+        {'legs.piston.mass': 0.0, 'legs.piston.inertia': 0.0})
+    links = {link.get('name'): link for link in ET.fromstring(urdf(Hexapod(p), 'x')).iter('link')}
+    assert links['leg_1_piston'].find('inertial') is None
+    assert links['leg_1_cylinder'].find('inertial') is not None
+
+
+def test_meshes_take_the_place_of_the_simple_shapes():
+    p = Parameters.from_yaml(PLATFORM).replaced({
+        'meshes.platform': 'package://my_hexapod/top.stl', 'meshes.scale': 0.001,
+        'meshes.platform_offset': [0.0, 0.0, -0.02, 0.0, 0.0, 1.5]})
+    links = {link.get('name'): link for link in ET.fromstring(urdf(Hexapod(p), 'x')).iter('link')}
+    visual = links['platform'].find('visual')
+    assert visual.find('origin').attrib == {'xyz': '0.0 0.0 -0.02', 'rpy': '0.0 0.0 1.5'}
+    assert visual.find('geometry/mesh').attrib == {
+        'filename': 'package://my_hexapod/top.stl', 'scale': '0.001 0.001 0.001'}
+    assert links['base'].find('visual/geometry/cylinder') is not None
+
+
+@pytest.mark.parametrize('interfaces', [['effort'], ['velocity'], ['position', 'effort']])
+def test_the_block_of_ros2_control_has_the_six_legs(interfaces):
+    p = Parameters.from_yaml(PLATFORM)
+    block = ET.fromstring(urdf(Hexapod(p), 'hexapod', Ros2Control(interfaces, 'mock'))).find(
+        'ros2_control')
+    assert block.find('hardware/plugin').text == 'mock_components/GenericSystem'
+    assert [joint.get('name') for joint in block.iter('joint')] == list(p['joints'])
+    for joint in block.iter('joint'):
+        assert [each.get('name') for each in joint.iter('command_interface')] == interfaces
+    home = StewartPlatform(p).home_pose()
+    lengths = StewartPlatform(p).inverse_kinematics(home) - p['geometry.zero_length']
+    assert [float(each.text) for each in block.iter('param')] == pytest.approx(lengths, abs=1e-15)
+
+
+def test_two_bodies_of_the_same_name_are_rejected():
+    p = Parameters.from_yaml(PLATFORM).replaced({'base_frame': 'leg_1_piston'})
+    with pytest.raises(ParameterError, match="two bodies would have the name 'leg_1_piston'"):
+        Hexapod(p)
