@@ -36,8 +36,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.design_limits import DesignLimits
+from stewart_dynamics.identification.design_options import DesignOptions
 from stewart_dynamics.identification.intervals import TWO_SIDED
-from stewart_dynamics.identification.unknowns import DEFAULT, Unknowns
+from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
@@ -51,26 +52,8 @@ _NOT_TOLD = 100.0
 # Scalings of a motion to its limits, before it is judged and at the end.
 _SCALINGS, _LAST_SCALINGS = 2, 30
 _CLOSE = 1e-3
-
-
-class DesignOptions(NamedTuple):
-    """Options of a design."""
-
-    kinds: tuple[str, ...] = DEFAULT
-    """What is to be identified, of ``unknowns.KINDS``."""
-    duration: float = 60.0
-    """[s]"""
-    frequency: float = 2.0
-    """Of the highest harmonic [Hz]."""
-    harmonics: int = 10
-    amplitude: float | None = None
-    """Displacement of the platform's origin at most [m]; turns: by the characteristic length."""
-    noise: float = 5.0
-    """Standard deviation of the efforts [N], for the predicted intervals."""
-    rate: float = 500.0
-    """Of setpoints and of measured efforts [Hz]."""
-    generations: int = 300
-    seed: int = 0
+# Digits of coefficients in a file [m, rad].
+_DIGITS = 7
 
 
 class Design(NamedTuple):
@@ -138,7 +121,7 @@ def design(parameters: Parameters, options: DesignOptions,
 def fine_times(options: DesignOptions) -> Array:
     """Return the times of the final check [s]: all of the motion."""
     many = math.ceil(options.duration * options.frequency * _FINE_SAMPLES)
-    return np.linspace(0.0, options.duration, many + 1)
+    return np.arange(many + 1, dtype=np.float64) * (options.duration / many)
 
 
 def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion: Motion,
@@ -156,8 +139,8 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
     values, vectors = np.linalg.eigh(scaled)
     least = max(_NOT_TOLD ** -2, 1e-13 * float(values[-1]))
     variances = (vectors ** 2) @ (1.0 / np.maximum(values, least))
-    half_widths: Array = TWO_SIDED * unknowns.scales * np.sqrt(variances)
-    return half_widths
+    errors: Array = np.sqrt(variances)
+    return TWO_SIDED * unknowns.scales * errors
 
 
 def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
@@ -174,7 +157,7 @@ class _Search:
         self._options = options
         self.unknowns = Unknowns(parameters, options.kinds)
         self.platform = StewartPlatform(parameters)
-        self.limits = DesignLimits(self.platform, options.amplitude)
+        self.limits = DesignLimits(self.platform, options.amplitude, options.center)
         many = options.harmonics
         self.size = 2 * many * 6
         self._base = options.frequency / many
@@ -241,8 +224,8 @@ class _Search:
             'motion.hold_at_end': False, 'motion.initial': self.limits.center,
             'motion.fourier.frequency': self._base,
             'motion.fourier.fade': min(1.0, options.duration / 4.0),
-            'motion.fourier.cosine': coefficients[:many].ravel(),
-            'motion.fourier.sine': coefficients[many:].ravel()}
+            'motion.fourier.cosine': coefficients[:many].round(_DIGITS).ravel(),
+            'motion.fourier.sine': coefficients[many:].round(_DIGITS).ravel()}
         return ReferenceMotionParameters(given)
 
 
@@ -267,7 +250,7 @@ def _evolution(costs: Callable[[Array], Array], size: int, options: DesignOption
 
     first = random.normal(size=(8 * many, size))
     of_first = costs(first)
-    mean = first[np.argmin(of_first)]
+    mean: Array = first[np.argmin(of_first)]
     best, lowest = mean, float(np.min(of_first))
     step, spread = 0.3, np.ones(size)
     step_path, path = np.zeros(size), np.zeros(size)

@@ -16,53 +16,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.limits import FORCE_MAX, LENGTH_MAX, LENGTH_MIN, VELOCITY_MAX
-from stewart_dynamics.mechanics.rows import CONDITION, FORCES, LENGTHS, MOTION, POSITION, RATES
+from stewart_dynamics.mechanics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS, OF_RESULTS, VELOCITY_MAX)
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, FORCES, LENGTHS, MOTION, POSE, POSITION, RATES, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Parts that stay free: of the stroke at each end, of the rates, of the forces. The masses are not
-# known yet, and a controller overshoots.
-_STROKE, _RATE, _FORCE = 0.02, 0.1, 0.2
+# Parts that stay free: of the stroke at each end, of rates, forces and joint angles. The masses
+# are not known yet, and a controller overshoots.
+_STROKE, _RATE, _FORCE, _ANGLE = 0.02, 0.1, 0.2, 0.1
 # The condition number at most, by singularity.warn_condition.
 _CONDITION = 0.5
-
-_NAMES = (LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX)
 
 
 class DesignLimits:
     """
-    The limits of a hexapod with their margins, and home, which is the center of the motion.
+    The limits of a hexapod with their margins, and the center of the motion.
 
     Parameters
     ----------
     platform : StewartPlatform
         The hexapod.
     amplitude : float, optional
-        Displacement of the origin from home at most [m], of turns by the characteristic length;
-        with it limits may be missing.
+        Displacement of the origin at most [m], of turns by the characteristic length; with it
+        limits may be missing.
+    center : six numbers, optional
+        X Y Z alpha beta gamma of the center [m, rad]; by default home.
 
     Raises
     ------
     ParameterError
-        A limit is missing, or home is not within the limits.
+        A limit is missing, or the center is not within the limits.
 
     """
 
-    def __init__(self, platform: StewartPlatform, amplitude: float | None) -> None:
+    def __init__(self, platform: StewartPlatform, amplitude: float | None = None,
+                 center: Sequence[float] | None = None) -> None:
         p = platform.parameters
-        missing = [name for name in _NAMES if p[name] is None]
+        missing = [name for name in OF_RESULTS if p[name] is None]
         if missing and amplitude is None:
             raise ParameterError(
                 f'{", ".join(missing)}: missing: a motion is designed within the limits of the '
                 'parameter file, or with --amplitude')
         self._platform, self._amplitude = platform, amplitude
-        home = platform.home_pose()
-        self._home = home
-        self.center: Array = np.concatenate([home.position, np.zeros(3)])
+        if center is None:
+            center = [*platform.home_pose().position.round(6).tolist(), 0.0, 0.0, 0.0]
+        self.center: Array = np.array(center, dtype=float)
         """X Y Z alpha beta gamma."""
         self._size = p['singularity.characteristic_length']
         low, high = p[LENGTH_MIN], p[LENGTH_MAX]
@@ -75,17 +83,24 @@ class DesignLimits:
             (1.0 - _FORCE) * p[FORCE_MAX])
         self._condition = _CONDITION * p['singularity.warn_condition']
         row = np.zeros((1, MOTION))
-        row[0, :3], row[0, 3:12] = home.position, home.rotation.ravel()
-        at_home = platform.solve(row)[0]
-        self._lengths, self._weights = at_home[LENGTHS], np.abs(at_home[FORCES])
-        self._condition_home = float(at_home[CONDITION])
+        self._rotation = from_euler(self.center[3:]).ravel()
+        row[0, POSE] = *self.center[:3], *self._rotation
+        there = platform.solve(row)[0]
+        self._lengths, self._weights = there[LENGTHS], np.abs(there[FORCES])
+        self._condition_there = float(there[CONDITION])
+        bounds = {name: (1.0 - _ANGLE) * p[name] for name in OF_JOINTS if p[name] is not None}
+        self._angles = angles_to_check(p, tuple(bounds))
+        angles = self._angles(row)[0] if self._angles else np.zeros(0)
+        self._joints = {name: (angles[ANGLES[name]], bound) for name, bound in bounds.items()}
         for name, wrong in (
-                (LENGTH_MIN, self._lengths <= self._low), (LENGTH_MAX, self._lengths >= self._high),
+                (LENGTH_MIN, self._lengths <= self._low),
+                (LENGTH_MAX, self._lengths >= self._high),
                 (FORCE_MAX, self._weights >= self._force),
-                ('singularity.warn_condition', self._condition_home >= self._condition)):
+                ('singularity.warn_condition', self._condition_there >= self._condition),
+                *((name, at >= bound) for name, (at, bound) in self._joints.items())):
             if np.any(wrong):
-                raise ParameterError(f'{name}: the hexapod is beyond it, or within its margin, '
-                                     'at home already: no motion about home')
+                raise ParameterError(f'{name}: at the center of the motion the hexapod exceeds '
+                                     'it, or is within its margin')
 
     def excess(self, rows: Array) -> Array:
         """
@@ -97,10 +112,9 @@ class DesignLimits:
         worst: Array = np.where(np.isfinite(parts), parts, 10.0).max(axis=0)
         return np.minimum(worst, 10.0)
 
-    def use(self, motion: object) -> dict[str, float]:
+    def use(self, motion: Motion) -> dict[str, float]:
         """Return the part of each limit, with its margin, that a motion (N,) uses."""
-        rows = getattr(motion, 'rows')
-        return {name: float(part[0]) for name, part in self._parts(rows[None]).items()
+        return {name: float(part[0]) for name, part in self._parts(motion.rows[None]).items()
                 if part[0] > 0.0}
 
     def _parts(self, rows: Array) -> dict[str, Array]:
@@ -113,11 +127,15 @@ class DesignLimits:
             LENGTH_MAX: (lengths - self._lengths) / (self._high - self._lengths),
             VELOCITY_MAX: rates / self._rate,
             FORCE_MAX: (forces - self._weights) / (self._force - self._weights),
-            'singularity.warn_condition': (results[..., CONDITION, None] - self._condition_home)
-            / (self._condition - self._condition_home)}
+            'singularity.warn_condition': (results[..., CONDITION, None] - self._condition_there)
+            / (self._condition - self._condition_there)}
+        if self._angles:
+            angles = self._angles(rows.reshape(-1, MOTION)).reshape(many, samples, -1)
+            for name, (at, bound) in self._joints.items():
+                parts[name] = (angles[..., ANGLES[name]] - at) / (bound - at)
         if self._amplitude is not None:
-            moved = np.linalg.norm(rows[..., POSITION] - self._home.position, axis=-1)
+            moved = np.linalg.norm(rows[..., POSITION] - self.center[:3], axis=-1)
             turned = self._size * np.linalg.norm(
-                rows[..., 3:12] - self._home.rotation.ravel(), axis=-1) / np.sqrt(2.0)
+                rows[..., ROTATION] - self._rotation, axis=-1) / np.sqrt(2.0)
             parts['--amplitude'] = np.maximum(moved, turned)[..., None] / self._amplitude
         return {name: part.max(axis=(1, 2)) for name, part in parts.items()}
