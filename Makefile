@@ -5,8 +5,8 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop demo-ship \
-  docs docs-site environment lint test
+.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop \
+  demo-mujoco demo-ship docs docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -80,6 +80,9 @@ demo: $(INSTALLED)
 demo-loop: $(INSTALLED)
 	@$(VENV)/bin/python demo/loop.py
 
+demo-mujoco: $(INSTALLED)
+	@$(VENV)/bin/python demo/mujoco_loop.py
+
 demo-ship: $(INSTALLED)
 	@$(VENV)/bin/python demo/ship.py
 
@@ -106,6 +109,7 @@ bags: $(INSTALLED)
 docs: $(INSTALLED)
 	$(VENV)/bin/python docs/figures/misprints.py
 	$(VENV)/bin/python docs/figures/draw.py
+	$(VENV)/bin/python docs/figures/hexapod.py
 	$(VENV)/bin/python docs/figures/tables.py
 
 # The pages as a site: docs/_build/html/index.html.
