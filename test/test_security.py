@@ -252,7 +252,8 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
     (tmp_path / 'profile.xml').write_text(LISTENS)
     (tmp_path / 'openssl.cnf').write_text('[tls]\nVerifyMode = Require\n')
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', *KEYSTORE, *TLS,
-                 'ROS_SECURITY_ENCLAVE_OVERRIDE'):
+                 'ROS_SECURITY_ENCLAVE_OVERRIDE', 'FASTDDS_DEFAULT_PROFILES_FILE',
+                 'FASTRTPS_DEFAULT_PROFILES_FILE'):
         monkeypatch.delenv(name, raising=False)
 
     def change(**variables: str) -> None:
@@ -315,6 +316,16 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
     monkeypatch.delenv('STEWART_KEYS')
     with pytest.raises(StewartError, match='the variable STEWART_KEYS is not set'):
         check_environment([])
+
+
+@pytest.mark.skipif(PROFILES == 'FASTDDS_DEFAULT_PROFILES_FILE', reason='Kilted reads it')
+def test_the_name_that_the_variable_has_in_kilted_is_rejected_in_jazzy(
+        environment: Callable[..., None]) -> None:
+    environment(FASTDDS_DEFAULT_PROFILES_FILE=str(ONE_HOST))
+    with pytest.raises(StewartError, match=f'this Fast DDS reads {PROFILES} in its place'):
+        check_environment([])
+    environment(**{PROFILES: str(ONE_HOST)})
+    check_environment([])
 
 
 # Participants and intruders
