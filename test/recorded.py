@@ -64,6 +64,9 @@ class Noise(NamedTuple):
     delay: float = 3e-3
 
 
+NOISE = Noise()
+
+
 def fourier(seed: int, base: float = 0.1, harmonics: int = 12) -> MotionAt:
     """Return a periodic motion around the home of config/platform.yaml."""
     a = rng(seed).normal(size=(2, harmonics, 6))
@@ -108,7 +111,7 @@ def pinocchio_forces(p: Parameters, motion: Motion) -> Array:
 
 
 def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed: int,
-             noise: Noise = Noise(), forces: Array | None = None, with_rates: bool = True,
+             noise: Noise = NOISE, forces: Array | None = None, with_rates: bool = True,
              ) -> Recorded:
     """
     Return a recording of a motion of a hexapod.

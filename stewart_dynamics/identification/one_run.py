@@ -33,10 +33,10 @@ from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.replay import mcap_scan, message_blocks
 from stewart_dynamics.replay.bags import bytes_of
 from stewart_dynamics.replay.results_folder import (
-    check_free, remove_abandoned, whole_folder, write_json)
+    check_free, IDENTIFICATION, remove_abandoned, whole_folder, write_json)
 from tqdm import tqdm
 
-PARAMETERS, RESULT, REPORT = 'identified.yaml', 'identification.json', 'report.html'
+PARAMETERS, RESULT, REPORT = 'identified.yaml', IDENTIFICATION, 'report.html'
 
 # The machine code that every identification needs.
 FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,

@@ -37,6 +37,10 @@ from stewart_dynamics.errors import BagError
 
 RESULT = 'summary.json'
 """The file by which a folder is known as results of a replay."""
+IDENTIFICATION = 'identification.json'
+"""The same of an identification."""
+
+_KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification'}
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(
@@ -153,8 +157,8 @@ def check_free(folder: Path, options: Writing, result: str = RESULT) -> None:
     if not options.force:
         raise BagError(f'{folder}: exists already; --force replaces results')
     if not (folder / result).is_file():
-        raise BagError(f'{folder}: exists already and is not a folder of results, with a '
-                       f'{result}: it is not replaced')
+        raise BagError(f'{folder}: exists already and is not a folder of {_KINDS[result]}: it is '
+                       'not replaced')
 
 
 def write_json(path: Path, document: Any) -> None:
