@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop demo-ship \
+.PHONY: bags bench bench-identify bench-loop bench-node bench-planned bench-replay clean demo demo-loop demo-ship \
   docs docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -82,6 +82,9 @@ bench-loop: $(INSTALLED)
 bench-node: $(INSTALLED)
 	.venv/bin/python benchmarks/node.py --write
 	.venv/bin/python benchmarks/rates.py --write
+
+bench-identify: $(INSTALLED)
+	.venv/bin/python benchmarks/identification.py --write
 
 bench-planned: $(INSTALLED)
 	.venv/bin/python benchmarks/planned.py --write
