@@ -5,8 +5,8 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-loop bench-node bench-planned bench-replay clean demo demo-loop \
-  demo-mujoco demo-ship docs docs-site environment lint test
+.PHONY: bags bench bench-identify bench-loop bench-node bench-planned bench-replay clean demo \
+  demo-loop demo-mujoco demo-ship docs docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -95,6 +95,9 @@ bench-loop: $(INSTALLED)
 bench-node: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/node.py --write
 	$(VENV)/bin/python benchmarks/rates.py --write
+
+bench-identify: $(INSTALLED)
+	$(VENV)/bin/python benchmarks/identification.py --write
 
 bench-planned: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/planned.py --write

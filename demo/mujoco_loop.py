@@ -12,8 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-
 """
 Run the controller of ``make demo-loop`` with MuJoCo in place of the simulator, and compare both.
 
@@ -41,7 +39,7 @@ PHYSICS: dict[str, list[str | Path]] = {
 
 
 def table(runs: Sequence[Run]) -> str:
-    """Return the table of all runs: without and with feed-forward, one physics beside the other."""
+    """Return the table of all runs: without and with feed-forward, both physics side by side."""
     pairs = list(zip(runs[::2], runs[1::2], strict=True))
     lines = ['tracking error        ' + ''.join(f'{name:^36}' for name in PHYSICS),
              'RMS (peak)            ' + f'{"PD only":>15}{"PD + forces":>15}{"":6}' * len(pairs)]

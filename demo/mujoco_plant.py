@@ -13,8 +13,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-
 """
 The node stewart_simulator with MuJoCo as its physics: topics, clock and parameters are the same.
 
@@ -40,7 +38,8 @@ from stewart_dynamics.runtime.plant import State
 from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
 
 # Coordinates of the MJCF: three of each leg, then the platform's free joint.
-_LEGS, _POSITION, _QUATERNION, _TWIST = slice(2, 18, 3), slice(18, 21), slice(21, 25), slice(18, 24)
+_LEGS, _POSITION, _QUATERNION = slice(2, 18, 3), slice(18, 21), slice(21, 25)
+_TWIST = slice(18, 24)
 
 
 class MuJoCoPlant:

@@ -55,8 +55,8 @@ KEYS = {
     'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
-OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'pyarrow': 'parquet',
-            'scipy': 'differentiate'}
+OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'mujoco': 'mujoco',
+            'pyarrow': 'parquet', 'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'yaml': 'pyyaml'}
 
@@ -297,8 +297,8 @@ def test_package_xml_names_what_the_package_imports() -> None:
 
 
 def test_package_xml_names_what_the_tests_import() -> None:
-    """The same for the tests."""
-    needed = {KEYS.get(name, name) for name in third_party('test')} - {''}
+    """The same for the tests, some of which run the demos."""
+    needed = {KEYS.get(name, name) for name in third_party('demo', 'examples', 'test')} - {''}
     assert needed <= depends('depend', 'exec_depend', 'test_depend')
 
 

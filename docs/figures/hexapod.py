@@ -12,8 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-
 """
 Draw docs/figures/mujoco.png: the MJCF of config/platform.yaml in MuJoCo, at two poses.
 
@@ -52,8 +50,8 @@ def model_of(platform: StewartPlatform) -> Any:
     ET.SubElement(visual, 'quality', {'shadowsize': '4096', 'offsamples': '8'})
     ET.SubElement(assets, 'texture', {'type': 'skybox', 'builtin': 'flat', 'rgb1': '1 1 1',
                                       'width': '16', 'height': '96'})
-    ET.SubElement(world, 'light', {'pos': '1.5 -2 4', 'dir': '-0.35 0.45 -1', 'directional': 'true',
-                                   'diffuse': '0.5 0.5 0.5', 'castshadow': 'true'})
+    ET.SubElement(world, 'light', {'pos': '1.5 -2 4', 'dir': '-0.35 0.45 -1',
+                                   'directional': 'true', 'diffuse': '0.5 0.5 0.5'})
     ET.SubElement(world, 'geom', {'type': 'plane', 'size': '0 0 0.1', 'pos': '0 0 -0.03',
                                   'rgba': '0.97 0.97 0.97 1'})
     return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding='unicode'))
