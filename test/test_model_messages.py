@@ -76,6 +76,23 @@ def test_the_loops_are_closed_in_every_message() -> None:
             np.testing.assert_allclose(state.position[:3], row[:3], rtol=0.0, atol=0.0)
 
 
+def test_the_joints_are_those_of_the_urdf() -> None:
+    """As Pinocchio reads it: it puts the end of each leg on its platform joint."""
+    pytest.importorskip('pinocchio')
+    from test_urdf import CLOSED, Tree
+    random = rng()
+    p = random_parameters(random)
+    tree, messages, motion = Tree(p), ModelMessages(p), random_motion(p, random, 50)
+    for n, row in enumerate(motion.rows.tolist()):
+        state: Any = STORE.deserialize_cdr(
+            messages.joint_states(STAMP, row), MODEL_TYPES[JOINT_STATES])
+        assert sorted(state.name) == sorted(tree.model.names[1:])
+        places = [tree.model.joints[tree.model.getJointId(name)].idx_q for name in state.name]
+        q = np.zeros(tree.model.nq)
+        q[places] = state.position
+        assert tree.gap(motion[n], q[tree.places]) < CLOSED
+
+
 @pytest.mark.parametrize('frame', ['b', 'ba', 'bas', 'base', 'base_link', 'Süd'])
 @pytest.mark.parametrize('child', ['p', 'pl', 'platform', 'tool/0'])
 def test_the_transform_is_the_pose(frame: str, child: str) -> None:

@@ -57,6 +57,8 @@ _OUTLIER = 8.0
 _MOST_OUTLIERS = 0.2
 # Filtered samples at least.
 _FEWEST = 20
+# Of fewer seconds the correlations of the residuals are not known well.
+_SHORT = 10.0
 # A seed: of the noise that is added to see what noise alone seems to tell.
 _SEED = 20221
 
@@ -196,6 +198,9 @@ class Identification:
         if extraction.cutoff < options.cutoff:
             notices.append(f'sampled at {1.0 / legs.period:.4g} Hz: the cut-off frequency is '
                            f'{extraction.cutoff:.3g} Hz')
+        if (self.extracts.samples - before) * extraction.step * legs.period < _SHORT:
+            notices.append(f'less than {_SHORT:g} s are left by the filters: intervals of so short a '
+                           'recording are too narrow')
         self.bags.append(BagRead(
             path, topics, legs.samples, (end - begin) * 1e-9, legs.period, extraction.cutoff,
             bool(legs.rates), rejected, left_out, stops, outliers, last.deviations, missing,
@@ -235,6 +240,11 @@ class Identification:
                            f'the filters: must be at least {_FEWEST}')
         assert self._noise is not None
         noise = self._noise * (self.extracts.samples / self._of_noise)
+        left = sum(np.count_nonzero(each, axis=0) for each in self.chosen)
+        if np.min(left) < _FEWEST:
+            raise BagError(f'{self.bags[0].path}: nothing to identify from: '
+                           f'{sum(bag.stops for bag in self.bags)} samples are at an end stop or '
+                           'at limits.force_max')
         unsound = sum(int(np.count_nonzero(~each)) for each in self.chosen)
         sums = self._sums()
         likely = list(of_efforts(sums, unknowns, self.parameters, options.motor_torque))

@@ -48,14 +48,16 @@ _FACTORS = ((1e-3, 'kN in place of N'), (1.0 / 9.80665, 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
 # A residual above this part of the efforts calls for a search.
 _SUSPICIOUS = 0.03
+# With one above this part the model says nothing.
+_UNEXPLAINED = 0.3
 # What is found must make it smaller by this.
 _BETTER = 0.5
 # Part of the samples that must be sound for a comparison.
 _FEWEST = 0.5
 # For a zero length it need not become so much smaller: it is told well.
 _SMALL_GAIN = 0.85
-# Recorded samples of the search at most.
-_PIECE = 12_000
+# The time of the search at most [s].
+_PIECE = 5.0
 # Of geometry.zero_length: a change that is tried [m], the smallest that is named, steps.
 _CHANGE, _NAMED, _STEPS = 1e-3, 2e-3, 6
 
@@ -98,7 +100,10 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
         scale = by_file
     elif not 0.1 < scale / by_file < 10.0:  # the file's legs may be wrong, not by so much
         scale = by_file
-    if not np.isfinite(scale) or scale == 0.0:
+    if not np.isfinite(by_file) or by_file == 0.0:
+        yield Likely('scale', 'all efforts are zero')
+        return
+    if not np.isfinite(scale):
         return
     if scale < 0.0:
         yield Likely('sign', 'the efforts have the opposite sign: + must push, as the forces of '
@@ -178,7 +183,12 @@ def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, win
             misfit = _tried(p, unknowns, extraction, swapped, fit)
             found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} look '
                                              'swapped'))
-    yield from _best(found, now)
+    mistakes = list(_best(found, now))
+    if not mistakes and residual > _UNEXPLAINED:
+        mistakes.append(Likely('misfit', (
+            f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
+            'positions and efforts may not belong together, or the geometry is wrong')))
+    yield from mistakes
 
 
 def _best(found: list[tuple[float, str, str]], now: float) -> Iterator[Likely]:
@@ -261,7 +271,7 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
 
 def _piece(window: Window, extraction: Extraction) -> Window:
     """Return the part of a window with the most motion, long enough for the filters."""
-    many = min(len(window.positions), max(_PIECE, 4 * extraction.margin))
+    many = min(len(window.positions), max(round(_PIECE / window.period), 4 * extraction.margin))
     moved = np.cumsum(np.abs(np.diff(window.positions, axis=0, prepend=window.positions[:1])
                              ).sum(axis=1))
     first = int(np.argmax(moved[many - 1:] - moved[:len(moved) - many + 1]))

@@ -30,7 +30,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.linear_parameters import (
-    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_SECOND, LINEAR, linear_parameters,
+    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR, linear_parameters,
     names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS,
     UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.parameters import Parameters
@@ -157,13 +157,24 @@ class Unknowns:
         """Return the parameter file's with these values (k,); ParameterError if none can have."""
         theta = self._theta.copy()
         theta[self.linear] = self.theta(values)
-        found = parameter_values(theta, self._parameters)
+        theta[CYLINDER_MASS] = self._masses_of_cylinders(theta)
+        try:
+            found = parameter_values(theta, self._parameters)
+        except ParameterError as exc:
+            raise ParameterError(f'what fits best is no machine: {exc}: identify less') from exc
         platform = self._whole(values)
         found |= {'platform.mass': platform[0], 'platform.center_of_mass': platform[CENTER],
                   'platform.inertia': platform[INERTIA]}
         changed: dict[str, Any] = {name: value for name, value in found.items()
                                    if not _alike(value, self._parameters[name])}
         return self._parameters.replaced(changed, 'identified')
+
+    def _masses_of_cylinders(self, theta: Array) -> Array:
+        """Return masses (6,) that bodies with their moments can have: they have no effect."""
+        first, second = theta[CYLINDER_FIRST], theta[CYLINDER_SECOND]
+        least = np.divide(first ** 2, second, out=np.zeros(6), where=second > 0.0)
+        return np.where(theta[CYLINDER_MASS] * second < first ** 2, 1.0001 * least,
+                        theta[CYLINDER_MASS])
 
     def _whole(self, values: Array) -> Array:
         whole = self._of_file.copy()

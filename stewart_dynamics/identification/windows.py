@@ -141,7 +141,8 @@ def _without_outliers(values: Array) -> tuple[Array, Flags]:
     off = np.abs(values - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0)
     usual = np.median(off, axis=0) / 0.6745 + 1e-9 * np.abs(values).max(axis=0)
     wild = (off > _OUTLIER * usual) & (
-        np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual)
+        np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual) & (
+        np.abs(five[1] - five[3]) < off)  # alone: not a step, as of friction at a reversal
     wild[:2] = wild[-2:] = False
     if not wild.any():
         return values, wild
