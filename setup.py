@@ -58,6 +58,10 @@ extras_require = {
         'ros-jazzy-common-interfaces~=5.3',
         'ros-rclpy[fastrtps]~=7.1.6',
     ],
+    'ros-kilted': [
+        'ros-kilted-common-interfaces~=5.5',
+        'ros-rclpy[fastrtps]~=9.1.2',
+    ],
     'test': [
         'colcon-common-extensions',
         'dask',

@@ -47,6 +47,7 @@ from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.nodes.markers import Markers
+from stewart_dynamics.nodes.security import PROFILES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import ExternalWrench
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
@@ -115,7 +116,7 @@ class Transport(NamedTuple):
 
 SHARED_MEMORY = Transport(*[{'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}] * 3)
 ONE_HOST = Transport(*[
-    {**PROFILE, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(SECURITY / 'one_host.xml')}] * 3)
+    {**PROFILE, PROFILES: str(SECURITY / 'one_host.xml')}] * 3)
 
 
 def tls(folder: Path) -> Transport:
@@ -129,7 +130,7 @@ def tls(folder: Path) -> Transport:
                     f'listener=127.0.0.1:{ports[1]}'], check=True, stdout=subprocess.DEVNULL)
     environments = [{
         **PROFILE, 'STEWART_KEYS': str(keys / name),
-        'FASTRTPS_DEFAULT_PROFILES_FILE': str(keys / name / 'profile.xml')}
+        PROFILES: str(keys / name / 'profile.xml')}
         for name in ('source', 'node', 'listener')]
     for of, name in ((0, 'source'), (2, 'listener')):
         environments[of]['OPENSSL_CONF'] = str(keys / name / 'openssl.cnf')

@@ -122,15 +122,21 @@ class Loop:
             'leg_controller': {'use_sim_time': True, **self.gains},
             'stewart_trajectory': {'use_sim_time': True, **trajectory}}
 
-    def run(self, feed_forward: bool, payload: float, progress: Callable[[int], object]) -> Run:
-        """Run the four programs, report the simulated time [ns], and return the errors."""
+    def run(self, feed_forward: bool, payload: float, progress: Callable[[int], object],
+            simulator: Sequence[str | Path] = ()) -> Run:
+        """
+        Run the four programs, report the simulated time [ns], and return the errors.
+
+        A command ``simulator`` takes the place of stewart_simulator, with its topics.
+        """
         mass, inertia = self._payload
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
         given['leg_controller']['ros__parameters']['feed_forward'] = feed_forward
         given['stewart_simulator']['ros__parameters'].update({
             'platform.mass': payload * mass, 'platform.inertia': (payload * inertia).tolist()})
         recorder = Recorder()
-        simulate(PROGRAMS, self._files, given, recorder, int(self.times[-1]), progress)
+        programs = {**PROGRAMS, 'stewart_simulator': simulator} if simulator else PROGRAMS
+        simulate(programs, self._files, given, recorder, int(self.times[-1]), progress)
         return Run(feed_forward, payload, recorder.errors(
             self.times, self._lengths, self._motion))
 

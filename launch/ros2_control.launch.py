@@ -21,8 +21,9 @@ Start controller manager, a joint_trajectory_controller and the node, as an exam
 and then examples/plan_motion.py with its leg_trajectory remapped to
 /leg_trajectory_controller/joint_trajectory.
 
-The hardware of the default urdf_file is mock_components/GenericSystem, whose state follows the
-commands. It needs ros2_control, ros2_controllers and robot_state_publisher.
+Without urdf_file the robot description is that of stewart_describe with the hardware
+mock_components/GenericSystem, whose state follows the commands. It needs ros2_control,
+ros2_controllers and robot_state_publisher.
 """
 
 from pathlib import Path
@@ -31,15 +32,28 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
+
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
+from stewart_dynamics.parameters import Parameters
 
 CONTROLLER = 'leg_trajectory_controller'
 FILES = {
     'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),
     'controllers_file': ('controllers/trajectory_position_effort.yaml',
-                         f'YAML file of the controller manager, with {CONTROLLER}'),
-    'urdf_file': ('controllers/hexapod.urdf',
-                  'URDF with the legs as joints and a block ros2_control')}
+                         f'YAML file of the controller manager, with {CONTROLLER}')}
+# The command interfaces of the default controllers_file.
+INTERFACES = ('position', 'effort')
+
+
+def robot_description(params_file: str, urdf_file: str) -> str:
+    """Return the URDF of a file, or that of the hexapod with mock hardware."""
+    if urdf_file:
+        return Path(urdf_file).read_text(encoding='utf-8')
+    return urdf(Hexapod(Parameters.from_yaml(params_file)), 'hexapod',
+                Ros2Control(INTERFACES, MOCK))
 
 
 def nodes(context: LaunchContext) -> list[Node]:
@@ -48,11 +62,15 @@ def nodes(context: LaunchContext) -> list[Node]:
     for name, file in files.items():
         if not Path(file).is_file():
             raise RuntimeError(f'{name}: {file}: no such file')
-    description = Path(files['urdf_file']).read_text(encoding='utf-8')
+    urdf_file = LaunchConfiguration('urdf_file').perform(context)
+    if urdf_file and not Path(urdf_file).is_file():
+        raise RuntimeError(f'urdf_file: {urdf_file}: no such file')
+    description = robot_description(files['params_file'], urdf_file)
     controllers = files['controllers_file']
     return [
         Node(package='robot_state_publisher', executable='robot_state_publisher',
-             parameters=[{'robot_description': description}], output='screen'),
+             parameters=[{'robot_description': ParameterValue(description, value_type=str)}],
+             output='screen'),
         # The spawner's file is the manager's as well: it has the types of the controllers.
         Node(package='controller_manager', executable='ros2_control_node',
              parameters=[controllers], remappings=[('~/robot_description', '/robot_description')],
@@ -74,5 +92,9 @@ def generate_launch_description() -> LaunchDescription:
         *(DeclareLaunchArgument(
             name, default_value=PathJoinSubstitution([share, 'config', file]), description=text)
           for name, (file, text) in FILES.items()),
+        DeclareLaunchArgument(
+            'urdf_file', default_value='',
+            description='URDF with the legs as joints and a block ros2_control; empty: that of '
+                        'params_file with mock hardware'),
         OpaqueFunction(function=nodes),
     ])

@@ -177,8 +177,13 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
               'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
     *_meshes(),
-    Parameter('visualization_rate', 'double', 'maximum rate of ~/markers; 0: off', 'Hz', 30.0,
-              minimum=0.0),
+    Parameter('visualization_rate', 'double', 'maximum rate of ~/markers and ~/joint_states; 0: '
+              'off', 'Hz', 30.0, minimum=0.0),
+    Parameter('publish_tf', 'bool', 'publish the transform from base_frame to platform_frame on '
+              '/tf, with every pose', default=False),
+    Parameter('joint_states.source', 'string', 'whose poses ~/joint_states and /tf have: those of '
+              'setpoints, or of the measured legs (~/measured_legs)', '', 'setpoint',
+              choices=('setpoint', 'measured')),
     Parameter('autostart', 'bool', 'configure and activate the node when it starts', default=True),
 )})
 

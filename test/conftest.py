@@ -55,10 +55,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope='session')
 def ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep ROS on this machine and its logs out of the home folder; announce nodes often."""
+    from stewart_dynamics.nodes.security import PROFILES
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        patch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(
-            Path(__file__).with_name('discovery.xml')))
+        patch.setenv(PROFILES, str(Path(__file__).with_name('discovery.xml')))
         patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('log')))
         for name in ('ROS_DOMAIN_ID', 'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY',
                      'NUMBA_DISABLE_JIT', 'RCUTILS_CONSOLE_OUTPUT_FORMAT',

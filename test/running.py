@@ -141,8 +141,13 @@ def own_domain() -> Iterator[int]:
 def of_shared_memory(domain: int) -> list[Path]:
     """Return the files in shared memory that are of Fast DDS's ports of a domain."""
     first = 7400 + 250 * domain
-    return [path for path in Path('/dev/shm').glob('*fastrtps_port*')
+    return [path for name in ('fastrtps', 'fastdds')  # of Jazzy, of Kilted
+            for path in Path('/dev/shm').glob(f'*{name}_port*')
             if 0 <= int(re.findall(r'port(\d+)', path.name)[0]) - first < 250]
+
+
+# By the node, or by Kilted's rclpy itself.
+TRANSITION_REJECTED = re.compile('transition rejected: |Unable to start transition ')
 
 
 def participants(domain: int) -> int:

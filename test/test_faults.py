@@ -39,8 +39,10 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
     bits, DEADLINE, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
-    Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, SEPARATE, STEP, wrench_message)
+    Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, SEPARATE, STEP,
+    TRANSITION_REJECTED, wrench_message)
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.nodes.security import PROFILES
 import yaml
 
 Start = Callable[..., DynamicsNode]
@@ -477,7 +479,7 @@ def _brief(folder: Path) -> dict[str, str]:
     """Return the environment of a process that others soon remove when it is killed."""
     profile = folder / 'brief.xml'
     profile.write_text(BRIEF, encoding='utf-8')
-    return {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile)}
+    return {PROFILES: str(profile)}
 
 
 def _by_udp(folder: Path, lease: str = '') -> dict[str, str]:
@@ -490,7 +492,7 @@ def _by_udp(folder: Path, lease: str = '') -> dict[str, str]:
     assert one_host.count('<builtin>') == 1
     profile = folder / 'udp.xml'
     profile.write_text(one_host.replace('<builtin>', f'<builtin>{lease}'), encoding='utf-8')
-    return {'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile),
+    return {PROFILES: str(profile),
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
 
 
@@ -623,7 +625,7 @@ def test_it_is_shut_down_from_unconfigured(start: Start, configured: bool) -> No
     # There is no way back, and it is logged.
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE, shutdown):
         assert not node.change(transition)
-    assert 'transition rejected: ' in node.program.stderr
+    assert TRANSITION_REJECTED.search(node.program.stderr)
     node.until(lambda: not any(writer.get_subscription_count()
                                for writer in node.writers.values()), 'it has no topics')
 
@@ -644,7 +646,7 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> 
         assert node.state == 'active'
         assert not node.set_parameters(platform__mass=0.0).successful
     assert not node.change(Transition.TRANSITION_ACTIVATE)
-    assert 'transition rejected: ' in node.program.stderr
+    assert TRANSITION_REJECTED.search(node.program.stderr)
     assert node.set_parameters(platform__mass=mass).successful
     feeder.end()
     assert len(masses) > 10

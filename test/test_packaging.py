@@ -55,8 +55,8 @@ KEYS = {
     'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
-OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'pyarrow': 'parquet',
-            'scipy': 'differentiate'}
+OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'mujoco': 'mujoco',
+            'pyarrow': 'parquet', 'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'yaml': 'pyyaml'}
 
@@ -297,8 +297,8 @@ def test_package_xml_names_what_the_package_imports() -> None:
 
 
 def test_package_xml_names_what_the_tests_import() -> None:
-    """The same for the tests."""
-    needed = {KEYS.get(name, name) for name in third_party('test')} - {''}
+    """The same for the tests, some of which run the demos."""
+    needed = {KEYS.get(name, name) for name in third_party('demo', 'test')} - {''}
     assert needed <= depends('depend', 'exec_depend', 'test_depend')
 
 
@@ -326,12 +326,14 @@ def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None
     extras = {item.name for item in requirements} | {'pip'}
     imported = third_party(*SOURCES) & set(KEYS)
     assert {PIP_NAMES.get(name, name) for name in imported} <= extras
-    pins = [Requirement(line) for file in ('requirements.txt', 'requirements-ros.txt')
-            for line in (ROOT / file).read_text().splitlines() if not line.startswith('#')]
-    assert {str(pin.specifier)[:2] for pin in pins} == {'=='}
-    versions = {pin.name: str(pin.specifier)[2:] for pin in pins}
-    for item in requirements:
-        assert item.specifier.contains(versions[item.name]), item
+    for ros, other in (('ros', 'ros-kilted'), ('kilted', 'ros')):
+        pins = [Requirement(line) for file in ('requirements.txt', f'requirements-{ros}.txt')
+                for line in (ROOT / file).read_text().splitlines() if not line.startswith('#')]
+        assert {str(pin.specifier)[:2] for pin in pins} == {'=='}
+        versions = {pin.name: str(pin.specifier)[2:] for pin in pins}
+        for item in requirements:
+            if f'extra == "{other}"' not in str(item.marker):
+                assert item.specifier.contains(versions[item.name]), item
 
 
 @pytest.mark.parametrize('path', python_files(*SOURCES),

@@ -58,6 +58,7 @@ from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PA
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, MODEL_TYPES, ModelMessages, TF
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 
@@ -200,7 +201,8 @@ def test_the_bag_has_the_topics_and_types_of_the_node(
         name: str, replayed: dict[str, Outputs]) -> None:
     with AnyReader([replayed[name].folder / 'bag']) as reader:
         assert {c.topic: c.msgtype for c in reader.connections} == {
-            f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()}
+            **{f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
+            f'{NODE}/{JOINT_STATES}': MODEL_TYPES[JOINT_STATES], TF: MODEL_TYPES[TF]}
     assert not list(replayed[name].folder.parent.glob('.*'))
 
 
@@ -235,6 +237,21 @@ def test_every_setpoint_is_answered_as_the_library_does(
         assert nanoseconds(load) == stamp
         assert load.header.frame_id == PARAMETERS['base_frame']
         assert six_of(load) == base_wrenches[n].tolist()
+
+
+@pytest.mark.parametrize('name', ['clear', 'singular'])
+def test_the_bag_shows_the_hexapod_as_a_model(name: str, replayed: dict[str, Outputs]) -> None:
+    given, messages = setpoints_of(name), ModelMessages(PARAMETERS)
+    stamps, rows = [*given], library_motion(name).rows.tolist()
+    of = recorded(replayed[name].folder / 'bag' / 'bag.mcap')
+    for topic, write in ((JOINT_STATES, messages.joint_states), (TF, messages.transform)):
+        found = [(when, data) for each, when, data in of if each == topic]
+        whens = [when for when, _ in found]
+        assert 240 < len(found) < 305  # in 10 s, at most 30 in a second, of setpoints at 100 Hz
+        assert np.diff(whens).min() >= SECOND // 30
+        expected = {when: write(stamp, row) for stamp, (when, *_), row in zip(
+            stamps, given.values(), rows, strict=True)}
+        assert [expected[when] for when in whens] == [data for _, data in found]
 
 
 @pytest.mark.parametrize('name', BAGS)
@@ -539,7 +556,7 @@ def test_another_name_of_the_node(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
-        f'/cell/hexapod/{topic}' for topic in OUTPUT_TYPES}
+        TF, *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES))}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:

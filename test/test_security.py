@@ -49,7 +49,7 @@ from running import (  # noqa: E402
 
 from stewart_dynamics.errors import StewartError  # noqa: E402
 from stewart_dynamics.nodes import simulator_messages  # noqa: E402
-from stewart_dynamics.nodes.security import check_environment  # noqa: E402
+from stewart_dynamics.nodes.security import check_environment, PROFILES  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
@@ -138,6 +138,7 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
             node.peer, 'stewart_dynamics').get('subscribe', set()), 'its topics are known')
         for right, names in done_by(node.peer, 'stewart_dynamics').items():
             union.setdefault(right, set()).update(names)
+    union['publish'].add('/tf')  # publish_tf, which ROS's wheels on PyPI cannot publish
     assert union == granted('/stewart_dynamics')
     assert {f'{NODE}/{topic}' for topic in OUTPUTS} < union['publish']
     assert {f'{NODE}/{topic}' for topic in INPUTS} < union['subscribe']
@@ -232,7 +233,7 @@ def test_without_dds_security_nothing_starts(domain: int, tmp_path: Path, name: 
 
 KEYSTORE = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce',
             'ROS_SECURITY_KEYSTORE': '{tmp}/keystore'}
-TLS = {'FASTRTPS_DEFAULT_PROFILES_FILE': '{tmp}/profile.xml', 'STEWART_KEYS': '{tmp}',
+TLS = {PROFILES: '{tmp}/profile.xml', 'STEWART_KEYS': '{tmp}',
        'OPENSSL_CONF': '{tmp}/openssl.cnf'}
 LISTENS = """\
 <dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
@@ -251,7 +252,8 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
     (tmp_path / 'profile.xml').write_text(LISTENS)
     (tmp_path / 'openssl.cnf').write_text('[tls]\nVerifyMode = Require\n')
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', *KEYSTORE, *TLS,
-                 'ROS_SECURITY_ENCLAVE_OVERRIDE'):
+                 'ROS_SECURITY_ENCLAVE_OVERRIDE', 'FASTDDS_DEFAULT_PROFILES_FILE',
+                 'FASTRTPS_DEFAULT_PROFILES_FILE'):
         monkeypatch.delenv(name, raising=False)
 
     def change(**variables: str) -> None:
@@ -270,8 +272,8 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
     ({**KEYSTORE, 'ROS_SECURITY_ENCLAVE_OVERRIDE': '/mine'}, ['-e', '/not_this']),
     (TLS, []),
     ({**TLS, 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}, []),
-    ({'FASTRTPS_DEFAULT_PROFILES_FILE': str(ONE_HOST)}, []),
-    ({'FASTRTPS_DEFAULT_PROFILES_FILE': ''}, []),
+    ({PROFILES: str(ONE_HOST)}, []),
+    ({PROFILES: ''}, []),
 ])
 def test_a_sound_environment_is_let_be(environment: Callable[..., None],
                                        variables: dict[str, str], arguments: list[str]) -> None:
@@ -287,9 +289,9 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
     ({'ROS_SECURITY_KEYSTORE': ''}, 'ROS_SECURITY_KEYSTORE: not set'),
     ({'ROS_SECURITY_KEYSTORE': '{tmp}'}, "ROS_SECURITY_KEYSTORE: '{tmp}': holds no enclave"),
     ({'ROS_SECURITY_ENCLAVE_OVERRIDE': '/yours'}, "holds no enclave '/yours'"),
-    ({'FASTRTPS_DEFAULT_PROFILES_FILE': '{tmp}/none.xml'},
-     'FASTRTPS_DEFAULT_PROFILES_FILE: {tmp}/none.xml: cannot be read: No such file'),
-    ({'FASTRTPS_DEFAULT_PROFILES_FILE': '{tmp}/openssl.cnf'}, 'cannot be read: not XML'),
+    ({PROFILES: '{tmp}/none.xml'},
+     f'{PROFILES}: {{tmp}}/none.xml: cannot be read: No such file'),
+    ({PROFILES: '{tmp}/openssl.cnf'}, 'cannot be read: not XML'),
     ({'STEWART_KEYS': '/none'}, 'private_key_file: /none/key.pem: cannot be read: No such file'),
     ({'OPENSSL_CONF': ''}, "OPENSSL_CONF: '': has no VerifyMode = Require"),
     ({'OPENSSL_CONF': '{tmp}/key.pem'}, "OPENSSL_CONF: '{tmp}/key.pem': has no VerifyMode"),
@@ -314,6 +316,16 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
     monkeypatch.delenv('STEWART_KEYS')
     with pytest.raises(StewartError, match='the variable STEWART_KEYS is not set'):
         check_environment([])
+
+
+@pytest.mark.skipif(PROFILES == 'FASTDDS_DEFAULT_PROFILES_FILE', reason='Kilted reads it')
+def test_the_name_that_the_variable_has_in_kilted_is_rejected_in_jazzy(
+        environment: Callable[..., None]) -> None:
+    environment(FASTDDS_DEFAULT_PROFILES_FILE=str(ONE_HOST))
+    with pytest.raises(StewartError, match=f'this Fast DDS reads {PROFILES} in its place'):
+        check_environment([])
+    environment(**{PROFILES: str(ONE_HOST)})
+    check_environment([])
 
 
 # Participants and intruders
@@ -423,7 +435,7 @@ def bound(program: Program) -> set[str]:
 def shares_memory(program: Program) -> bool:
     """Return whether a program has the shared memory of Fast DDS."""
     maps = (Path('/proc') / str(program.process.pid) / 'maps').read_text()
-    return '/dev/shm/fastrtps' in maps
+    return '/dev/shm/fastrtps' in maps or '/dev/shm/fastdds' in maps
 
 
 def flows(receiver: Partner, mark: int, more: int = 20) -> Callable[[], bool]:
@@ -471,7 +483,7 @@ def test_one_host(crowd: Crowd, tmp_path: Path) -> None:
     Any process of the host may use it, and then gets all: the page says so.
     """
     system = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
-    profile = {**system, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(ONE_HOST)}
+    profile = {**system, PROFILES: str(ONE_HOST)}
     node = crowd.node(**profile)
     receiver = crowd.partner('receiver', 0, **profile)
     crowd.partner('source', 1, **profile)
@@ -480,7 +492,7 @@ def test_one_host(crowd: Crowd, tmp_path: Path) -> None:
         elsewhere = tmp_path / 'elsewhere.xml'
         elsewhere.write_text(ONE_HOST.read_text().replace('127.0.0.1', address))
         intruders.append(crowd.partner(
-            'udp', 3, FASTRTPS_DEFAULT_PROFILES_FILE=str(elsewhere), **system))
+            'udp', 3, **{PROFILES: str(elsewhere)}, **system))
     crowd.until(flows(receiver, 1), 'forces flow')
     crowd.until_tried(intruders)
     crowd.until(flows(receiver, 1), 'forces flow on')
@@ -564,8 +576,8 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     crowd.until(flows(receiver, 1), 'forces flow')
     turned_away = [
         crowd.partner('self_signed', 2, file=of['node'], **own),
-        crowd.partner('no_certificate', 3, file=of['node'], FASTRTPS_DEFAULT_PROFILES_FILE=without(
-            dials, NO_CERTIFICATE)),
+        crowd.partner('no_certificate', 3, file=of['node'],
+                      **{PROFILES: without(dials, NO_CERTIFICATE)}),
         crowd.partner('certificate_of_a_listener', 4, file=of['node'],
                       STEWART_KEYS=str(folder / 'source'))]
     crowd.until(lambda: all('Handshake failed' in each.stdout for each in turned_away),
@@ -573,7 +585,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     # Not before: a peer that connects without TLS delays the next ones.
     unheard = [
         crowd.partner('plain_tcp', 5, file=of['node'],
-                      FASTRTPS_DEFAULT_PROFILES_FILE=without(dials, 'tls')),
+                      **{PROFILES: without(dials, 'tls')}),
         crowd.partner('udp_and_shm', 6)]
     crowd.until_tried(turned_away + unheard)
     crowd.until(flows(receiver, 1), 'forces flow on')
@@ -589,8 +601,8 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     assert not shares_memory(node)
 
     assert node.stdout == ''
-    plain = crowd.partner('plain_tcp_listens', 7, file=of['bare'], FASTRTPS_DEFAULT_PROFILES_FILE=(
-        without(folder / 'bare' / 'profile.xml', 'tls')))
+    plain = crowd.partner('plain_tcp_listens', 7, file=of['bare'], **{
+        PROFILES: without(folder / 'bare' / 'profile.xml', 'tls')})
     crowd.until_tried([plain])
     crowd.until(flows(receiver, 1), 'forces flow on')
     impostor = crowd.partner('self_signed_listens', 8, file=of['spare'], **own)
@@ -620,12 +632,10 @@ def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None
     stranger = crowd.partner('udp_and_shm', 3)
     reader = crowd.partner(
         'no_certificate', 4, file=read / 'node' / 'environment.sh',
-        FASTRTPS_DEFAULT_PROFILES_FILE=without(
-            read / 'node' / 'profile.xml', NO_CERTIFICATE))
+        **{PROFILES: without(read / 'node' / 'profile.xml', NO_CERTIFICATE)})
     crowd.node('open')
     crowd.node('fooled', file=fooled / 'node' / 'environment.sh',
-               FASTRTPS_DEFAULT_PROFILES_FILE=without(
-                   fooled / 'node' / 'profile.xml', 'verify_mode'))
+               **{PROFILES: without(fooled / 'node' / 'profile.xml', 'verify_mode')})
     crowd.until(lambda: reader.heard('setpoint/pose', 1), 'who has no certificate reads')
     crowd.until(flows(impostor, 2), 'who has signed its own is answered')
     crowd.until(flows(stranger, 3), 'who has neither keys nor profile is answered')
@@ -637,9 +647,9 @@ def test_a_key_that_cannot_be_read_is_said_in_one_line(
     folder = keys('source') / 'node'
     (folder / 'ca.pem').unlink()
     line = rejected(domain, tmp_path / 'node', 'stewart_dynamics', '--params-file', PLATFORM,
-                    FASTRTPS_DEFAULT_PROFILES_FILE=str(folder / 'profile.xml'),
+                    **{PROFILES: str(folder / 'profile.xml')},
                     STEWART_KEYS=str(folder), ROS_AUTOMATIC_DISCOVERY_RANGE='SYSTEM_DEFAULT')
-    assert line == (f'stewart_dynamics: FASTRTPS_DEFAULT_PROFILES_FILE: {folder}/profile.xml: '
+    assert line == (f'stewart_dynamics: {PROFILES}: {folder}/profile.xml: '
                     f'verify_file: {folder}/ca.pem: cannot be read: No such file or directory')
 
 

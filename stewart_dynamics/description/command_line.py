@@ -18,11 +18,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import one_line, StewartError
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters import Parameters
 
 DONE, LIKELY_MISTAKE, BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
 _INTERFACES = ('position', 'velocity', 'effort')
@@ -32,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
     try:
-        return _write(given)
+        return _read(given) if given.source else _write(given)
     except StewartError as exc:
         _complain(one_line(exc))
         return BAD_INPUT
@@ -48,12 +52,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='stewart_describe', formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Write a hexapod as URDF, SDFormat and MJCF.',
-        epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF).\n\n'
+        description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
+                    'into a parameter file.',
+        epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.\n\n'
                'exit codes: 0 done; 1 with --strict, where a likely mistake was found; 2 bad '
-               'arguments, parameters or\nfiles; 130 interrupted')
-    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+               'arguments, parameters or\nfiles, or no hexapod found; 130 interrupted')
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument('--params', type=Path, metavar='FILE',
                         help='parameters of the hexapod, the file that the node takes')
+    source.add_argument('--from', dest='source', type=Path, metavar='FILE',
+                        help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
     parser.add_argument('--output', type=Path, default=Path('.'), metavar='DIR',
                         help='folder of the results (default: the current one)')
     parser.add_argument('--name', type=_name, metavar='NAME',
@@ -92,7 +100,6 @@ def _write(given: argparse.Namespace) -> int:
     from stewart_dynamics.description.mjcf import mjcf
     from stewart_dynamics.description.sdf import sdf
     from stewart_dynamics.description.urdf import Ros2Control, urdf
-    from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters import Parameters
 
     parameters = Parameters.from_yaml(given.params)
@@ -102,19 +109,46 @@ def _write(given: argparse.Namespace) -> int:
         control = Ros2Control(given.ros2_control, given.hardware)
     _put(given, {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
                  f'{name}.xml': mjcf(hexapod, name)})
+    return _judge(parameters, given)
+
+
+def _read(given: argparse.Namespace) -> int:
+    from stewart_dynamics.description.reading import read_hexapod
+
+    if given.ros2_control is not None:
+        raise StewartError('--ros2-control: not with --from')
+    found = read_hexapod(given.source)
+    path = given.output / f'{given.name or given.source.stem}.yaml'
+    _check_new([path], given)
+    found.parameters.to_yaml(path)
+    print(path)
+    for remark in found.remarks:
+        _complain(remark)
+    return _judge(found.parameters, given)
+
+
+def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
+    """Print likely mistakes and return the exit code."""
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+
     mistakes = likely_mistakes(parameters)
     for mistake in mistakes:
         _complain(f'warning: {mistake}')
     return LIKELY_MISTAKE if mistakes and given.strict else DONE
 
 
-def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
-    """Write all files or none."""
-    paths = {given.output / name: text for name, text in files.items()}
+def _check_new(paths: Iterable[Path], given: argparse.Namespace) -> None:
+    """Make the folder; StewartError where a file exists that may not be replaced."""
     for path in paths:
         if path.exists() and not given.force:
             raise StewartError(f'{path}: exists; --force replaces it')
     given.output.mkdir(parents=True, exist_ok=True)
+
+
+def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
+    """Write all files or none."""
+    paths = {given.output / name: text for name, text in files.items()}
+    _check_new(paths, given)
     for path, text in paths.items():
         path.write_text(text, encoding='utf-8')
         print(path)

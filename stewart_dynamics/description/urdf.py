@@ -88,6 +88,8 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str
     block = add(root, CARRIED)
     for each, text in carried(p, (*_NOT_IN_URDF, *without_limit(p, _LIMITS))).items():
         add(block, 'parameter', name=each, value=text)
+    for leg in hexapod.legs:
+        add(block, 'loop', tip=leg.piston.name, platform=leg.ball)
     if control is not None:
         _ros2_control(root, hexapod, name, control)
     return text_of(root, _COMMENT)

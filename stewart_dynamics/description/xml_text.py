@@ -28,6 +28,8 @@ from stewart_dynamics.parameters import Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters that a format has no place for."""
+_IF_GIVEN = ('geometry.base_joint_axes', 'geometry.platform_joint_axes',
+             'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
 NOT_CHECKED = 'none'
 """Value there of a limit that is not checked."""
 
@@ -55,6 +57,7 @@ def text_of(root: ET.Element, comment: str) -> str:
 
 def carried(parameters: Parameters, names: Iterable[str]) -> Mapping[str, str]:
     """Return parameters as text, for a block of what a format has no place for."""
+    names = [*names, *(name for name in _IF_GIVEN if parameters[name] is not None)]
     return {name: NOT_CHECKED if parameters[name] is None else numbers(parameters[name])
             for name in names}
 

@@ -25,6 +25,7 @@ import signal
 import sys
 
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification import design_command
 from stewart_dynamics.identification.options import CUTOFF, HOLD_OUT, Options
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
@@ -36,7 +37,11 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
-    given = _arguments().parse_args(arguments)
+    parser = _arguments()
+    given = parser.parse_args(arguments)
+    if bool(given.bags) == given.design:
+        parser.error('--design takes no BAG' if given.design else
+                     'the following arguments are required: BAG')
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
             stream.reconfigure(errors='backslashreplace')
@@ -67,13 +72,13 @@ def _arguments() -> argparse.ArgumentParser:
                'when the motion does not tell everything that was asked for;\n2 bad arguments, '
                'parameters or bags, or a likely mistake; 3 part of a bag could not be read, the '
                'rest is done; 130 interrupted')
-    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
+    parser.add_argument('bags', nargs='*', type=Path, metavar='BAG',
                         help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
                              'with bags in it; several are of one and the same hexapod')
     parser.add_argument('--params', required=True, type=Path, metavar='FILE',
                         help='parameters of the hexapod as far as they are known, the file that '
                              'the node takes')
-    parser.add_argument('--output', type=Path, default=Path('identified'), metavar='DIR',
+    parser.add_argument('--output', type=Path, metavar='DIR',
                         help='folder of the results (default: identified)')
     parser.add_argument('--force', action='store_true', help='replace results that exist')
     parser.add_argument('--strict', action='store_true',
@@ -104,6 +109,7 @@ def _arguments() -> argparse.ArgumentParser:
                       help='efforts are not delayed; by default the delay is estimated')
     what.add_argument('--accept-mistakes', action='store_true',
                       help='write results although a mistake is likely')
+    design_command.add_options(parser)
     return parser
 
 
@@ -124,15 +130,19 @@ def _run(given: argparse.Namespace) -> int:
         given.cutoff, given.prior, given.hold_out, not given.no_delay, given.accept_mistakes,
         not given.no_report, given.force)
     parameters = Parameters.from_yaml(given.params, given.node)
-    bags = [bag for path in given.bags for bag in find_bags(path, given.output)]
+    if given.design:
+        design_command.run(given, parameters)
+        return DONE
+    output = given.output or Path('identified')
+    bags = [bag for path in given.bags for bag in find_bags(path, output)]
     if HINT:
         print(f'stewart_identify: {HINT}', file=sys.stderr)
     prepare(FUNCTIONS)
     for mistake in likely_mistakes(parameters):
         _complain(f'warning: {mistake}')
-    result = run(bags, parameters, given.output, options, _complain)
+    result = run(bags, parameters, output, options, _complain)
     print(_printable(result_text(result)))
-    print(_printable(f'results: {given.output}'))
+    print(_printable(f'results: {output}'))
     missing = [f'{bag["bag"]}: part of it could not be read: {"; ".join(bag["missing"])}'
                for bag in result['bags'] if bag['missing']]
     for text in missing:

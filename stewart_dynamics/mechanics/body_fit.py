@@ -61,8 +61,10 @@ _NOISE = 0.2
 
 # Iterations of the noise.
 ROUNDS = 4
-LAGS = 5
+LAGS = 8
 _NORMAL_95 = 1.959964
+# Student's t of n degrees of freedom, by n, above the normal distribution's: the first term.
+_STUDENT_95 = 2.372
 # The noise is at least this part of the largest effort: no sensor is better.
 _LEAST_NOISE = 1e-5
 
@@ -177,6 +179,8 @@ class BodyFit:
         strongest = np.abs(self._y).max() + np.abs(self._p[..., 0]).max() * given.mass
         self._least = (_LEAST_NOISE * strongest) ** 2
         self._variance = max(float(np.mean(self._y ** 2)), self._least)
+        # Bartlett's window leaves so many degrees of freedom of the correlations.
+        self._freedom = 1.5 * len(samples.differences) / LAGS
         self._solution: Solution | None = None
 
     def improve(self) -> None:
@@ -223,7 +227,8 @@ class BodyFit:
             (_flat(self._body(change + step)) - _flat(self._body(change - step))) / (
                 2.0 * step.max()) for step in np.diag(1e-4 * self._scales)])
         covariance = derivative @ self._covariance(solution) @ derivative.T
-        half_widths = _NORMAL_95 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        quantile = _NORMAL_95 + _STUDENT_95 / self._freedom
+        half_widths = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         residual = float(np.sqrt(np.mean(self._residuals ** 2)))
         return FittedBody(Body(body.mass, center, inertia),
                           half_widths, known, consistent, residual)
@@ -249,9 +254,8 @@ class BodyFit:
             product = np.einsum('ipjq,ij->pq', products, correlation)
             weight = 1.0 - lag / (LAGS + 1)
             meat += weight * (product + product.T) if lag else product
-        # Bartlett's window leaves so many degrees of freedom, of which the fit takes these.
-        freedom = 1.5 * many / LAGS
-        meat *= freedom / (freedom - FRICTION - TEN / 6)
+        # Of the degrees of freedom the fit takes these.
+        meat *= self._freedom / (self._freedom - FRICTION - TEN / 6)
         # What the friction, uncertain as it is, may shift.
         by_friction = self._eliminate @ self._p
         meat += np.einsum('ikp,ikq->pq', by_friction, by_friction)

@@ -116,11 +116,17 @@ def likely_mistakes(parameters: Parameters) -> Iterator[str]:
         if bounds is not None and bounds.max() > _WIDEST:
             yield (f'{name}: {bounds.max():.3g} rad, {math.degrees(bounds.max()):.0f} degrees: '
                    'more than any joint of a leg: in degrees?')
+    given = [axes for axes in AXES if parameters[axes] is not None]
+    if not given:
+        return  # the angles at home are zero; no machine code is loaded for that
     try:
-        angles = JointAngles(parameters)(Motion.from_pose(home_pose(parameters)).rows[None])[0]
+        home = Motion.from_pose(home_pose(parameters)).rows
     except ParameterError:
         return  # without a home pose
+    angles = JointAngles(parameters, given)(home[None])[0]
     for axes, (limit, where) in zip(AXES, ANGLES.items(), strict=True):
+        if axes not in given:
+            continue
         at_home, bounds = angles[where], parameters[limit]
         leg = int(np.argmax(at_home if bounds is None else at_home - bounds))
         joint, angle = parameters['joints'][leg], at_home[leg]

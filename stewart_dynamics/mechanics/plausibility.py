@@ -33,6 +33,7 @@ from stewart_dynamics.mechanics import joint_axes, lagrange
 from stewart_dynamics.mechanics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.symmetry import odd_joint
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle
@@ -105,8 +106,11 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         if geometry:
             reach = reach_of(parameters, shape)
             found += _legs(parameters, shape, reach)
-            if not sizes:  # else what follows from a wrong unit
-                found += (tuple(_singular(parameters, shape, reach))
+            odd = tuple(_symmetry(parameters))
+            if len(odd) == 1:
+                found += odd
+            elif not sizes:  # else what follows from a wrong unit
+                found += (tuple(_singular(parameters, shape, reach)) or odd
                           or _order(parameters, shape, reach))
                 found += joint_axes.likely_mistakes(parameters)
     return tuple(found)
@@ -250,6 +254,19 @@ def _order(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
         yield (f'geometry.platform_joints: at home ({home.text}) the legs are shorter with the '
                f'platform joints in the order {(orders[best] + 1).tolist()}: are the joints in '
                'another order?')
+
+
+def _symmetry(p: Parameters) -> Iterator[str]:
+    for name in ('base_joints', 'platform_joints'):
+        joints = p[f'geometry.{name}']
+        odd = odd_joint(joints)
+        if odd is not None:
+            twins = [leg for n, leg in enumerate(p['joints'])
+                     if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
+            same = f', the same as {twins[0]}' if twins else ''
+            yield (f'geometry.{name}: {p["joints"][odd.joint]}: {_listed(joints[odd.joint])} m'
+                   f'{same}: the other five {odd.symmetry}, as all six would with '
+                   f'{_listed(odd.expected)} m: a sign or a digit?')
 
 
 def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:

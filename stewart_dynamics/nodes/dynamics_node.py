@@ -37,6 +37,7 @@ from stewart_dynamics.nodes import parameter_changes
 from stewart_dynamics.nodes.declared_parameters import declare_parameters
 from stewart_dynamics.nodes.diagnostics_publisher import DiagnosticsPublisher
 from stewart_dynamics.nodes.markers_publisher import MarkersPublisher
+from stewart_dynamics.nodes.model_publisher import ModelPublisher
 from stewart_dynamics.nodes.payload_service import inertia_message, PayloadService
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.nodes.rclpy_workarounds import (
@@ -57,6 +58,7 @@ from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH, ExternalWr
 from stewart_dynamics.runtime.input_topics import WRENCH
 from stewart_dynamics.runtime.leg_history import LegHistory
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS, MeasuredLegs, NOT_COMPILED
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.rejections import NOT_EXCLUSIVE, Rejection
 from stewart_dynamics.runtime.setpoint_joining import Setpoints
@@ -150,7 +152,12 @@ class DynamicsNode(LifecycleNode):
         self._queue = SetpointQueue(
             models.step, self._publish, self._setpoints.on_base, self._reject_joined,
             self._take_waiting, self._on_answered)
-        self._markers = MarkersPublisher(parameters, self._topics.publishers.get(MARKERS))
+        publishers = self._topics.publishers
+        self._markers = MarkersPublisher(parameters, publishers.get(MARKERS))
+        self._model = ModelPublisher(
+            self._model_messages, parameters['visualization_rate'], publishers.get(JOINT_STATES),
+            publishers.get(TF))
+        self._model_measured = parameters['joint_states.source'] == 'measured'
         self._handled, self._rested = -math.inf, False
         self._active = True
         return TransitionCallbackReturn.SUCCESS
@@ -187,6 +194,7 @@ class DynamicsNode(LifecycleNode):
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)
         self._messages = OutputMessages(self._settings)
+        self._model_messages = ModelMessages(self._settings)
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
@@ -249,6 +257,8 @@ class DynamicsNode(LifecycleNode):
         if self._base_wrench_read:
             self._publish_base_wrench(setpoint)
         self._markers.answered(setpoint, output)
+        if not self._model_measured:
+            self._model.moved(setpoint.stamp, setpoint.motion)
         now = time.monotonic()
         if setpoint.base is not None:
             self._diagnostics.base.answered(setpoint, now)
@@ -262,7 +272,9 @@ class DynamicsNode(LifecycleNode):
                 self._messages.of_base_wrench(setpoint.stamp, wrench))
 
     def _on_answered(self) -> bool:
-        self._markers.publish_due(time.monotonic())
+        now = time.monotonic()
+        self._markers.publish_due(now)
+        self._model.publish_due(now)
         rested, self._rested = self._rested, False
         if rested:  # nothing has waited for this answer
             return False
@@ -299,6 +311,9 @@ class DynamicsNode(LifecycleNode):
             data, self._setpoints.wrench, target, self._setpoints.base)
         if estimate is None:
             return
+        if self._model_measured:
+            self._model.moved(estimate.stamp, estimate.motion)
+            self._model.publish_due(now)
         if estimate.wrench is not None:
             self._topics.publishers[EXTERNAL_WRENCH].publish(
                 self._messages.of_estimate(estimate))
@@ -376,6 +391,8 @@ class DynamicsNode(LifecycleNode):
             self._base_wrench_code.begin()
         self._base_wrench_read = reads and self._base_wrench_code.ready
         self._markers.publish_due(now)  # the last answer before a silence
+        self._model.publish_due(now)
+        self._model.look()
         if self._diagnostics.due_at_tick(now):
             self._report()
 

@@ -15,6 +15,8 @@
 """
 Workarounds for rclpy 7.1 (ROS 2 Jazzy): each for one defect, with its upstream issue.
 
+rclpy 9.1 (Kilted) works with all of them.
+
 Where there is no upstream issue, the docstring describes what rclpy does, and names a test: when
 it passes without the workaround, the workaround can be removed.
 """
@@ -56,7 +58,8 @@ def answer_impossible_transitions(node: LifecycleNode, log: Callable[[str], None
     Answer a request for a transition that the present state does not have: no success.
 
     rclpy raises the error out of spin, which ends the program, and the client waits forever
-    (https://github.com/ros2/rclpy/issues/1209; its pull request 1319 is not in 7.1).
+    (https://github.com/ros2/rclpy/issues/1209; its pull request 1319 is not in 7.1). rclpy 9.1
+    answers so itself, and logs the error.
 
     Parameters
     ----------

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib import metadata
 import os
 from pathlib import Path
 import re
@@ -31,11 +32,23 @@ from xml.etree import ElementTree
 
 from stewart_dynamics.errors import StewartError
 
-_PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_OLD, _NEW = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
 _VARIABLE = re.compile(r'\$\{([A-Z_][A-Z0-9_]*)\}')  # in the syntax of Fast DDS
 _COMMENT = re.compile('<!--.*?-->', re.DOTALL)
 _KEY_FILES = ('private_key_file', 'cert_chain_file', 'verify_file')
 _ASKS_FOR_CERTIFICATES = re.compile(r'^\s*VerifyMode\s*=\s*Require\b', re.MULTILINE)
+
+
+def _profiles() -> str:
+    try:
+        renamed = int(metadata.version('rclpy').split('.')[0]) >= 9
+    except (metadata.PackageNotFoundError, ValueError):
+        renamed = False
+    return _NEW if renamed else _OLD
+
+
+PROFILES = _profiles()
+"""The variable with the file of Fast DDS's profiles; Fast DDS 3, of Kilted, has renamed it."""
 
 
 def check_environment(arguments: Sequence[str]) -> str:
@@ -46,8 +59,8 @@ def check_environment(arguments: Sequence[str]) -> str:
     """
     permissive = _check_dds_security(arguments)
     rmw = os.environ.get('RMW_IMPLEMENTATION') or 'rmw_fastrtps_cpp'
-    if os.environ.get(_PROFILE) and 'fastrtps' in rmw:
-        _check_profile(Path(os.environ[_PROFILE]))
+    if 'fastrtps' in rmw:
+        _check_profiles()
     return permissive
 
 
@@ -93,17 +106,28 @@ def _check_dds_security(arguments: Sequence[str]) -> str:
     return ''
 
 
-def _check_profile(path: Path) -> None:
+def _check_profiles() -> None:
+    """Check the file of profiles that is in effect; Kilted takes the old name, too."""
+    new, old = os.environ.get(_NEW), os.environ.get(_OLD)
+    if PROFILES == _OLD and new and not old:
+        raise StewartError(f'{_NEW}: {new}: this Fast DDS reads {_OLD} in its place')
+    if PROFILES == _NEW and new:
+        _check_profile(_NEW, Path(new))
+    elif old:
+        _check_profile(_OLD, Path(old))
+
+
+def _check_profile(variable: str, path: Path) -> None:
     try:
         # Fast DDS takes an empty line before <?xml, and -- in a comment.
         text = _COMMENT.sub('', path.read_text(encoding='utf-8')).lstrip()
         root = ElementTree.fromstring(text)
     except (OSError, UnicodeDecodeError, ElementTree.ParseError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else f'not XML: {exc}'
-        raise StewartError(f'{_PROFILE}: {path}: cannot be read: {reason}') from exc
+        raise StewartError(f'{variable}: {path}: cannot be read: {reason}') from exc
     unset = [name for name in _VARIABLE.findall(text) if name not in os.environ]
     if unset:
-        raise StewartError(f'{_PROFILE}: {path}: the variable {unset[0]} is not set')
+        raise StewartError(f'{variable}: {path}: the variable {unset[0]} is not set')
     elements = [(element.tag.rpartition('}')[2], _VARIABLE.sub(
         lambda found: os.environ[found[1]], element.text or '').strip())
         for element in root.iter()]
@@ -112,13 +136,13 @@ def _check_profile(path: Path) -> None:
                     or os.environ.get('ROS_LOCALHOST_ONLY') == '1')
     if (on_localhost and ('useBuiltinTransports', 'false') in elements
             and kinds & {'interfaceWhiteList', 'tls'}):
-        raise StewartError(f'{_PROFILE}: {path}: is not in effect where '
+        raise StewartError(f'{variable}: {path}: is not in effect where '
                            'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, which adds shared memory '
                            'and UDP on all addresses: set it to SYSTEM_DEFAULT, and '
                            'ROS_LOCALHOST_ONLY not at all')
     for kind, name in elements:
         if kind in _KEY_FILES:
-            _read(Path(name), f'{_PROFILE}: {path}: {kind}')
+            _read(Path(name), f'{variable}: {path}: {kind}')
     if {'tls', 'listening_ports'} <= kinds:
         name = os.environ.get('OPENSSL_CONF', '')
         if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):

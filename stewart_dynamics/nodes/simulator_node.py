@@ -21,7 +21,7 @@ from functools import partial
 import gc
 import math
 import time
-from typing import Any
+from typing import Any, ClassVar
 
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
 from rclpy.clock import Clock as RosClock
@@ -83,6 +83,8 @@ class SimulatorNode(Node):
     Raises ParameterError where the parameters break a rule.
     """
 
+    plant: ClassVar[Callable[[SimulatorParameters], Any]] = Plant
+
     def __init__(self) -> None:
         super().__init__(
             'stewart_simulator', automatically_declare_parameters_from_overrides=True,
@@ -93,7 +95,7 @@ class SimulatorNode(Node):
         if machine_code.HINT:
             self.get_logger().warning(machine_code.HINT)
         begun = time.monotonic()
-        self._plant = SIGNALS.interruptible(partial(Plant, self._settings))
+        self._plant = SIGNALS.interruptible(partial(type(self).plant, self._settings))
         self._state_messages = StateMessages(self._settings)
         for mistake in likely_mistakes(self._settings):
             self.get_logger().warning(mistake)

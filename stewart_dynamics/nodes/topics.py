@@ -30,12 +30,14 @@ from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
+from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime import planned_trajectory_messages as planned
 from stewart_dynamics.runtime.external_wrench import EXTERNAL_WRENCH
 from stewart_dynamics.runtime.input_topics import BASE_SOURCES, INPUT_TYPES, SOURCES
 from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, TF
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
@@ -99,11 +101,17 @@ class Topics:
         Parameters
         ----------
         parameters : Parameters
-            Which setpoint topics, which of the base, and whether there are markers.
+            Which setpoint topics, which of the base, and whether there are markers, joint states
+            and transforms.
         on_setpoint, on_base : callable
             Gets topic and bytes of a message on a setpoint topic, or on one of the base.
         others : mapping of topic to callable
             What gets the bytes of a message on the other topics.
+
+        Raises
+        ------
+        ParameterError
+            ``publish_tf`` needs a package that is not installed.
 
         """
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -116,6 +124,9 @@ class Topics:
         self._publish(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), '/diagnostics')
         if parameters['visualization_rate']:
             self._publish(MARKERS, MarkerArray, QoSProfile(depth=1))
+            self._publish(JOINT_STATES, JointState, QoSProfile(depth=10))
+        if parameters['publish_tf']:
+            self._publish(TF, _transforms(), QoSProfile(depth=100), TF)
         # The executor takes messages in the order of the subscriptions: a setpoint needs those of
         # the base that have come before it.
         self.base, self.setpoints = ({
@@ -162,3 +173,14 @@ class Topics:
         self._node.get_logger().error(
             f'{topic}: a publisher offers an incompatible quality of service, policy '
             f'{qos_policy_name_from_kind(event.last_policy_kind)}: its messages are not received')
+
+
+def _transforms() -> Any:
+    """Return tf2_msgs/TFMessage, which ROS's wheels on PyPI do not contain."""
+    try:
+        from tf2_msgs.msg import TFMessage
+    except ImportError as exc:
+        raise ParameterError(
+            'publish_tf: true: needs the ROS package tf2_msgs, which is not installed (it is part '
+            'of ROS, but not of its wheels on PyPI)') from exc
+    return TFMessage

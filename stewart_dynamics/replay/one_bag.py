@@ -52,6 +52,7 @@ from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import base_wrench, input_topics as inputs, step
 from stewart_dynamics.runtime.base_wrench import BaseWrench
+from stewart_dynamics.runtime.model_messages import ModelMessages
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.recorded_messages import Messages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
@@ -179,7 +180,9 @@ class _Run:
         if options.report:
             self.report = Report(parameters, measured=options.measured is not None)
             self._breakdown = ForceBreakdownRows(parameters)
-        self._bag = OutputBag(folder / 'bag', options.node, OutputMessages(parameters))
+        self._bag = OutputBag(
+            folder / 'bag', options.node, OutputMessages(parameters), ModelMessages(parameters),
+            parameters['visualization_rate'])
         stack.callback(self._bag.abandon)
         self._table: Table = kind_of_table(options.parquet)(
             folder, parameters['joints'], self._quasi_static,
@@ -294,7 +297,7 @@ class _Run:
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
         base_wrenches = self._base_wrench.many(setpoints)
-        self._bag.write(setpoints.times, outputs, base_wrenches)
+        self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
         seconds = self._seconds(setpoints.stamps)
         self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
         breakdown = None

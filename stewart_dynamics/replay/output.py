@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from struct import Struct
 from typing import Any
@@ -32,7 +33,8 @@ from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.mcap_layout import MAGIC
-from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.runtime.model_messages import MODEL_TYPES, ModelMessages, TF
+from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages, Written
 from stewart_dynamics.runtime.step import Outputs
 import yaml  # type: ignore[import-untyped]
 
@@ -57,33 +59,42 @@ class OutputBag:
         Node name, the prefix of the topics.
     messages : OutputMessages
         Serializes the messages.
+    model : ModelMessages
+        Serializes those that show the hexapod as a model.
+    rate : float
+        At most so many of these are written in a second [Hz]; 0: none, and no topics of them.
 
     """
 
-    def __init__(self, folder: Path, node: str, messages: OutputMessages) -> None:
+    def __init__(self, folder: Path, node: str, messages: OutputMessages, model: ModelMessages,
+                 rate: float) -> None:
         self._folder = folder
-        self._messages = messages
+        self._messages, self._model = messages, model
+        self._period = round(1e9 / rate) if rate else 0
+        self._due: int | None = None  # when the model is written next
+        self._types = OUTPUT_TYPES | (MODEL_TYPES if rate else {})
         folder.mkdir()
         self._file = (folder / f'{folder.name}.mcap').open('wb')
         self._counts: Counter[int] = Counter()
         self._times: tuple[int, int] | None = None
         self._chunks: list[ChunkIndex] = []
         store = get_typestore(Stores.ROS2_JAZZY)
-        kinds = tuple(dict.fromkeys(OUTPUT_TYPES.values()))
+        kinds = tuple(dict.fromkeys(self._types.values()))
         self._schemas = [
             Schema(data=store.generate_msgdef(kind, ros_version=2)[0].encode(),
                    encoding='ros2msg', id=n, name=kind) for n, kind in enumerate(kinds, start=1)]
         self._hashes = {kind: store.hash_rihs01(kind) for kind in kinds}
         self._channels = {
             topic: Channel(
-                id=n, topic=f'{node}/{topic}', message_encoding='cdr',
+                id=n, topic=topic if topic == TF else f'{node}/{topic}', message_encoding='cdr',
                 schema_id=kinds.index(kind) + 1, metadata={
                     'offered_qos_profiles': '', 'topic_type_hash': self._hashes[kind]})
-            for n, (topic, kind) in enumerate(OUTPUT_TYPES.items(), start=1)}
+            for n, (topic, kind) in enumerate(self._types.items(), start=1)}
         self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
         self._file.write(self._declarations())
 
-    def write(self, times: Stamps, outputs: Outputs, base_wrenches: Array) -> None:
+    def write(self, times: Stamps, motions: Array, outputs: Outputs, base_wrenches: Array,
+              ) -> None:
         """
         Write a chunk: what each setpoint gives.
 
@@ -91,6 +102,8 @@ class OutputBag:
         ----------
         times : (N,)
             When they are recorded [ns].
+        motions : (N, MOTION)
+            Their motions.
         outputs : Outputs
             N of them.
         base_wrenches : (N, 6)
@@ -101,7 +114,8 @@ class OutputBag:
             return
         groups = [group for group in (
             *self._messages.of_outputs(outputs),
-            self._messages.of_base_wrenches(outputs.stamps, base_wrenches)) if len(group[1])]
+            self._messages.of_base_wrenches(outputs.stamps, base_wrenches),
+            *self._of_model(times, motions, outputs)) if len(group[1])]
         sizes = np.zeros((len(times), len(groups)), dtype=np.int64)
         for n, (_, which, messages) in enumerate(groups):
             sizes[which, n] = _HEAD + messages.dtype.itemsize
@@ -124,6 +138,21 @@ class OutputBag:
             indexes.setdefault(channel, []).append((times[which], starts))
             self._counts[channel] += len(which)
         self._write_chunk(content, int(times.min()), int(times.max()), indexes)
+
+    def _of_model(self, times: Stamps, motions: Array, outputs: Outputs) -> Iterator[Written]:
+        """Yield the messages that show the model, as often as they are due."""
+        which = np.array([*self._when_due(times)], dtype=np.int64)
+        for topic, messages in self._model.of_rows(outputs.stamps[which], motions[which]):
+            yield topic, which, messages
+
+    def _when_due(self, times: Stamps) -> Iterator[int]:
+        n = 0
+        while self._period and n < len(times):
+            now = int(times[n])
+            if self._due is None or now >= self._due:
+                yield n
+                self._due = now + self._period
+            n = max(n + 1, int(np.searchsorted(times, self._due)))
 
     def close(self) -> None:
         """Write the index, and metadata.yaml."""
@@ -189,9 +218,9 @@ class OutputBag:
             'version': 9, 'storage_identifier': 'mcap', 'relative_file_paths': [name], **span(),
             'topics_with_message_count': [{
                 'topic_metadata': {
-                    'name': channel.topic, 'type': OUTPUT_TYPES[topic],
+                    'name': channel.topic, 'type': self._types[topic],
                     'serialization_format': 'cdr', 'offered_qos_profiles': [],
-                    'type_description_hash': self._hashes[OUTPUT_TYPES[topic]]},
+                    'type_description_hash': self._hashes[self._types[topic]]},
                 'message_count': self._counts[channel.id],
             } for topic, channel in self._channels.items()],
             'compression_format': '', 'compression_mode': '', 'files': [{'path': name, **span()}],

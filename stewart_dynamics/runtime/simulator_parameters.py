@@ -92,9 +92,9 @@ _OWN = (
 
 # Beginnings of names.
 _OF_THE_NODE = ('autostart', 'external_wrench.', 'geometry.base_joint_axes',
-                'geometry.platform_joint_axes', 'limits.base_joint_angle_max',
+                'geometry.platform_joint_axes', 'joint_states.', 'limits.base_joint_angle_max',
                 'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
-                'platform_frame', 'setpoint.', 'singularity.', 'trajectory.',
+                'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
                 'visualization_rate')
 
 SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({

@@ -1,0 +1,89 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Predicted intervals of a designed motion and of a sine sweep of the same length and limits.
+
+Run by hand; README.md beside this file says what is compared and how.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+import platform
+import sys
+import time
+
+from inverse_dynamics import Array, HERE, markdown, processor_name, write
+from stewart_dynamics import Parameters
+from stewart_dynamics.identification.design import Design, design, predicted_half_widths
+from stewart_dynamics.identification.design_options import DesignOptions
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+sys.path.insert(0, str(HERE.parent / 'test'))
+from sweeps import sweep  # noqa: E402, I100, I202
+
+BEGIN, END = '<!-- design: begin -->', '<!-- design: end -->'
+ROWS = ('platform.mass', 'platform.center_of_mass', 'platform.inertia',
+        'actuator.viscous_friction', 'actuator.coulomb_friction')
+
+
+def compared(designed: Design, half_widths: dict[str, Array]) -> list[str]:
+    """Return the table: the mean interval of each kind, and the least ratio of one parameter."""
+    names = designed.unknowns.names
+    rows: list[tuple[str, ...]] = [('half of the 95 % interval', 'unit', 'designed', *(
+        part for label in half_widths for part in (label, 'times wider', 'at least')))]
+    for kind in ROWS:
+        of_kind = [n for n, name in enumerate(names) if name.startswith(kind)]
+        mine = designed.half_widths[of_kind]
+        row = [f'`{kind}`', designed.unknowns.units[of_kind[0]], f'{mine.mean():.2g}']
+        for values in half_widths.values():
+            ratios = values[of_kind] / mine
+            row += [f'{values[of_kind].mean():.2g}', f'{ratios.mean():.1f}',
+                    f'{ratios.min():.1f}']
+        rows.append(tuple(row))
+    return markdown(rows)
+
+
+def main() -> None:
+    """Design, compare and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument('--params', type=Path, default=HERE.parent / 'config' / 'platform.yaml')
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--generations', type=int, default=DesignOptions().generations)
+    parser.add_argument('--write', action='store_true', help='put the table into README.md')
+    options = parser.parse_args()
+    parameters = Parameters.from_yaml(options.params)
+    asked = DesignOptions(seed=options.seed, generations=options.generations)
+    begin = time.monotonic()
+    designed = design(parameters, asked)
+    took = time.monotonic() - begin
+    platform_ = StewartPlatform(parameters)
+    half_widths = {label: predicted_half_widths(
+        platform_, designed.unknowns, sweep(platform_, asked, together), asked.duration, asked)
+        for label, together in (('sweeps in turn', False), ('sweeps at once', True))}
+    lines = ['', *compared(designed, half_widths), '', (
+        f'{asked.duration:.0f} s up to {asked.frequency:g} Hz, efforts at {asked.rate:g} Hz with '
+        f'white noise of {asked.noise:g} N. Designed in {took:.0f} s, seed {asked.seed}.'), '', (
+        f'{processor_name()}, {len(os.sched_getaffinity(0))} cores. Python '
+        f'{platform.python_version()}.'), '']
+    print('\n'.join(lines))
+    if options.write:
+        write(lines, BEGIN, END)
+
+
+if __name__ == '__main__':
+    main()

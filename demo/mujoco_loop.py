@@ -1,0 +1,89 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Run the controller of ``make demo-loop`` with MuJoCo in place of the simulator, and compare both.
+
+``make demo-mujoco`` runs it: reference motion, node and examples/leg_controller.py over ROS 2
+topics, with stewart_simulator and with MuJoCo (mujoco_plant.py), each without and with the node's
+forces as feed-forward. The forces come from this package, the motion from a physics engine that
+does not know its equations.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import json
+from pathlib import Path
+import sys
+import time
+
+from closed_loop import BANDWIDTH, demonstration, progress_bar, ROOT, UNITS
+from loop import Loop, Run, summary
+import rclpy
+
+PHYSICS: dict[str, list[str | Path]] = {
+    'stewart_simulator': [], 'MuJoCo': [sys.executable, ROOT / 'demo' / 'mujoco_plant.py']}
+
+
+def table(runs: Sequence[Run]) -> str:
+    """Return the table of all runs: without and with feed-forward, both physics side by side."""
+    pairs = list(zip(runs[::2], runs[1::2], strict=True))
+    lines = ['tracking error        ' + ''.join(f'{name:^36}' for name in PHYSICS),
+             'RMS (peak)            ' + f'{"PD only":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
+    for name, unit in UNITS.items():
+        line = f'{name:12}{unit:>5}     '
+        for pd, forward in pairs:
+            line += ''.join(f'{each.errors.rms[name]:8.1f} {f"({each.errors.peak[name]:.0f})":>6}'
+                            for each in (pd, forward))
+            line += f'{pd.errors.rms[name] / forward.errors.rms[name]:5.0f}x'
+        lines.append(line)
+    return '\n'.join(lines)
+
+
+def main() -> None:
+    """Run the loop with both, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--seconds', type=float, default=10.0, help='duration of the motion [s]')
+    parser.add_argument('--bandwidth', type=float, default=BANDWIDTH,
+                        help='natural frequency of a leg under PD control [Hz]')
+    parser.add_argument('--output', type=Path, default=ROOT / 'looped',
+                        help='folder for mujoco.json')
+    options = parser.parse_args()
+    runs: list[Run] = []
+    with demonstration('demo-mujoco'):
+        loop = Loop(ROOT / 'config' / 'platform.yaml', ROOT / 'config' / 'trajectory_loop.yaml',
+                    options.seconds, options.bandwidth)
+        options.output.mkdir(parents=True, exist_ok=True)
+        rclpy.init()
+        begun = time.monotonic()
+        with progress_bar(4 * options.seconds) as progress:
+            for name, command in PHYSICS.items():
+                for feed_forward in (False, True):
+                    progress.set_description_str(
+                        f'{name}, {"PD + forces" if feed_forward else "PD only"}')
+                    before = len(runs) * options.seconds
+                    runs.append(loop.run(feed_forward, 1.0, lambda reached, before=before: (
+                        progress.update(before + min(reached * 1e-9, options.seconds)
+                                        - progress.n)), command))
+        print(f'\n{table(runs)}\n')
+        (options.output / 'mujoco.json').write_text(
+            json.dumps(summary(loop, runs) | {'physics': [*PHYSICS]}, indent=1) + '\n',
+            encoding='utf-8')
+        print(f'{time.monotonic() - begun:.0f} s; {options.output}: mujoco.json')
+
+
+if __name__ == '__main__':
+    main()

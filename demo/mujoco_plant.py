@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The node stewart_simulator with MuJoCo as its physics: topics, clock and parameters are the same.
+
+The model is the MJCF that stewart_describe writes. End stops are MuJoCo's, a base that moves and
+external wrenches are not simulated.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import mujoco
+import numpy as np
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.mjcf import mjcf
+from stewart_dynamics.mechanics.leg_joints import TreeJoints
+from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.nodes.run import run
+from stewart_dynamics.nodes.simulator_node import SimulatorNode
+from stewart_dynamics.runtime.plant import State
+from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+
+# Coordinates of the MJCF: three of each leg, then the platform's free joint.
+_LEGS, _POSITION, _QUATERNION = slice(2, 18, 3), slice(18, 21), slice(21, 25)
+_TWIST = slice(18, 24)
+
+
+class MuJoCoPlant:
+    """The hexapod in MuJoCo, with the calls of ``stewart_dynamics.runtime.plant.Plant``."""
+
+    def __init__(self, parameters: SimulatorParameters) -> None:
+        self.parameters = parameters
+        self.fault = ''
+        self._model = mujoco.MjModel.from_xml_string(mjcf(Hexapod(parameters), 'hexapod'))
+        self._data = mujoco.MjData(self._model)
+        self.steps = max(1, round(1.0 / (parameters['rate'] * self._model.opt.timestep)))
+        self._model.opt.timestep = 1.0 / (parameters['rate'] * self.steps)
+        self._zero_length = parameters['geometry.zero_length']
+        pose = parameters['initial_pose']
+        rotation = from_euler(pose[3:])
+        qpos = self._data.qpos
+        qpos[:18] = TreeJoints(parameters).positions(pose[:3], rotation)[6:]
+        qpos[_POSITION] = pose[:3]
+        qpos[_QUATERNION] = np.roll(to_quaternion(rotation), 1)
+        mujoco.mj_forward(self._model, self._data)
+        self.state = self._now()._replace(acceleration=NO_WRENCH, forces=NO_WRENCH)
+
+    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> State:
+        """Return the state one period later, under the commands [N]."""
+        self._data.ctrl[:] = commands
+        mujoco.mj_step(self._model, self._data, self.steps)
+        if not np.isfinite(self._data.qpos).all():
+            self.fault = 'MuJoCo has lost the hexapod: a coordinate is not finite'
+            return self.state
+        self.state = self._now()
+        return self.state
+
+    def brake(self) -> State:
+        """Return the state at rest in the present pose."""
+        self._data.qvel[:] = 0.0
+        self.state = self._now()._replace(acceleration=NO_WRENCH)
+        return self.state
+
+    def measured(self) -> State:
+        """Return the present state; there is no noise."""
+        return self.state
+
+    def _now(self) -> State:
+        qpos, qvel, qacc = self._data.qpos, self._data.qvel, self._data.qacc
+        w, x, y, z = qpos[_QUATERNION].tolist()
+        # A free joint turns in axes of its body.
+        turn = np.reshape(from_quaternion(x, y, z, w), (3, 3))
+
+        def in_base_axes(rates: Array) -> Any:
+            linear, angular = rates[_TWIST][:3], turn @ rates[_TWIST][3:]
+            return (*linear.tolist(), *angular.tolist())
+
+        lengths: Any = tuple((qpos[_LEGS] + self._zero_length).tolist())
+        rates: Any = tuple(qvel[_LEGS].tolist())
+        forces: Any = tuple(self._data.actuator_force.tolist())
+        return State(lengths, rates, forces, (*qpos[_POSITION].tolist(), x, y, z, w),
+                     in_base_axes(qvel), in_base_axes(qacc))
+
+
+class MuJoCoNode(SimulatorNode):
+    """The simulator, another physics in it."""
+
+    plant = MuJoCoPlant
+
+
+if __name__ == '__main__':
+    sys.exit(run(MuJoCoNode, SimulatorParameters))

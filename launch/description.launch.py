@@ -1,0 +1,72 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Start the node and show the hexapod as a model: robot_state_publisher, RViz with RobotModel.
+
+    ros2 launch stewart_dynamics description.launch.py params_file:=my_hexapod.yaml
+
+The robot description is the URDF that stewart_describe writes; the node gives the positions of all
+its joints on joint_states. It needs robot_state_publisher and rviz2.
+"""
+
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.urdf import urdf
+from stewart_dynamics.parameters import Parameters
+
+JOINT_STATES = '/stewart_dynamics/joint_states'
+
+
+def nodes(context: LaunchContext) -> list[Node]:
+    """Return the three programs, once the file of the hexapod is there and sound."""
+    file = LaunchConfiguration('params_file').perform(context)
+    if not Path(file).is_file():
+        raise RuntimeError(f'params_file: {file}: no such file')
+    description = urdf(Hexapod(Parameters.from_yaml(file)), Path(file).stem)
+    return [
+        Node(package='stewart_dynamics', executable='stewart_dynamics', name='stewart_dynamics',
+             parameters=[file], output='screen'),
+        # It publishes the transform to the platform as well: publish_tf of the node stays false.
+        Node(package='robot_state_publisher', executable='robot_state_publisher',
+             parameters=[{'robot_description': ParameterValue(description, value_type=str)}],
+             remappings=[('joint_states', JOINT_STATES)], output='screen'),
+        Node(package='rviz2', executable='rviz2',
+             arguments=['-d', LaunchConfiguration('rviz_file')],
+             condition=IfCondition(LaunchConfiguration('rviz')), output='screen')]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the programs and the arguments."""
+    config = PathJoinSubstitution([FindPackageShare('stewart_dynamics'), 'config'])
+    return LaunchDescription([
+        DeclareLaunchArgument(
+            'params_file', default_value=PathJoinSubstitution([config, 'platform.yaml']),
+            description='YAML file with the parameters of the hexapod'),
+        DeclareLaunchArgument('rviz', default_value='true', choices=['true', 'false'],
+                              description='show it in RViz'),
+        DeclareLaunchArgument(
+            'rviz_file', default_value=PathJoinSubstitution([config, 'description.rviz']),
+            description='configuration of RViz; its fixed frame is base_frame'),
+        OpaqueFunction(function=nodes),
+    ])

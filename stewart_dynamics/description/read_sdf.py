@@ -1,0 +1,173 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""SDFormat as a mechanism: poses relative to each other, axes by the rules of each version."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.mechanism import (
+    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE,
+    UNIVERSAL, WORLD)
+from stewart_dynamics.description.read_urdf import numbers_of, unit
+from stewart_dynamics.description.xml_text import CARRIED
+from stewart_dynamics.mechanics.rotation import from_euler
+
+_KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
+          'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}
+_MODEL = '__model__'
+# Before this version axes are in the frame of the model, not of the joint.
+_JOINT_AXES = (1, 5)
+_UNLIMITED = 1e15  # SDFormat's own value is 1e16
+_DEFAULT_MASS = 1.0  # [kg], of a link without one
+
+
+def read_sdf(root: ET.Element, source: Path) -> Mechanism:
+    """Return the mechanism of the model with most prismatic joints."""
+    models = [*root.iter('model')]
+    if not models:
+        raise DescriptionError(f'{source}: no model')
+    model = max(models, key=lambda each: sum(
+        joint.get('type') == 'prismatic' for joint in each.findall('joint')))
+    reader = _Model(model, _version(root), source)
+    joints = [made for joint in model.findall('joint') for made in [reader.joint(joint)] if made]
+    mechanism = Mechanism(
+        str(source), model.get('name', source.stem),
+        {link.get('name', ''): reader.part(link) for link in model.findall('link')}, joints)
+    if model.find('include') is not None or model.find('model') is not None:
+        mechanism.remarks.append('nested and included models are not read')
+    gravity = root.find('world/gravity')
+    if gravity is not None:
+        mechanism.gravity = numbers_of(gravity.text, 3, source, 'gravity')
+    for each in model:
+        if each.tag.endswith('}parameter') or each.tag == f'{CARRIED}:parameter':
+            mechanism.carried[each.get('name', '')] = each.get('value', '')
+    return mechanism
+
+
+def _version(root: ET.Element) -> tuple[int, ...]:
+    try:
+        return tuple(int(each) for each in (root.get('version') or '1.9').split('.'))
+    except ValueError:
+        return 1, 9
+
+
+class _Model:
+    """The frames of a model."""
+
+    def __init__(self, model: ET.Element, version: tuple[int, ...], source: Path) -> None:
+        self._version, self._source = version, source
+        self._elements = {each.get('name', ''): each for tag in ('link', 'joint', 'frame')
+                          for each in model.findall(tag)}
+        self._links = {link.get('name', '') for link in model.findall('link')}
+        self._placements: dict[str, Placement] = {}
+        self._under_way: set[str] = set()
+        self._model = HERE
+        self._model = self._own(model)
+
+    def place(self, name: str) -> Placement:
+        """Return where a link, joint or frame is."""
+        if name in ('', _MODEL, WORLD):
+            return self._model if name != WORLD else HERE
+        if name not in self._placements:
+            if name not in self._elements or name in self._under_way:
+                raise DescriptionError(f'{self._source}: no frame {name!r}, or relative to itself')
+            self._under_way.add(name)
+            element = self._elements[name]
+            pose = element.find('pose')
+            default = self._text(element, 'child') if element.tag == 'joint' else element.get(
+                'attached_to', '') if element.tag == 'frame' else ''
+            relative = default if pose is None else pose.get('relative_to') or pose.get(
+                'frame') or default
+            self._placements[name] = self.place(relative).of(self._own(element))
+            self._under_way.discard(name)
+        return self._placements[name]
+
+    def part(self, link: ET.Element) -> Part:
+        """Return a link as a body."""
+        name, inertial = link.get('name', ''), link.find('inertial')
+        if inertial is None:
+            return Part(name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), note=(
+                f'{name}: no mass: {_DEFAULT_MASS:g} kg, as SDFormat has it'))
+        own = self._own(inertial)
+        tensor = np.eye(3)
+        for key, (i, j) in {'ixx': (0, 0), 'ixy': (0, 1), 'ixz': (0, 2), 'iyy': (1, 1),
+                            'iyz': (1, 2), 'izz': (2, 2)}.items():
+            text = inertial.findtext(f'inertia/{key}')
+            if text is not None:
+                tensor[i, j] = tensor[j, i] = numbers_of(
+                    text, 1, self._source, f'{name}: {key}')[0]
+        r = own.rotation
+        text = inertial.findtext('mass')
+        return Part(name, self.place(name), _DEFAULT_MASS if text is None else float(
+            numbers_of(text, 1, self._source, f'{name}: mass')[0]), own.position,
+            tensor if np.array_equal(r, np.eye(3)) else r @ tensor @ r.T)
+
+    def joint(self, joint: ET.Element) -> Joint | None:
+        """Return a joint."""
+        name = joint.get('name', '')
+        parent, child = self._text(joint, 'parent'), self._text(joint, 'child')
+        for end in (parent, child):
+            if end not in self._links | {WORLD}:
+                raise DescriptionError(f'{self._source}: joint {name!r}: no link {end!r}')
+        made = Joint(name, _KINDS.get(joint.get('type', ''), OTHER), parent, child,
+                     self.place(name).position)
+        made.axes = [self._axis(joint, axis) for axis in (
+            joint.find('axis'), joint.find('axis2')) if axis is not None]
+        axis = joint.find('axis')
+        if made.kind == SLIDE and axis is not None:
+            for field, path in (('lower', 'limit/lower'), ('upper', 'limit/upper'),
+                                ('velocity_max', 'limit/velocity'), ('force_max', 'limit/effort'),
+                                ('damping', 'dynamics/damping'),
+                                ('friction', 'dynamics/friction')):
+                text = axis.findtext(path)
+                if text is not None:
+                    value = float(numbers_of(text, 1, self._source, f'{name}: {path}')[0])
+                    if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
+                        setattr(made, field, value)
+        return made
+
+    def _axis(self, joint: ET.Element, axis: ET.Element) -> Array:
+        name, xyz = joint.get('name', ''), axis.find('xyz')
+        along = numbers_of('0 0 1' if xyz is None else xyz.text, 3, self._source,
+                           f'axis of joint {name!r}')
+        frame = name
+        if self._version < _JOINT_AXES or axis.findtext(
+                'use_parent_model_frame', '').strip() in ('1', 'true'):
+            frame = _MODEL
+        elif xyz is not None:
+            frame = xyz.get('expressed_in') or name
+        return self.place(frame).rotation @ unit(along, self._source, f'axis of joint {name!r}')
+
+    def _own(self, element: ET.Element) -> Placement:
+        pose = element.find('pose')
+        what = f'pose of {element.tag} {element.get("name", "")!r}'
+        if pose is None or not (pose.text or '').strip():
+            return HERE
+        angles = np.pi / 180.0 if pose.get('degrees') in ('1', 'true') else 1.0
+        values = numbers_of(pose.text, 6, self._source, what)
+        return Placement(from_euler(angles * values[3:]), values[:3])
+
+    def _text(self, element: ET.Element, tag: str) -> str:
+        text = (element.findtext(tag) or '').strip()
+        if not text:
+            raise DescriptionError(
+                f'{self._source}: joint {element.get("name", "")!r}: no {tag}')
+        return text

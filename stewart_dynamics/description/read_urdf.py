@@ -1,0 +1,180 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""URDF as a mechanism; elements ``joint`` in a block ``gazebo`` close loops, as in Gazebo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.mechanism import (
+    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE,
+    UNIVERSAL)
+from stewart_dynamics.description.xml_text import CARRIED
+from stewart_dynamics.mechanics.rotation import from_euler
+
+_KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
+          'universal': UNIVERSAL, 'ball': BALL, 'spherical': BALL, 'revolute2': UNIVERSAL}
+
+
+def read_urdf(root: ET.Element, source: Path) -> Mechanism:
+    """Return the mechanism of a URDF; DescriptionError where it is not one."""
+    links = {link.get('name', ''): link for link in root.findall('link')}
+    found = [joint for joint in root.findall('joint') if joint.find('child') is not None]
+    of_child = {_end(joint, 'child', source): joint for joint in found}
+    placements: dict[str, Placement] = {}
+    for name in links:
+        _place(name, of_child, placements, source)
+    mechanism = Mechanism(
+        str(source), root.get('name', source.stem),
+        {name: _part(name, link, placements[name], source) for name, link in links.items()},
+        [_joint(joint, placements, source) for joint in found])
+    for joint in root.findall('gazebo/joint'):
+        mechanism.joints.append(_closing(joint, placements, source))
+    block = root.find(CARRIED)
+    if block is not None:
+        mechanism.carried = {each.get('name', ''): each.get('value', '')
+                             for each in block.findall('parameter')}
+        for loop in block.findall('loop'):
+            tip, ball = loop.get('tip', ''), loop.get('platform', '')
+            if not {tip, ball} <= set(links):
+                raise DescriptionError(f'{source}: loop: no link {tip!r} or {ball!r}')
+            mechanism.joints.append(Joint(
+                ball, BALL, tip, ball, placements[tip].position,
+                child_anchor=placements[ball].position))
+    return mechanism
+
+
+def numbers_of(text: str | None, count: int, source: Path, what: str) -> Array:
+    """Return so many numbers of a text, or zeros where there is none."""
+    if text is None:
+        return np.zeros(count)
+    try:
+        values = np.array([float(each) for each in text.split()])
+    except ValueError as exc:
+        raise DescriptionError(f'{source}: {what}: {text!r}: must be numbers') from exc
+    if len(values) != count or not np.isfinite(values).all():
+        raise DescriptionError(f'{source}: {what}: {text!r}: must be {count} finite numbers')
+    return values
+
+
+def unit(axis: Array, source: Path, what: str) -> Array:
+    """Return a vector of length 1."""
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise DescriptionError(f'{source}: {what}: the axis is zero')
+    return axis / length
+
+
+def _place(name: str, of_child: dict[str, ET.Element], placements: dict[str, Placement],
+           source: Path) -> None:
+    """Place a link and all links that carry it."""
+    chain = []
+    while name not in placements and name in of_child:
+        if name in chain:
+            raise DescriptionError(f'{source}: link {name!r} carries itself')
+        chain.append(name)
+        name = _end(of_child[name], 'parent', source)
+    at = placements.setdefault(name, HERE)
+    for each in reversed(chain):
+        at = at.of(_origin(of_child[each], source))
+        placements[each] = at
+
+
+def _end(joint: ET.Element, side: str, source: Path) -> str:
+    end = joint.find(side)
+    name = None if end is None else end.get('link') or (end.text or '').strip()
+    if not name:
+        raise DescriptionError(f'{source}: joint {joint.get("name")!r}: no {side}')
+    return name
+
+
+def _origin(element: ET.Element, source: Path) -> Placement:
+    origin = element.find('origin')
+    if origin is None:
+        return HERE
+    what = f'origin of {element.tag} {element.get("name", "")!r}'
+    return Placement(from_euler(numbers_of(origin.get('rpy'), 3, source, what)),
+                     numbers_of(origin.get('xyz'), 3, source, what))
+
+
+def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Part:
+    inertial = link.find('inertial')
+    if inertial is None:
+        return Part(name, placement)
+    what = f'inertial of link {name!r}'
+    origin = _origin(inertial, source)
+    mass, given = inertial.find('mass'), inertial.find('inertia')
+    tensor = np.zeros((3, 3))
+    if given is not None:
+        for key, (i, j) in {'ixx': (0, 0), 'ixy': (0, 1), 'ixz': (0, 2), 'iyy': (1, 1),
+                            'iyz': (1, 2), 'izz': (2, 2)}.items():
+            tensor[i, j] = tensor[j, i] = numbers_of(given.get(key, '0'), 1, source, what)[0]
+    r = origin.rotation
+    return Part(name, placement,
+                None if mass is None else float(numbers_of(mass.get('value'), 1, source, what)[0]),
+                origin.position, tensor if np.array_equal(r, np.eye(3)) else r @ tensor @ r.T)
+
+
+def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
+    name = joint.get('name', '')
+    child = _end(joint, 'child', source)
+    kind = _KINDS.get(joint.get('type', ''), OTHER)
+    at = placements[child] if child in placements else HERE
+    made = Joint(name, kind, _end(joint, 'parent', source), child, at.position)
+    for end in (made.parent, child):
+        if end not in placements:
+            raise DescriptionError(f'{source}: joint {name!r}: no link {end!r}')
+    if kind in (HINGE, SLIDE):
+        axis = joint.find('axis')
+        along = numbers_of('1 0 0' if axis is None else axis.get('xyz'), 3, source,
+                           f'axis of joint {name!r}')
+        made.axes = [at.rotation @ unit(along, source, f'axis of joint {name!r}')]
+    limit, dynamics = joint.find('limit'), joint.find('dynamics')
+    if limit is not None:
+        made.lower, made.upper, made.velocity_max, made.force_max = (
+            _optional(limit, key, source) for key in ('lower', 'upper', 'velocity', 'effort'))
+    if dynamics is not None:
+        made.damping = _optional(dynamics, 'damping', source) or 0.0
+        made.friction = _optional(dynamics, 'friction', source) or 0.0
+    return made
+
+
+def _optional(element: ET.Element, key: str, source: Path) -> float | None:
+    text = element.get(key)
+    if text is None:
+        return None
+    return float(numbers_of(text, 1, source, f'{key} of {element.tag}')[0])
+
+
+def _closing(joint: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
+    """Return a joint in SDFormat within URDF: its pose is in the frame of its child."""
+    name, parent, child = (joint.get('name', ''), _end(joint, 'parent', source),
+                           _end(joint, 'child', source))
+    for end in (parent, child):
+        if end not in placements:
+            raise DescriptionError(f'{source}: joint {name!r}: no link {end!r}')
+    pose = numbers_of(joint.findtext('pose'), 6, source, f'pose of joint {name!r}')
+    at = placements[child].of(Placement(from_euler(pose[3:]), pose[:3]))
+    kind = _KINDS.get(joint.get('type', ''), OTHER)
+    axes = [at.rotation @ numbers_of(each.findtext('xyz'), 3, source, f'axis of {name!r}')
+            for each in (joint.find('axis'), joint.find('axis2')) if each is not None]
+    if kind == HINGE and not axes:
+        axes = [at.rotation[:, 2]]
+    return Joint(name, kind, parent, child, at.position, axes)

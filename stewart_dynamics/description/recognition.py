@@ -1,0 +1,292 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The parameters of the hexapod in a mechanism, and in one line each what had to be assumed.
+
+A leg is made of two slender bodies here: all bodies on one side of its slide become one, its
+center of mass and its inertia are taken along the line between the joints.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.description.mechanism import (
+    BALL, DescriptionError, HERE, HINGE, Mechanism, Part, Placement, UNIVERSAL)
+from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
+from stewart_dynamics.description.xml_text import NOT_CHECKED
+from stewart_dynamics.parameters import PARAMETERS, Parameters, STANDARD_GRAVITY
+
+# In terms of the length of a leg, or [rad]; what is smaller is rounding.
+_SMALL = 1e-6
+_INCLINED = 1e-3
+_OFF_AXIS = 1e-3
+_UNEQUAL = 0.01
+_THICK = 0.05
+_LIMITS = ('length_min', 'length_max', 'velocity_max', 'force_max')
+
+
+class Recognized(NamedTuple):
+    """The hexapod of a file."""
+
+    parameters: Parameters
+    remarks: tuple[str, ...]
+    """What was assumed or not found, one line each."""
+
+
+class _Body(NamedTuple):
+    """Several bodies as one, in world axes."""
+
+    mass: float
+    center: Array
+    inertia: Array
+
+
+def recognized(mechanism: Mechanism) -> Recognized:
+    """
+    Return the parameters of the hexapod in a mechanism.
+
+    Raises
+    ------
+    DescriptionError
+        There is no hexapod in it.
+    ParameterError
+        Its numbers break a rule of the parameters.
+
+    """
+    found = topology_of(mechanism)
+    remarks = list(mechanism.remarks)
+    legs, of_legs = [], []
+    for chain in found.chains:
+        said: list[str] = []
+        legs.append(_leg(chain, found, said))
+        of_legs.append(said)
+    names = [leg['joints'] for leg in legs]
+    remarks += [part.note for parts in (
+        found.platform_parts, *(chain.lower + chain.upper for chain in found.chains))
+        for part in parts if part.note]
+    remarks += _grouped(names, of_legs)
+    values: dict[str, Any] = {
+        'base_frame': found.base.name, 'platform_frame': found.platform.name,
+        'joints': names}
+    for key in legs[0]:
+        if key != 'joints':
+            values[key] = np.array([leg[key] for leg in legs]).ravel() if all(
+                leg[key] is not None for leg in legs) else None
+    values |= _platform(found, remarks)
+    values |= _gravity(mechanism, found, remarks)
+    given = {name: value for name, value in (values | _carried(mechanism)).items()
+             if value is not None}
+    remarks += _missing(given, mechanism)
+    return Recognized(Parameters(given, mechanism.source), tuple(dict.fromkeys(remarks)))
+
+
+def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
+    """Return what a leg gives the parameters."""
+    at, base = chain.slide, found.base.placement
+    slide, out = chain.steps[at].joint, chain.steps[at].from_parent
+    lower, upper = chain.steps[:at], chain.steps[at + 1:]
+    if not lower or not upper:
+        raise DescriptionError(
+            f'{slide.name}: no joint between it and the {"platform" if lower else "base"}: legs '
+            'whose length does not change are not those of this model')
+    root = _center(lower, 'base', said)
+    tip = _center(upper, 'platform', said)
+    on_platform = tip if len(upper) > 1 or upper[0].joint.child_anchor is None else upper[-1].far
+    gap = float(np.linalg.norm(tip - on_platform))
+    length = float(np.linalg.norm(tip - root))
+    axis = slide.axes[0]
+    along = axis if axis @ (tip - root) >= 0.0 and (out or length > 0.0) else -axis
+    closed = gap <= _SMALL * max(length, np.finfo(float).tiny)
+    if length > 0.0:
+        line = (tip - root) / length
+        angle = math.acos(min(1.0, float(abs(line @ axis))))
+        if angle > _INCLINED:
+            said.append('the axis of its prismatic joint is inclined to the line between the '
+                        f'joints by {math.degrees(angle):.3g} degrees: taken along the line')
+        along = line if angle > _SMALL else along
+    if not closed and not chain.steps[-1].joint.name.startswith(slide.name):
+        said.append(f'its end is {gap:.3g} m from its joint on the platform at the positions of '
+                    'the file: the loop is open')
+    grows = float(np.sign((axis if out else -axis) @ along))
+    if grows < 0.0:
+        said.append('its prismatic joint is positive while it retracts: the sign is turned')
+    zero = length - grows * slide.position
+    ends = [None if q is None else zero + grows * q for q in (slide.lower, slide.upper)]
+    if grows < 0.0:
+        ends.reverse()
+    low, high = (-math.inf if slide.lower is None else slide.lower,
+                 math.inf if slide.upper is None else slide.upper)
+    if not low - _SMALL * length <= slide.position <= high + _SMALL * length:
+        said.append(f'its position in the file, {slide.position:.4g} m, is outside its limits, '
+                    f'{low:.4g} to {high:.4g} m')
+    leg: dict[str, Any] = {
+        'joints': slide.name, 'geometry.base_joints': base.inside(root),
+        'geometry.platform_joints': found.platform.placement.inside(on_platform),
+        'geometry.zero_length': max(zero, 0.0),
+        'actuator.reflected_mass': slide.armature, 'actuator.viscous_friction': slide.damping,
+        'actuator.coulomb_friction': slide.friction}
+    for name, value in zip(_LIMITS, [*ends, slide.velocity_max, slide.force_max], strict=True):
+        least = 0.0 if name == 'length_min' else np.finfo(float).tiny
+        if value is not None and value < least:
+            said.append(f'limits.{name}: {value:.3g}: cannot be: left out')
+            value = None
+        leg[f'limits.{name}'] = value
+    for part, bodies, start, way in (('cylinder', chain.lower, root, along),
+                                     ('piston', chain.upper, tip, -along)):
+        leg |= _slender(part, bodies, start, way, length, said)
+    return leg
+
+
+def _center(steps: list[Step], where: str, said: list[str]) -> Array:
+    """Return the point about which joints turn, on the side of the leg [m]."""
+    points = [step.far if where == 'base' else step.near for step in steps]
+    full = [point for point, step in zip(points, steps, strict=True)
+            if step.joint.kind in (BALL, UNIVERSAL)]
+    if full:
+        apart = max(float(np.linalg.norm(point - full[0])) for point in full)
+        if apart > 0.0:
+            said.append(f'its joints at the {where} are {apart:.3g} m apart: the first is taken')
+        return full[0]
+    lines = [(point, step.joint.axes[0]) for point, step in zip(points, steps, strict=True)
+             if step.joint.kind == HINGE]
+    if len(lines) < 2:
+        said.append(f'its joint at the {where} turns about one axis: taken as one that turns '
+                    'about all')
+        return points[0]
+    if all(np.array_equal(point, lines[0][0]) for point, _ in lines):
+        return lines[0][0]
+    across = [np.eye(3) - np.outer(axis, axis) for _, axis in lines]
+    matrix = np.sum(across, axis=0)
+    if np.linalg.cond(matrix) > 1.0 / _SMALL:
+        said.append(f'the axes of its joints at the {where} are parallel: their middle is taken')
+        return np.asarray(np.mean([point for point, _ in lines], axis=0))
+    center = np.linalg.solve(matrix, np.sum(
+        [a @ point for a, (point, _) in zip(across, lines, strict=True)], axis=0))
+    missed = max(float(np.linalg.norm(a @ (center - point)))
+                 for a, (point, _) in zip(across, lines, strict=True))
+    if missed > _SMALL:
+        said.append(f'the axes of its joints at the {where} miss each other by '
+                    f'{2.0 * missed:.3g} m: their middle is taken')
+    return center
+
+
+def _slender(part: str, bodies: list[Part], start: Array, way: Array, length: float,
+             said: list[str]) -> dict[str, Any]:
+    """Return mass, center and transverse inertia of a leg's bodies along its line."""
+    body = _together(bodies, HERE)
+    name = f'legs.{part}'
+    if not any(each.mass for each in bodies):
+        said.append(f'no mass of its {part}: {name}.mass is 0.0')
+    arm = body.center - start
+    center = float(arm @ way) if body.mass else 0.0
+    off = float(np.linalg.norm(arm - center * way)) if body.mass else 0.0
+    if off > _OFF_AXIS * max(length, abs(center)):
+        said.append(f'the center of mass of its {part} is {off:.3g} m off the line between the '
+                    'joints: taken on the line')
+    axial = float(way @ body.inertia @ way)
+    across = np.eye(3) - np.outer(way, way)
+    moments = np.linalg.eigvalsh(across @ body.inertia @ across)[1:]
+    transverse = 0.5 * (float(np.trace(body.inertia)) - axial)
+    if transverse > 0.0 and moments[1] - moments[0] > _UNEQUAL * moments[1]:
+        said.append(f'the two transverse moments of inertia of its {part} differ: their mean is '
+                    'taken')
+    if axial > _THICK * transverse:
+        said.append(f'inertia of its {part} about its axis, {axial:.3g} kg m^2, is left out')
+    return {f'{name}.mass': body.mass, f'{name}.center_of_mass': center,
+            f'{name}.inertia': max(transverse, 0.0)}
+
+
+def _together(parts: Iterable[Part], frame: Placement) -> _Body:
+    """Return several bodies as one, in a frame."""
+    heavy = [part for part in parts if part.mass]
+    if not heavy:
+        return _Body(0.0, np.zeros(3), np.zeros((3, 3)))
+    if len(heavy) == 1 and heavy[0].placement is frame:
+        return _Body(heavy[0].mass or 0.0, heavy[0].center, heavy[0].inertia)
+    masses = np.array([part.mass for part in heavy])
+    centers = np.array([frame.inside(part.placement.point(part.center)) for part in heavy])
+    center = masses @ centers / masses.sum()
+    inertia = np.zeros((3, 3))
+    for part, mass, at in zip(heavy, masses, centers, strict=True):
+        turn, arm = frame.rotation.T @ part.placement.rotation, at - center
+        inertia += turn @ part.inertia @ turn.T + mass * (arm @ arm * np.eye(3)
+                                                          - np.outer(arm, arm))
+    return _Body(float(masses.sum()), center, inertia)
+
+
+def _platform(found: Topology, remarks: list[str]) -> dict[str, Any]:
+    body = _together(found.platform_parts, found.platform.placement)
+    if not body.mass:
+        raise DescriptionError(f'{found.platform.name}: the platform has no mass')
+    several = sum(bool(part.mass) for part in found.platform_parts)
+    if several > 1:
+        remarks.append(f'platform: {several} bodies that are fixed to each other are one here')
+    return {'platform.mass': body.mass, 'platform.center_of_mass': body.center,
+            'platform.inertia': body.inertia[np.triu_indices(3)]}
+
+
+def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[str, Any]:
+    gravity = mechanism.gravity
+    if gravity is None:
+        gravity = np.array(STANDARD_GRAVITY)
+        if 'gravity' not in mechanism.carried:
+            remarks.append("gravity: not in the file: 9.80665 m/s^2 along the world's -z")
+    turn = found.base.placement.rotation
+    return {'gravity': gravity if np.array_equal(turn, np.eye(3)) else turn.T @ gravity}
+
+
+def _carried(mechanism: Mechanism) -> dict[str, Any]:
+    """Return the parameters that stewart_describe has added to the format."""
+    values: dict[str, Any] = {}
+    for name, text in mechanism.carried.items():
+        if name not in PARAMETERS:
+            continue
+        if PARAMETERS[name].kind != 'double':
+            values[name] = text
+            continue
+        try:
+            numbers = [float(each) for each in text.split()] if text != NOT_CHECKED else None
+        except ValueError as exc:
+            raise DescriptionError(f'{mechanism.source}: {name}: {text!r}: must be numbers'
+                                   ) from exc
+        values[name] = numbers
+    return values
+
+
+def _missing(given: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
+    """Return what the file does not have, one line each."""
+    said = [f'limits.{name}: not in the file: not checked' for name in _LIMITS
+            if f'limits.{name}' not in {**given, **mechanism.carried}]
+    if not (mechanism.carried or np.any(given['actuator.reflected_mass'])):
+        said.append('actuator.reflected_mass: not in the file: 0 kg')
+    return said
+
+
+def _grouped(names: list[str], of_legs: list[list[str]]) -> list[str]:
+    """Return remarks on legs, those that are the same of all legs once."""
+    counts = Counter(remark for said in of_legs for remark in dict.fromkeys(said))
+    lines = []
+    for name, said in zip(names, of_legs, strict=True):
+        for remark in dict.fromkeys(said):
+            lines.append(f'{"each leg" if counts[remark] == len(names) else name}: {remark}')
+    return lines

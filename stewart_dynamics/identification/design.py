@@ -1,0 +1,274 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A motion that makes the intervals of an identification small, within the limits of the hexapod.
+
+A Fourier series of all six coordinates about home (``mechanics.reference_motion``), whose
+coefficients minimize the sum of the squared standard errors of what is asked for, each by the
+change that would matter (A-optimal; J. Swevers et al., "Optimal robot excitation and
+identification", IEEE Trans. Robotics and Automation 13, 1997, doi:10.1109/70.631234). Every set of
+coefficients is taken as large as the limits allow, so that only their proportions are sought:
+with an evolution strategy that adapts the spread of each of them (R. Ros, N. Hansen, "A simple
+modification in CMA-ES achieving linear time and space complexity", PPSN X, 2008,
+doi:10.1007/978-3-540-87700-4_30), from the seed alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification.design_limits import DesignLimits
+from stewart_dynamics.identification.design_options import DesignOptions
+from stewart_dynamics.identification.intervals import TWO_SIDED
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters import Parameters
+
+# Samples in a period of the highest harmonic, and in each of the final check.
+_SAMPLES, _FINE_SAMPLES = 20, 100
+# A little of a parameter that a motion does not tell at all: its standard error, by its scale.
+_NOT_TOLD = 100.0
+# Scalings of a motion to its limits, before it is judged and at the end.
+_SCALINGS, _LAST_SCALINGS = 2, 30
+_CLOSE = 1e-3
+# Digits of coefficients in a file [m, rad].
+_DIGITS = 7
+
+
+class Design(NamedTuple):
+    """
+    A designed motion.
+
+    Attributes
+    ----------
+    trajectory : ReferenceMotionParameters
+        For stewart_trajectory.
+    unknowns : Unknowns
+        What it is to tell.
+    half_widths : (k,)
+        Predicted 95 % intervals of the unknowns, for white noise in the efforts.
+    use : dict of str to float
+        Part of each limit that it uses.
+
+    """
+
+    trajectory: ReferenceMotionParameters
+    unknowns: Unknowns
+    half_widths: Array
+    use: dict[str, float]
+
+
+def design(parameters: Parameters, options: DesignOptions,
+           progress: Callable[[int], object] = lambda done: None) -> Design:
+    """
+    Return a motion that tells what is asked for, and its predicted intervals.
+
+    The same parameters, options and seed give the same motion.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod as far as they are known; its limits.
+    options : DesignOptions
+        What is asked for, and how the motion is to be.
+    progress : callable
+        Called with the number of generations done.
+
+    Raises
+    ------
+    ParameterError
+        A limit is missing, or home is not within the limits.
+    StewartError
+        No motion tells all that is asked for.
+
+    """
+    search = _Search(parameters, options)
+    best = _evolution(search.costs, search.size, options, progress)
+    trajectory = search.trajectory(best)
+    motion = motion_at(trajectory, fine_times(options))
+    half_widths = predicted_half_widths(
+        search.platform, search.unknowns, motion, options.duration, options)
+    unknown = [name for name, half, scale in zip(
+        search.unknowns.names, half_widths, search.unknowns.scales, strict=True)
+        if not half < _NOT_TOLD * scale]
+    if unknown:
+        raise StewartError(f'no motion within the limits tells all of {", ".join(options.kinds)}: '
+                           f'{unknown[0]} is not identifiable; ask for less with --identify')
+    return Design(trajectory, search.unknowns, half_widths, search.limits.use(motion))
+
+
+def fine_times(options: DesignOptions) -> Array:
+    """Return the times of the final check [s]: all of the motion."""
+    many = math.ceil(options.duration * options.frequency * _FINE_SAMPLES)
+    return np.arange(many + 1, dtype=np.float64) * (options.duration / many)
+
+
+def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion: Motion,
+                          seconds: float, options: DesignOptions) -> Array:
+    """
+    Return the half widths (k,) of the 95 % intervals that a motion of so many seconds gives.
+
+    For efforts with white noise alone; nan where the motion tells nothing of a parameter.
+    """
+    columns = columns_of(platform, unknowns, motion.rows.reshape(-1, 24))
+    per_sample = columns.reshape(-1, columns.shape[-1])
+    information = per_sample.T @ per_sample * (
+        seconds * options.rate / len(columns) / options.noise ** 2)
+    scaled = unknowns.scales[:, None] * information * unknowns.scales
+    values, vectors = np.linalg.eigh(scaled)
+    least = max(_NOT_TOLD ** -2, 1e-13 * float(values[-1]))
+    variances = (vectors ** 2) @ (1.0 / np.maximum(values, least))
+    errors: Array = np.sqrt(variances)
+    return TWO_SIDED * unknowns.scales * errors
+
+
+def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
+    """Return how efforts (N, 6) change with the unknowns, (N, 6, k), of rows of motion."""
+    matrices: Array = platform.regressors(rows)[..., unknowns.linear] @ unknowns.derivative(
+        unknowns.start)
+    return matrices
+
+
+class _Search:
+    """The cost of proportions of coefficients."""
+
+    def __init__(self, parameters: Parameters, options: DesignOptions) -> None:
+        self._options = options
+        self.unknowns = Unknowns(parameters, options.kinds)
+        self.platform = StewartPlatform(parameters)
+        self.limits = DesignLimits(self.platform, options.amplitude, options.center)
+        many = options.harmonics
+        self.size = 2 * many * 6
+        self._base = options.frequency / many
+        turns = np.arange(_SAMPLES * many) / (_SAMPLES * many)
+        angle = 2.0 * np.pi * turns[:, None] * np.arange(1, many + 1)
+        omega = 2.0 * np.pi * self._base * np.arange(1, many + 1)
+        c, s = np.cos(angle), np.sin(angle)
+        # Of cosine and sine coefficients: position, velocity, acceleration of each sample.
+        self._bases = (np.hstack([c, s]), np.hstack([-omega * s, omega * c]),
+                       np.hstack([-omega ** 2 * c, -omega ** 2 * s]))
+        # Proportions of one are of one velocity, and of one displacement at the joints.
+        size = parameters['singularity.characteristic_length']
+        self._units = (1.0 / np.tile(np.arange(1, many + 1), 2)[:, None]
+                       / np.array([1.0, 1.0, 1.0, size, size, size]))
+        self._first = 0.02 * size
+
+    def costs(self, proportions: Array) -> Array:
+        """Return the cost (M,) of proportions (M, size)."""
+        coefficients = proportions.reshape(len(proportions), -1, 6) * self._units
+        coefficients *= self._first / np.abs(coefficients).max(axis=(1, 2), keepdims=True)
+        for _ in range(_SCALINGS):
+            excess = self.limits.excess(self._rows(coefficients))
+            coefficients /= np.maximum(excess, 0.2)[:, None, None]
+        rows = self._rows(coefficients)
+        excess = self.limits.excess(rows)
+        columns = columns_of(self.platform, self.unknowns, rows.reshape(-1, rows.shape[-1]))
+        columns = columns.reshape(len(proportions), -1, columns.shape[-1]) * self.unknowns.scales
+        information = columns.swapaxes(1, 2) @ columns * (
+            self._options.duration * self._options.rate / rows.shape[1]
+            / self._options.noise ** 2)
+        information += np.eye(information.shape[-1]) / _NOT_TOLD ** 2
+        variances = np.trace(np.linalg.inv(information), axis1=1, axis2=2)
+        # Information grows with the square of the amplitude: what is too large costs that.
+        cost: Array = np.log(variances) + 2.0 * np.abs(np.log(np.maximum(excess, 0.2)))
+        return np.where(np.isfinite(cost), cost, np.inf)
+
+    def _rows(self, coefficients: Array) -> Array:
+        """Return rows of motion (M, N, MOTION) of one period, of coefficients (M, 2 n, 6)."""
+        pose, rate, acceleration = (base @ coefficients for base in self._bases)
+        pose = self.limits.center + pose
+        rows: Array = Motion.from_euler(
+            pose[..., :3], pose[..., 3:], rate[..., :3], rate[..., 3:], acceleration[..., :3],
+            acceleration[..., 3:]).rows
+        return rows
+
+    def trajectory(self, proportions: Array) -> ReferenceMotionParameters:
+        """Return the motion of these proportions, as large as the limits allow at any time."""
+        coefficients = proportions.reshape(-1, 6) * self._units
+        coefficients *= self._first / np.abs(coefficients).max()
+        times = fine_times(self._options)
+        for _ in range(_LAST_SCALINGS):
+            found = self._parameters(coefficients)
+            excess = float(self.limits.excess(motion_at(found, times).rows[None])[0])
+            if 1.0 - _CLOSE <= excess <= 1.0:
+                break
+            coefficients /= excess * (1.0 + 0.3 * _CLOSE)
+        return found
+
+    def _parameters(self, coefficients: Array) -> ReferenceMotionParameters:
+        many, options = self._options.harmonics, self._options
+        given: dict[str, Any] = {
+            'base_frame': self.platform.parameters['base_frame'], 'rate': options.rate,
+            'motion.type': 'fourier', 'motion.duration': options.duration,
+            'motion.hold_at_end': False, 'motion.initial': self.limits.center,
+            'motion.fourier.frequency': self._base,
+            'motion.fourier.fade': min(1.0, options.duration / 4.0),
+            'motion.fourier.cosine': coefficients[:many].round(_DIGITS).ravel(),
+            'motion.fourier.sine': coefficients[many:].round(_DIGITS).ravel()}
+        return ReferenceMotionParameters(given)
+
+
+def _evolution(costs: Callable[[Array], Array], size: int, options: DesignOptions,
+               progress: Callable[[int], object]) -> Array:
+    """Return the best proportions that an evolution strategy with adapted spreads finds."""
+    random = np.random.default_rng(options.seed)
+    many = 4 + int(3.0 * math.log(size))
+    parents = many // 2
+    weights = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
+    weights /= weights.sum()
+    effective = 1.0 / float(np.sum(weights ** 2))
+    # Hansen's constants; those of the covariance for a diagonal one.
+    c_step = (effective + 2.0) / (size + effective + 5.0)
+    damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (size + 1.0)) - 1.0) + c_step
+    c_path = (4.0 + effective / size) / (size + 4.0 + 2.0 * effective / size)
+    faster = (size + 2.0) / 3.0
+    c_rank_one = faster * 2.0 / ((size + 1.3) ** 2 + effective)
+    c_rank = min(1.0 - c_rank_one, faster * 2.0 * (effective - 2.0 + 1.0 / effective) / (
+        (size + 2.0) ** 2 + effective))
+    expected = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size ** 2))
+
+    first = random.normal(size=(8 * many, size))
+    of_first = costs(first)
+    mean: Array = first[np.argmin(of_first)]
+    best, lowest = mean, float(np.min(of_first))
+    step, spread = 0.3, np.ones(size)
+    step_path, path = np.zeros(size), np.zeros(size)
+    for generation in range(options.generations):
+        moves = random.normal(size=(many, size)) * np.sqrt(spread)
+        candidates = mean + step * moves
+        found = costs(candidates)
+        order = np.argsort(found, kind='stable')
+        if found[order[0]] < lowest:
+            best, lowest = candidates[order[0]], float(found[order[0]])
+        chosen = moves[order[:parents]]
+        move = weights @ chosen
+        mean = mean + step * move
+        step_path = (1.0 - c_step) * step_path + math.sqrt(
+            c_step * (2.0 - c_step) * effective) * move / np.sqrt(spread)
+        path = (1.0 - c_path) * path + math.sqrt(c_path * (2.0 - c_path) * effective) * move
+        spread = ((1.0 - c_rank_one - c_rank) * spread + c_rank_one * path ** 2
+                  + c_rank * (weights @ chosen ** 2))
+        step *= math.exp(c_step / damping * (float(np.linalg.norm(step_path)) / expected - 1.0))
+        progress(generation + 1)
+    return best

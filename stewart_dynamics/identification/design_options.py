@@ -1,0 +1,43 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Options of the design of a motion."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from stewart_dynamics.identification.unknowns import DEFAULT
+
+
+class DesignOptions(NamedTuple):
+    """Options of a design."""
+
+    kinds: tuple[str, ...] = DEFAULT
+    """What is to be identified, of ``unknowns.KINDS``."""
+    duration: float = 60.0
+    """[s]"""
+    frequency: float = 2.0
+    """Of the highest harmonic [Hz]."""
+    harmonics: int = 10
+    amplitude: float | None = None
+    """Displacement of the platform's origin at most [m]; turns: by the characteristic length."""
+    center: tuple[float, ...] | None = None
+    """X Y Z alpha beta gamma about which it moves [m, rad]; None: home."""
+    noise: float = 5.0
+    """Standard deviation of the efforts [N], for the predicted intervals."""
+    rate: float = 500.0
+    """Of setpoints and of measured efforts [Hz]."""
+    generations: int = 400
+    seed: int = 0

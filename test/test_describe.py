@@ -1,0 +1,116 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The command stewart_describe: what it writes, says and returns."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+from stewart_dynamics import Parameters
+from stewart_dynamics.description import main
+
+PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
+
+
+def run(*arguments):
+    """Return the exit code for these arguments."""
+    return main([str(each) for each in arguments])
+
+
+def test_three_files_are_written_and_nothing_is_said(tmp_path, capsys):
+    assert run('--params', PLATFORM, '--output', tmp_path) == 0
+    names = ['platform.urdf', 'platform.sdf', 'platform.xml']
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    printed = capsys.readouterr()
+    assert printed.out.split() == [str(tmp_path / name) for name in names]
+    assert printed.err == ''
+
+
+def test_what_exists_is_kept_unless_it_may_be_replaced(tmp_path, capsys):
+    (tmp_path / 'a.sdf').write_text('mine')
+    given = '--params', PLATFORM, '--output', tmp_path, '--name', 'a'
+    assert run(*given) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ['a.sdf']
+    assert capsys.readouterr().err == (
+        f'stewart_describe: {tmp_path / "a.sdf"}: exists; --force replaces it\n')
+    assert run(*given, '--force') == 0
+    assert (tmp_path / 'a.sdf').read_text() != 'mine'
+
+
+@pytest.mark.parametrize('kind', ['urdf', 'sdf', 'xml'])
+def test_each_file_is_read_into_a_parameter_file_that_the_node_takes(kind, tmp_path, capsys):
+    if kind == 'xml':
+        pytest.importorskip('mujoco')
+    run('--params', PLATFORM, '--output', tmp_path)
+    assert run('--from', tmp_path / f'platform.{kind}', '--output', tmp_path / 'read') == 0
+    read = Parameters.from_yaml(tmp_path / 'read' / 'platform.yaml')
+    assert read['limits.velocity_max'] == pytest.approx([0.5] * 6)
+    assert capsys.readouterr().err == ''
+
+
+def test_likely_mistakes_are_warnings_and_exit_code_1_with_strict(tmp_path, capsys):
+    p = Parameters.from_yaml(PLATFORM)
+    joints = p['geometry.base_joints'].copy()
+    joints[0, 1] *= -1.0
+    p.replaced({'geometry.base_joints': joints}).to_yaml(tmp_path / 'wrong.yaml')
+    given = '--params', tmp_path / 'wrong.yaml', '--output', tmp_path
+    assert run(*given) == 0
+    assert 'stewart_describe: warning: geometry.base_joints: leg_' in capsys.readouterr().err
+    assert run(*given, '--force', '--strict') == 1
+    assert run('--from', tmp_path / 'wrong.sdf', '--output', tmp_path / 'read', '--strict') == 1
+
+
+def test_the_block_of_ros2_control_is_written_by_option(tmp_path):
+    run('--params', PLATFORM, '--output', tmp_path, '--ros2-control', 'position,effort',
+        '--hardware', 'topic')
+    text = (tmp_path / 'platform.urdf').read_text()
+    assert 'joint_state_topic_hardware_interface/JointStateTopicSystem' in text
+    assert text.count('<command_interface name="effort" />') == 6
+
+
+@pytest.mark.parametrize(('arguments', 'error'), [
+    (['--params', 'none.yaml'], 'none.yaml: cannot be read'),
+    (['--from', 'none.urdf'], 'none.urdf: cannot be read'),
+    (['--from', str(PLATFORM)], 'not XML'),
+    (['--from', 'none.urdf', '--ros2-control', 'effort'], '--ros2-control: not with --from'),
+])
+def test_bad_input_is_exit_code_2_and_one_line(arguments, error, tmp_path, capsys):
+    assert run(*arguments, '--output', tmp_path) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith('stewart_describe: ')
+    assert error in printed.err
+    assert printed.err.count('\n') == 1
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize('arguments', [
+    [], ['--params', 'a', '--from', 'b'], ['--params', 'a', '--name', 'a/b'],
+    ['--params', 'a', '--ros2-control', 'torque']])
+def test_wrong_arguments_are_explained(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        run(*arguments)
+    assert ended.value.code == 2
+    assert 'usage: stewart_describe' in capsys.readouterr().err
+
+
+def test_help_needs_neither_numpy_nor_the_compiler():
+    code = ('import sys; from stewart_dynamics.description import main\n'
+            'try: main(["--help"])\n'
+            'except SystemExit: print(sorted({"numpy", "numba"} & set(sys.modules)))')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.endswith('[]\n')

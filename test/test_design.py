@@ -1,0 +1,209 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Designed motions: within the limits, reproducible, with smaller intervals than sine sweeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import ROOT
+from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+from stewart_dynamics.identification.command_line import main
+from stewart_dynamics.identification.design import (
+    columns_of, Design, design, predicted_half_widths)
+from stewart_dynamics.identification.design_options import DesignOptions
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from sweeps import sweep
+
+PLATFORM = ROOT / 'config' / 'platform.yaml'
+HEXAPOD = Parameters.from_yaml(PLATFORM)
+SMALL = DesignOptions(harmonics=3, duration=12.0, generations=20, kinds=('platform',))
+LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+
+
+@pytest.fixture(scope='module')
+def small() -> Design:
+    """Return a motion that was designed in little time."""
+    return design(HEXAPOD, SMALL)
+
+
+def at_1_khz(trajectory: ReferenceMotionParameters) -> Any:
+    """Return the motion at times of 1 kHz."""
+    return motion_at(trajectory, np.arange(0.0, trajectory['motion.duration'] + 5e-4, 1e-3))
+
+
+def test_it_is_within_the_limits_less_their_margins(small: Design) -> None:
+    platform = StewartPlatform(HEXAPOD)
+    result = platform.inverse_dynamics(at_1_khz(small.trajectory))
+    p = HEXAPOD
+    stroke = p['limits.length_max'] - p['limits.length_min']
+    assert np.all(result.lengths > p['limits.length_min'] + 0.01 * stroke)
+    assert np.all(result.lengths < p['limits.length_max'] - 0.01 * stroke)
+    assert np.all(np.abs(result.rates) < 0.901 * p['limits.velocity_max'])
+    assert np.all(np.abs(result.forces) < 0.801 * p['limits.force_max'])
+    assert np.all(result.condition_number < 0.501 * p['singularity.warn_condition'])
+    # It uses what it may.
+    assert 0.99 < max(small.use.values()) <= 1.0
+    assert np.abs(result.rates).max() > 0.89 * p['limits.velocity_max'].max()
+
+
+def test_it_begins_and_ends_at_rest_at_home(small: Design) -> None:
+    ends = motion_at(small.trajectory, [0.0, 12.0])
+    assert np.all(ends.rows[:, 12:] == 0.0)
+    home = StewartPlatform(HEXAPOD).home_pose()
+    np.testing.assert_allclose(ends.position, [home.position] * 2, rtol=0.0, atol=1e-6)
+
+
+def test_equal_seeds_give_equal_motions(small: Design) -> None:
+    again = design(HEXAPOD, SMALL)
+    assert again.trajectory == small.trajectory
+    assert again.half_widths.tolist() == small.half_widths.tolist()
+    other = design(HEXAPOD, SMALL._replace(seed=1, generations=2))
+    assert other.trajectory != small.trajectory
+
+
+def test_generations_make_the_intervals_smaller(small: Design) -> None:
+    first = design(HEXAPOD, SMALL._replace(generations=1))
+    scales = small.unknowns.scales
+    assert np.sum((small.half_widths / scales) ** 2) < 0.8 * np.sum(
+        (first.half_widths / scales) ** 2)
+
+
+def test_its_intervals_are_three_times_narrower_than_those_of_sine_sweeps() -> None:
+    """Of inertia and all of the platform; its weight tells the mass in any motion."""
+    platform, options = StewartPlatform(HEXAPOD), DesignOptions(
+        kinds=('platform',), generations=60, harmonics=6)
+    designed = design(HEXAPOD, options)
+    scales = designed.unknowns.scales
+    for together in (False, True):
+        swept = predicted_half_widths(platform, designed.unknowns, sweep(
+            platform, options, together), options.duration, options)
+        of_both = [np.sqrt(np.mean((each / scales) ** 2))
+                   for each in (swept, designed.half_widths)]
+        assert of_both[0] > 3.0 * of_both[1]
+        ratios = (swept / designed.half_widths)[4:]
+        assert np.sqrt(np.mean(ratios ** 2)) > 3.0
+
+
+def test_the_predicted_intervals_are_those_of_a_fit(small: Design) -> None:
+    """Of least squares on efforts with noise, many times."""
+    random, options = np.random.default_rng(4), SMALL._replace(rate=50.0)
+    platform, unknowns = StewartPlatform(HEXAPOD), small.unknowns
+    times = np.arange(0.0, 12.0, 1.0 / options.rate)
+    motion = motion_at(small.trajectory, times)
+    columns = columns_of(platform, unknowns, motion.rows).reshape(-1, len(unknowns.names))
+    noise = options.noise * random.normal(size=(len(columns), 400))
+    found = np.linalg.lstsq(columns * unknowns.scales, noise, rcond=None)[0]
+    spread = 1.959964 * unknowns.scales * found.std(axis=1)
+    predicted = predicted_half_widths(platform, unknowns, motion, 12.0, options)
+    np.testing.assert_allclose(spread / predicted, 1.0, atol=0.15)
+
+
+def test_missing_limits_are_named_and_an_amplitude_takes_their_place() -> None:
+    without = HEXAPOD.replaced(dict.fromkeys(LIMITS[1:]))
+    with pytest.raises(ParameterError, match=r'^limits.length_max, limits.velocity_max, '
+                       r'limits.force_max: missing: .* or with --amplitude$'):
+        design(without, SMALL)
+    designed = design(without, SMALL._replace(
+        amplitude=0.02, generations=2, center=(0.0, 0.0, 1.1, 0.0, 0.0, 0.1)))
+    motion = at_1_khz(designed.trajectory)
+    moved = np.linalg.norm(motion.position - motion.position[0], axis=1)
+    assert moved.max() <= 0.02
+    relative = motion.rotation[0].T @ motion.rotation
+    turned = np.arccos(np.clip((np.trace(relative, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0))
+    assert designed.trajectory['motion.initial'].tolist() == [0.0, 0.0, 1.1, 0.0, 0.0, 0.1]
+    assert turned.max() <= 1.001 * 0.02 / without['singularity.characteristic_length']
+    assert max(moved.max(), turned.max() * 0.6) > 0.019
+
+
+def test_angles_of_joints_are_limits_as_well() -> None:
+    narrow = HEXAPOD.replaced({'limits.base_joint_angle_max': 0.05,
+                               'limits.platform_joint_angle_max': 0.1})
+    designed = design(narrow, SMALL._replace(generations=2))
+    base, platform = StewartPlatform(narrow).joint_angles(at_1_khz(designed.trajectory))
+    assert base.max() <= 0.0451 and platform.max() <= 0.0901
+    assert base.max() > 0.04 or platform.max() > 0.08
+
+
+def test_a_center_beyond_a_limit_is_named() -> None:
+    weak = HEXAPOD.replaced({'limits.force_max': 300.0})
+    with pytest.raises(ParameterError, match='^limits.force_max: at the center of the motion '):
+        design(weak, SMALL)
+    with pytest.raises(ParameterError, match='^limits.length_max: at the center of the motion '):
+        design(HEXAPOD, SMALL._replace(center=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0)))
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Return exit code, stdout and stderr of stewart_identify --design in this process."""
+    code = main(['--design', *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+QUICK = ('--params', PLATFORM, '--generations', 3, '--harmonics', 2, '--duration', 8,
+         '--identify', 'platform,friction')
+
+
+def test_the_file_is_for_stewart_trajectory(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / 'designed'
+    code, out, err = run(capsys, *QUICK, '--output', folder)
+    assert (code, err) == (0, '')
+    trajectory = ReferenceMotionParameters.from_yaml(folder / 'trajectory.yaml')
+    assert (trajectory['motion.type'], trajectory['motion.duration']) == ('fourier', 8.0)
+    lines = out.splitlines()
+    assert lines[0] == ('predicted 95 % intervals: 8 s, white noise of 5 N in efforts at 500 Hz')
+    assert lines[1].split()[:2] == ['platform.mass', '+-']
+    assert lines[12].split()[0] == 'actuator.coulomb_friction'
+    assert f'motion: {folder / "trajectory.yaml"}' in lines[-1]
+    head = (folder / 'trajectory.yaml').read_text(encoding='utf-8')
+    assert head.startswith('# Designed to identify platform, friction, seed 0.')
+    # Nothing that exists is replaced without --force.
+    code, out, err = run(capsys, *QUICK, '--output', folder)
+    assert code == 2 and str(folder) in err and not out
+    assert run(capsys, *QUICK, '--output', folder, '--force')[0] == 0
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    ((*QUICK, '--highest-frequency', 20), '--highest-frequency 20 Hz: must be at most --cutoff'),
+    ((*QUICK[:-1], 'cylinder,piston'), 'no motion within the limits tells all of cylinder, '
+     'piston: legs.cylinder.second_moment.leg_1 is not identifiable; ask for less'),
+    (('--params', 'missing.yaml'), 'missing.yaml: '),
+])
+def test_what_cannot_be_designed_is_one_line(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:
+    code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
+    assert (code, out) == (2, '')
+    assert len(err.splitlines()) == 1
+    assert said in err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    (('--params', 'x', '--design', 'a_bag'), '--design takes no BAG'),
+    (('--params', 'x'), 'the following arguments are required: BAG'),
+    (('--params', 'x', '--design', '--duration', '0'), 'must be at least 2'),
+    (('--params', 'x', '--design', '--harmonics', '2.5'), 'invalid whole number value'),
+])
+def test_arguments_that_do_not_fit_are_named(
+        capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err

@@ -1,0 +1,230 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Hexapods of others' files: what is read, what is said, and what is rejected."""
+
+from pathlib import Path
+import re
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from referees import random_parameters, rng
+
+from stewart_dynamics import Parameters, StewartError
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.mjcf import mjcf
+from stewart_dynamics.description.reading import read_hexapod
+from stewart_dynamics.description.sdf import sdf
+from stewart_dynamics.description.urdf import urdf
+from stewart_dynamics.mechanics.rotation import to_euler
+
+PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
+WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf}
+EXACT = 1e-12
+
+
+def machines():
+    """Yield hexapods of all kinds, those without mass in their legs and in a world frame too."""
+    yield Parameters.from_yaml(PLATFORM)
+    for seed in range(3):
+        yield random_parameters(rng(seed))
+    given = random_parameters(rng(5)).given
+    yield Parameters({**{name: value for name, value in given.items()
+                         if not name.startswith('legs.')}, 'base_frame': 'world'})
+
+
+def written(p, kind, folder, change=lambda text: text):
+    """Return the file of a hexapod."""
+    path = folder / f'hexapod.{kind}'
+    path.write_text(change(WRITERS[kind](Hexapod(p), 'hexapod')), encoding='utf-8')
+    return path
+
+
+def foreign(text):
+    """Return a document without what stewart_describe has added to its format."""
+    root = ET.fromstring(text)
+    for parent in [*root.iter()]:
+        for child in [*parent]:
+            if child.tag.endswith('}parameter') or child.tag in ('stewart_dynamics', 'custom'):
+                parent.remove(child)
+    return ET.tostring(root, encoding='unicode')
+
+
+@pytest.mark.parametrize('kind', WRITERS)
+@pytest.mark.parametrize('machine', range(5))
+def test_what_is_written_reads_back_with_the_same_numbers(kind, machine, tmp_path):
+    if kind == 'xml':
+        pytest.importorskip('mujoco')
+    p = [*machines()][machine]
+    read = read_hexapod(written(p, kind, tmp_path)).parameters
+    for name, value in p.items():
+        if isinstance(value, np.ndarray) and not name.startswith(('meshes.', 'singularity.')):
+            assert read[name] == pytest.approx(value, rel=EXACT, abs=EXACT), name
+        elif name in ('base_frame', 'platform_frame', 'joints', 'platform.mass'):
+            assert read[name] == value
+        elif name.startswith('limits.'):
+            assert read[name] is value is None
+
+
+@pytest.mark.parametrize('kind', ['sdf', 'xml'])
+def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_path):
+    if kind == 'xml':
+        pytest.importorskip('mujoco')
+    p = Parameters.from_yaml(PLATFORM)
+    found = read_hexapod(written(p, kind, tmp_path, foreign))
+    for name in ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia',
+                 'legs.piston.center_of_mass', 'limits.force_max', 'actuator.viscous_friction'):
+        assert found.parameters[name] == pytest.approx(p[name], rel=1e-6, abs=1e-12), name
+    said = '\n'.join(found.remarks)
+    if kind == 'sdf':  # which counts positions from the file's own
+        assert 'gravity: not in the file: 9.80665' in said
+        assert 'actuator.reflected_mass: not in the file: 0 kg' in said
+        assert found.parameters['geometry.zero_length'] == pytest.approx(1.3, abs=1e-4)
+    else:
+        assert 'limits.velocity_max: not in the file: not checked' in said
+
+
+def at_home(text, hexapod):
+    """Return the URDF with all joints at zero where they are at home, without its own block."""
+    root = ET.fromstring(foreign(text))
+    joints = {joint.get('name'): joint for joint in root.findall('joint')}
+    for leg in hexapod.legs:
+        joints[leg.name].find('origin').set('xyz', f'0 0 {leg.home_length!r}')
+    ET.SubElement(joints['platform_z'], 'origin', {'xyz': f'0 0 {float(hexapod.position[2])!r}'})
+    return root, joints
+
+
+def test_an_open_urdf_whose_loops_gazebo_closes_is_read(tmp_path):
+    p = Parameters.from_yaml(PLATFORM)
+
+    def closed_by_gazebo(text):
+        root, _ = at_home(text, Hexapod(p))
+        for leg in p['joints']:
+            joint = ET.SubElement(ET.SubElement(root, 'gazebo'), 'joint',
+                                  {'name': f'{leg}_ball', 'type': 'ball'})
+            ET.SubElement(joint, 'parent').text = f'{leg}_piston'
+            ET.SubElement(joint, 'child').text = f'{leg}_platform_joint'
+        return ET.tostring(root, encoding='unicode')
+
+    found = read_hexapod(written(p, 'urdf', tmp_path, closed_by_gazebo)).parameters
+    for name in ('geometry.base_joints', 'geometry.platform_joints', 'platform.inertia'):
+        assert found[name] == pytest.approx(p[name], abs=1e-12), name
+
+
+def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_this_is_said(tmp_path):
+    """As CAD programs write it: the other five legs end in the air."""
+    p = Parameters.from_yaml(PLATFORM)
+
+    def carried_by_a_leg(text):
+        hexapod = Hexapod(p)
+        root, joints = at_home(text, hexapod)
+        for name, joint in joints.items():
+            if name.startswith('platform_') or name.endswith('_fixed'):
+                root.remove(joint)
+        for link in root.findall('link'):
+            if link.get('name').endswith(('_link', '_platform_joint')):
+                root.remove(link)
+        leg = hexapod.legs[0]
+        joint = ET.SubElement(root, 'joint', {'name': 'ball', 'type': 'spherical'})
+        ET.SubElement(joint, 'parent', {'link': leg.piston.name})
+        ET.SubElement(joint, 'child', {'link': 'platform'})
+        # The platform's frame is at its joint: the other joints are read relative to it.
+        turn = to_euler(leg.mount.T)
+        ET.SubElement(joint, 'origin', {'rpy': ' '.join(repr(float(angle)) for angle in turn)})
+        return ET.tostring(root, encoding='unicode')
+
+    found = read_hexapod(written(p, 'urdf', tmp_path, carried_by_a_leg))
+    assert found.parameters['geometry.base_joints'] == pytest.approx(
+        p['geometry.base_joints'], abs=1e-12)
+    joints = p['geometry.platform_joints']
+    assert found.parameters['geometry.platform_joints'] == pytest.approx(
+        joints - joints[0], abs=1e-9)
+    assert any(remark.startswith('the loops are open: the ends of five legs are taken as ball '
+                                 "joints on 'platform'") for remark in found.remarks)
+
+
+def changed(text, pattern, replacement):
+    new, count = re.subn(pattern, replacement, text, count=1)
+    assert count == 1
+    return new
+
+
+def test_a_start_outside_the_limits_is_said(tmp_path):
+    p = Parameters.from_yaml(PLATFORM)
+
+    def moved(text):
+        return changed(foreign(text), r'<lower>[^<]*</lower>', '<lower>0.1</lower>')
+
+    found = read_hexapod(written(p, 'sdf', tmp_path, moved))
+    assert any(re.match(r'leg_1: its position in the file, 0 m, is outside its limits, 0.1 to',
+                        remark) for remark in found.remarks)
+
+
+@pytest.mark.parametrize(('text', 'error'), [
+    ('', 'not XML'),
+    ('<robot', 'not XML'),
+    ('<html/>', "begins with 'html': must be URDF"),
+    ('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="x"/>', 'is xacro'),
+    ('<!DOCTYPE a [<!ENTITY b "c">]><robot name="x"/>', 'has entities'),
+    ('<robot name="x"><link name="a"/></robot>', 'no hexapod: 0 prismatic joints'),
+    ('<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
+     '<child link="b"/></joint></robot>', "no link 'b'"),
+    ('<robot name="x"><link name="a"/><link name="b"/><joint name="j" type="fixed">'
+     '<origin xyz="1 nan 0"/><parent link="a"/><child link="b"/></joint></robot>',
+     'must be 3 finite numbers'),
+    ('<robot name="x"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
+     '<child link="a"/></joint></robot>', "'a' carries itself"),
+    ('<sdf version="1.9"/>', 'no model'),
+    ('<sdf version="1.9"><model name="m"><link name="a"><pose relative_to="a">0 0 0 0 0 0</pose>'
+     '</link></model></sdf>', 'relative to itself'),
+    ('<sdf version="1.9"><model name="m"><joint name="j" type="fixed"><parent>a</parent></joint>'
+     '</model></sdf>', "joint 'j': no child"),
+])
+def test_what_is_no_hexapod_is_rejected_in_one_line(text, error, tmp_path):
+    path = tmp_path / 'file.xml'
+    path.write_text(text, encoding='utf-8')
+    with pytest.raises(StewartError, match=re.escape(error)) as caught:
+        read_hexapod(path)
+    assert '\n' not in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_mujocos_own_words_are_given_for_an_mjcf_that_it_rejects(tmp_path):
+    pytest.importorskip('mujoco')
+    path = tmp_path / 'file.xml'
+    path.write_text('<mujoco><equality><connect relpose="1"/></equality></mujoco>')
+    with pytest.raises(StewartError, match="MuJoCo: .*unrecognized attribute: 'relpose'"):
+        read_hexapod(path)
+
+
+def test_five_legs_are_no_hexapod(tmp_path):
+    p = Parameters.from_yaml(PLATFORM)
+
+    def without_one(text):
+        root = ET.fromstring(foreign(text))
+        model = root.find('model')
+        for joint in [*model.findall('joint')]:
+            if joint.get('name') == 'leg_4':
+                joint.set('type', 'fixed')
+        return ET.tostring(root, encoding='unicode')
+
+    with pytest.raises(StewartError, match='no hexapod: 5 prismatic joints'):
+        read_hexapod(written(p, 'sdf', tmp_path, without_one))
+
+
+def test_a_missing_file_is_said(tmp_path):
+    with pytest.raises(StewartError, match='cannot be read: No such file'):
+        read_hexapod(tmp_path / 'none.urdf')
