@@ -67,7 +67,7 @@ TARGETS = {
     'platform.inertia': (2.0, '% of the largest'), 'actuator.viscous_friction': (3.0, '% of it'),
     'actuator.coulomb_friction': (3.0, '% of it')}
 # Payload: five equal masses on the platform [kg], above its origin [m].
-MASS, HEIGHT = 8.0, 0.2
+MASS, HEIGHT = 15.0, 0.2
 LONG = 600.0
 
 
@@ -172,24 +172,25 @@ def states(result: Mapping[str, Any], state: str) -> str:
     kinds: dict[str, list[str]] = {}
     for name in names:
         kinds.setdefault(kind_of(name), []).append(name.rpartition('.')[2])
-    return '; '.join(
-        f'`{kind}`' if len(ends) in (1, 6) and kind != 'platform.center_of_mass'
+    return ', '.join(
+        f'`{kind}`' if len(ends) == 6 or kind == 'platform.mass'
         else f'`{kind}` {" ".join(ends)}' for kind, ends in kinds.items()) or '-'
 
 
 def not_told(folder: Path) -> list[str]:
     """Return the lines of what bags at rest and about one axis tell."""
-    rows = [('motion', 'identified', 'in combinations', 'not told')]
+    lines = []
     for name, motion in (('at rest', at_rest), ('about x', about([1.0, 0.0, 0.0])),
                          ('about (1, 1, 0)', about([1.0, 1.0, 0.0]))):
         given = recorded(TRUE, motion, 20.0, 250.0, 1, NOISE)
         bag = write_bag(folder / name, given, GIVEN['joints'])
         found, _, _, said = identify(folder, [bag], '--no-report')
         assert found is not None, said
-        rows.append((name, states(found, 'identified'), '; '.join(
-            f'`{each["words"]}`' for each in found['combinations']) or '-',
-            states(found, 'not_told')))
-    return [line.replace('-:|', '-|') for line in markdown(rows)]
+        sums = '; '.join(f'`{each["words"]}`' for each in found['combinations'])
+        lines.append(f'- {name}, 20 s: identified are {states(found, "identified")}'
+                     + (f'; in combinations {sums}' if sums else '')
+                     + f'; not told are {states(found, "not_told")}.')
+    return lines
 
 
 def five_masses(folder: Path) -> list[str]:
@@ -200,7 +201,7 @@ def five_masses(folder: Path) -> list[str]:
         center = (TRUE['platform.mass'] * TRUE['platform.center_of_mass']
                   + masses * MASS * np.array([0.0, 0.0, HEIGHT])) / mass
         loaded = TRUE.replaced({'platform.mass': mass, 'platform.center_of_mass': center})
-        given = recorded(loaded, fourier(SEED), 30.0, 250.0, 10 + masses,
+        given = recorded(loaded, fourier(SEED), SECONDS, 250.0, 10 + masses,
                          NOISE._replace(effort=2.5, length=5e-6, rate=5e-4))
         bag = write_bag(folder / f'{masses} masses', given, GIVEN['joints'])
         result, _, _, said = identify(folder, [bag], '--no-report')

@@ -24,6 +24,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
+from functools import partial
 from importlib.metadata import version
 import os
 from pathlib import Path
@@ -51,6 +52,7 @@ from stewart_dynamics.nodes.security import PROFILES
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.external_wrench import ExternalWrench
 from stewart_dynamics.runtime.measured_legs import MeasuredLegs
+from stewart_dynamics.runtime.model_messages import ModelMessages
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.step import Setpoint, Step
 
@@ -444,8 +446,16 @@ def picture_words() -> str:
     size = len(markers.write(motion, output))
     times = repeat(lambda: markers.write(motion, output), timer=time.process_time, repeat=21,
                    number=200)
-    return (f'A picture has {size:,} bytes and is written in {median(times) / 200 * 1e6:.0f} us '
-            'of processor time, median of 21.')
+    words = (f'A picture has {size:,} bytes and is written in {median(times) / 200 * 1e6:.0f} us '
+             'of processor time, median of 21.')
+    model = ModelMessages(parameters)
+    for what, make in (('message of `~/joint_states`', model.joint_states),
+                       ('transform of `/tf`', model.transform)):
+        times = repeat(partial(make, FIRST_STAMP, motion), timer=time.process_time, repeat=21,
+                       number=1000)
+        words += (f' A {what} has {len(make(FIRST_STAMP, motion))} bytes and is written in '
+                  f'{median(times) / 1000 * 1e6:.1f} us.')
+    return words
 
 
 def main() -> None:

@@ -298,7 +298,7 @@ def test_package_xml_names_what_the_package_imports() -> None:
 
 def test_package_xml_names_what_the_tests_import() -> None:
     """The same for the tests, some of which run the demos."""
-    needed = {KEYS.get(name, name) for name in third_party('demo', 'test')} - {''}
+    needed = {KEYS.get(name, name) for name in third_party('demo', 'examples', 'test')} - {''}
     assert needed <= depends('depend', 'exec_depend', 'test_depend')
 
 

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 import pytest
 from referees import (
     derivative, PinocchioReferee, printed_compiled_and_not, QUARTER_TURN, random_base_motion,
-    random_motion, random_parameters, rng, symmetric_parameters)
+    random_motion, random_parameters, rng, rotation_about, symmetric_parameters)
 
 from stewart_dynamics import (
-    Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
+    BaseMotion, Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
 from stewart_dynamics.mechanics.linear_parameters import (
     COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR, linear_parameters,
     names_of, OFFSET, parameter_values, PISTON_MASS, PISTON_SECOND, PLATFORM, REFLECTED_MASS,
@@ -84,6 +84,29 @@ def test_each_column_is_the_force_of_one_unit_of_its_parameter() -> None:
         np.testing.assert_allclose(matrix[..., n], column, rtol=1e-8,
                                    atol=1e-8 * np.abs(column).max())
     np.testing.assert_array_equal(matrix[..., OFFSET], np.broadcast_to(np.eye(6), (MANY, 6, 6)))
+
+
+@pytest.mark.parametrize('moving', [False, True])
+def test_tilt_columns_are_the_derivatives_by_turns_of_gravity(moving: bool) -> None:
+    random = rng(11)
+    p = random_parameters(random)
+    motion = random_motion(p, random, MANY)
+    base = random_base_motion(p, random, MANY) if moving else BaseMotion(p['gravity'])
+    platform = StewartPlatform(p)
+    tilted = platform.regressor(motion, base if moving else None, tilt=True)
+    assert tilted.names[-2:] == ('gravity.tilt_x', 'gravity.tilt_y')
+    np.testing.assert_array_equal(
+        tilted.matrix[..., :-2], platform.regressor(motion, base if moving else None).matrix)
+    for n, axis in enumerate(np.eye(3)[:2]):
+        def forces(angle: float, axis: Array = axis) -> Array:
+            turned = BaseMotion(
+                base.gravity @ rotation_about(axis, angle).T, base.linear_acceleration,
+                base.angular_velocity, base.angular_acceleration)
+            return platform.inverse_dynamics(motion, base=turned).forces
+
+        column = derivative(forces, 1e-3)
+        np.testing.assert_allclose(tilted.matrix[..., -2 + n], column, rtol=1e-7,
+                                   atol=1e-8 * np.abs(column).max())
 
 
 def test_what_no_motion_can_tell() -> None:

@@ -184,7 +184,11 @@ def test_the_block_of_ros2_control_has_the_six_legs(interfaces):
     assert [float(each.text) for each in block.iter('param')] == pytest.approx(lengths, abs=1e-15)
 
 
-def test_two_bodies_of_the_same_name_are_rejected():
-    p = Parameters.from_yaml(PLATFORM).replaced({'base_frame': 'leg_1_piston'})
-    with pytest.raises(ParameterError, match="two bodies would have the name 'leg_1_piston'"):
+@pytest.mark.parametrize(('changes', 'name'), [
+    ({'base_frame': 'leg_1_piston'}, 'leg_1_piston'),
+    ({'joints': ['platform', 'b', 'c', 'd', 'e', 'f']}, 'platform'),
+    ({'platform_frame': 'world'}, 'world')])
+def test_two_bodies_or_joints_of_the_same_name_are_rejected(changes, name):
+    p = Parameters.from_yaml(PLATFORM).replaced(changes)
+    with pytest.raises(ParameterError, match=f"the name '{name}' would be there twice"):
         Hexapod(p)

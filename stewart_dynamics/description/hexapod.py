@@ -126,7 +126,7 @@ class Hexapod:
     Raises
     ------
     ParameterError
-        Two joints or two bodies would have the same name.
+        Two joints or bodies would have the same name.
 
     """
 
@@ -142,15 +142,19 @@ class Hexapod:
             inertia_matrix(parameters['platform.inertia']))
         directions = mounts(parameters)
         self.legs = tuple(self._leg(n, directions[n]) for n in range(6))
-        names = [self.base, self.base_body, self.platform][self.base == self.base_body:]
+        self._check_names()
+
+    def _check_names(self) -> None:
+        """Raise ParameterError where a name is taken; some formats have one list for all."""
+        names = [_WORLD, self.base_body, self.platform, *self.joints]
         for leg in self.legs:
             names += [leg.cross, leg.cylinder.name, leg.piston.name, leg.ball]
         twice = [name for n, name in enumerate(names) if name in names[:n]]
         if twice:
             raise ParameterError(
                 f'base_frame: {shown(self.base)}, platform_frame: {shown(self.platform)}, joints: '
-                f'{shown(list(parameters["joints"]))}: two bodies would have the name '
-                f'{shown(twice[0])}')
+                f'{shown(list(self.parameters["joints"]))}: the name {shown(twice[0])} would be '
+                'there twice')
 
     def _leg(self, n: int, mount: Array) -> Leg:
         p = self.parameters

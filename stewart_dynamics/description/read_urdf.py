@@ -38,6 +38,11 @@ def read_urdf(root: ET.Element, source: Path) -> Mechanism:
     links = {link.get('name', ''): link for link in root.findall('link')}
     found = [joint for joint in root.findall('joint') if joint.find('child') is not None]
     of_child = {_end(joint, 'child', source): joint for joint in found}
+    for child, joint in of_child.items():
+        for end in (child, _end(joint, 'parent', source)):
+            if end not in links:
+                raise DescriptionError(
+                    f'{source}: joint {joint.get("name")!r}: no link {end!r}')
     placements: dict[str, Placement] = {}
     for name in links:
         _place(name, of_child, placements, source)
@@ -136,11 +141,8 @@ def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) ->
     name = joint.get('name', '')
     child = _end(joint, 'child', source)
     kind = _KINDS.get(joint.get('type', ''), OTHER)
-    at = placements[child] if child in placements else HERE
+    at = placements[child]
     made = Joint(name, kind, _end(joint, 'parent', source), child, at.position)
-    for end in (made.parent, child):
-        if end not in placements:
-            raise DescriptionError(f'{source}: joint {name!r}: no link {end!r}')
     if kind in (HINGE, SLIDE):
         axis = joint.find('axis')
         along = numbers_of('1 0 0' if axis is None else axis.get('xyz'), 3, source,

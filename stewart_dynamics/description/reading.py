@@ -20,6 +20,8 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
+
 from stewart_dynamics.description.mechanism import DescriptionError, Mechanism
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
@@ -41,7 +43,10 @@ def read_hexapod(path: Path) -> Recognized:
         The file cannot be read, or there is no hexapod in it; in one line.
 
     """
-    return recognized(read_mechanism(path))
+    try:
+        return recognized(read_mechanism(path))
+    except np.linalg.LinAlgError as exc:
+        raise DescriptionError(f'{path}: out of range: numbers overflow') from exc
 
 
 def read_mechanism(path: Path) -> Mechanism:

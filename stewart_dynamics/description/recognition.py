@@ -61,6 +61,7 @@ class _Body(NamedTuple):
     inertia: Array
 
 
+@np.errstate(all='ignore')  # what overflows breaks a rule of the parameters
 def recognized(mechanism: Mechanism) -> Recognized:
     """
     Return the parameters of the hexapod in a mechanism.

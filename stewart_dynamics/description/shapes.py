@@ -98,7 +98,7 @@ def _plate(kind: str, joints: Array, thickness: float) -> Shape:
     center = joints.mean(axis=0)
     axes = level_axes(joints - center)
     radius = float(np.linalg.norm((joints - center) @ axes[:2].T, axis=1).max())
-    return Shape('cylinder', kind, center, axes.T, radius, thickness)
+    return Shape('cylinder', kind, center, axes.T, max(radius, thickness), thickness)
 
 
 def _mesh(hexapod: Hexapod, kind: str) -> tuple[Shape, ...]:

@@ -199,8 +199,8 @@ class Identification:
             notices.append(f'sampled at {1.0 / legs.period:.4g} Hz: the cut-off frequency is '
                            f'{extraction.cutoff:.3g} Hz')
         if (self.extracts.samples - before) * extraction.step * legs.period < _SHORT:
-            notices.append(f'less than {_SHORT:g} s are left by the filters: intervals of so short a '
-                           'recording are too narrow')
+            notices.append(f'less than {_SHORT:g} s are left by the filters: intervals are too '
+                           'narrow for so short a recording')
         self.bags.append(BagRead(
             path, topics, legs.samples, (end - begin) * 1e-9, legs.period, extraction.cutoff,
             bool(legs.rates), rejected, left_out, stops, outliers, last.deviations, missing,

@@ -30,9 +30,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.linear_parameters import (
-    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR, linear_parameters,
-    names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS,
-    UNITS, VISCOUS_FRICTION)
+    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR,
+    linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
+    PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.parameters import Parameters
 
 # Of the platform, in the terms of the parameter file.

@@ -33,6 +33,8 @@ GAP = 4.0
 # A sample is an outlier if it is so many deviations off the cubic through its neighbours, and
 # half as many off the median of the five around it.
 _OUTLIER = 12.0
+# Efforts have kinks where a leg reverses: what is off by less is none.
+_OF_EFFORTS = 2e-3
 # At most so many neighbours are replaced; more of them are no outlier but a step.
 _LONGEST = 3
 
@@ -103,8 +105,8 @@ def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> W
     if many < 8:
         return None
     at = period * np.arange(many, dtype=float)
-    (positions, replaced), (pushes, replaced_too) = (
-        _without_outliers(each) for each in (legs.values[:, :6], efforts.values))
+    positions, replaced = _without_outliers(legs.values[:, :6], 0.0)
+    pushes, replaced_too = _without_outliers(efforts.values, _OF_EFFORTS)
     of_legs, of_efforts = (1e-9 * (each.stamps - begin).astype(float)
                            for each in (legs, efforts))
     outliers = _near(of_legs, replaced, at, period) | _near(of_efforts, replaced_too, at, period)
@@ -135,14 +137,27 @@ def interpolated(times: Array, values: Array, at: Array) -> Array:
     return result
 
 
-def _without_outliers(values: Array) -> tuple[Array, Flags]:
-    """Return values (N, k) with single wild ones replaced by their neighbours, and which."""
+def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
+    """
+    Return values (N, k) with single wild ones replaced by their neighbours, and which.
+
+    Parameters
+    ----------
+    values : (N, k)
+        At any times.
+    floor : float
+        Deviations at least, by those of the values themselves: for signals with kinks.
+
+    """
     five = np.stack([np.roll(values, shift, axis=0) for shift in range(-2, 3)])
     off = np.abs(values - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0)
-    usual = np.median(off, axis=0) / 0.6745 + 1e-9 * np.abs(values).max(axis=0)
+    usual = (np.median(off, axis=0) / 0.6745 + floor * np.std(values, axis=0)
+             + 1e-9 * np.abs(values).max(axis=0))
     wild = (off > _OUTLIER * usual) & (
         np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual) & (
-        np.abs(five[1] - five[3]) < off)  # alone: not a step, as of friction at a reversal
+        np.abs(five[1] - five[3]) < off)  # not a step, as of friction at a reversal
+    # and none of the four around it is farther off
+    wild &= off >= np.stack([np.roll(off, shift, axis=0) for shift in (-2, -1, 1, 2)]).max(axis=0)
     wild[:2] = wild[-2:] = False
     if not wild.any():
         return values, wild

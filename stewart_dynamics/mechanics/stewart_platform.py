@@ -34,16 +34,16 @@ from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBrea
 from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
 from stewart_dynamics.mechanics.joint_axes import JointAngles
-from stewart_dynamics.mechanics.linear_parameters import LINEAR, names_of
+from stewart_dynamics.mechanics.linear_parameters import LINEAR, linear_parameters, names_of
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.platform_arguments import (
     base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.pose import Pose
 from stewart_dynamics.mechanics.regressor import Regressor
 from stewart_dynamics.mechanics.rows import (
-    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES, FORCES,
-    GRAVITY, JOINT_ANGLES, LENGTHS, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION, RESULT,
-    TWIST, WRENCH)
+    BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
+    FORCES, GRAVITY, JOINT_ANGLES, LENGTHS, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
+    RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
 from stewart_dynamics.parameters import Parameters
@@ -175,20 +175,45 @@ class StewartPlatform:
         check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
         return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
 
-    def regressor(self, motion: Motion, base: BaseMotion | None = None) -> Regressor:
+    def regressor(self, motion: Motion, base: BaseMotion | None = None, *,
+                  tilt: bool = False) -> Regressor:
         """
         Return how the leg forces depend on the parameters in which they are linear.
 
         ``regressor.matrix @ linear_parameters(platform.parameters)`` are the forces of
         ``inverse_dynamics``; the parameters of this hexapod matter for it only by geometry and
         gravity. Arguments and errors are those of ``inverse_dynamics``.
+
+        With ``tilt`` two columns are added, ``gravity.tilt_x`` and ``gravity.tilt_y`` [N/rad]: the
+        derivatives by small turns of gravity about the base's x and y axes, with this hexapod's
+        parameters; their linear parameters are zero.
         """
         rows, _, bases, shape = loaded(motion, None, base)
         results = self.solve(rows, None, bases)
         check_finite('motion', results.reshape(*shape, RESULT), len(shape))
         find_unsolvable(rows, results, shape, 'raise')
         matrix = self.regressors(rows, bases).reshape(*shape, 6, LINEAR)
-        return Regressor(check_finite('motion', matrix, len(shape)), names_of(self.parameters))
+        names = names_of(self.parameters)
+        if tilt:
+            columns = self._tilt_columns(rows, base, shape).reshape(*shape, 6, 2)
+            matrix = np.concatenate([matrix, columns], axis=-1)
+            names = *names, 'gravity.tilt_x', 'gravity.tilt_y'
+        return Regressor(check_finite('motion', matrix, len(shape)), names)
+
+    def _tilt_columns(self, rows: Array, base: BaseMotion | None, shape: tuple[int, ...],
+                      ) -> Array:
+        """Return the derivatives of the forces (N, 6, 2) by turns of gravity about x and y."""
+        still = np.zeros_like(rows)
+        still[:, POSE] = rows[:, POSE]
+        gravity = copies((self._still if base is None else base).rows[..., GRAVITY], shape)
+        theta = linear_parameters(self.parameters)
+        columns = []
+        for axis in np.eye(3)[:2]:
+            # Forces at rest are linear in gravity.
+            turned = np.zeros((len(gravity), BASE))
+            turned[:, GRAVITY] = np.cross(axis, gravity)
+            columns.append(self.regressors(still, turned) @ theta)
+        return np.stack(columns, axis=-1)
 
     def regressors(self, rows: Array, bases: Array | None = None) -> Array:
         """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""

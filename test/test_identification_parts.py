@@ -1,0 +1,222 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parts of an identification: filters, windows, kinematics, bounds, reading of bags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+from recorded import fourier, Recorded, write_bag
+from referees import rng, ROOT
+
+from stewart_dynamics import Parameters, StewartPlatform
+from stewart_dynamics.errors import BagError, ParameterError
+from stewart_dynamics.identification.command_line import main
+from stewart_dynamics.identification.filters import (
+    convolved, decimated, LowPass, white_deviation)
+from stewart_dynamics.identification.guess import pose_near
+from stewart_dynamics.identification.kinematics import motions, poses
+from stewart_dynamics.identification.physical import consistent
+from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.windows import interpolated, Signal, uniform
+from stewart_dynamics.mechanics.least_squares import identifiability, Information
+from stewart_dynamics.mechanics.pseudo_inertia import is_consistent
+from stewart_dynamics.replay.recording import Recording
+
+Array = NDArray[np.float64]
+
+GIVEN = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
+PERIOD = 1e-3
+FILTER = LowPass.of(PERIOD, 25.0, 10.0)
+TIMES = np.arange(4000) * PERIOD
+INNER = TIMES[FILTER.half:-FILTER.half]
+
+
+def wave(frequency: float, order: int = 0, times: Array = TIMES) -> Array:
+    """Return a sine about one (N, 1), or its derivative."""
+    w = 2.0 * np.pi * frequency
+    sine: Array = w ** order * np.sin(w * times + 0.3 + 0.5 * np.pi * order)[:, None]
+    return sine + 1.0 if not order else sine
+
+
+@pytest.mark.parametrize('frequency', [0.2, 1.0, 5.0, 15.0])
+def test_filters_give_derivatives_without_phase(frequency: float) -> None:
+    w = 2.0 * np.pi * frequency
+    for order, allowed in ((0, 1e-4), (1, 1e-4), (2, 2e-3)):
+        found = convolved(wave(frequency), FILTER.taps(order))
+        off = found - wave(frequency, order, INNER)
+        assert np.abs(off).max() < allowed * w ** order, order
+        of_positions, of_rates = FILTER.fused(order, 1e-5, 1e-3)
+        both = convolved(wave(frequency), of_positions) + convolved(
+            wave(frequency, 1), of_rates)
+        assert np.abs(both - wave(frequency, order, INNER)).max() < 2e-3 * w ** order
+    late = convolved(wave(frequency), FILTER.taps(0, 3e-3))
+    assert np.abs(late - wave(frequency, 0, INNER + 3e-3)).max() < 1e-3
+
+
+def test_filters_stop_what_is_above_the_band() -> None:
+    assert np.abs(convolved(wave(40.0) - 1.0, FILTER.taps())).max() < 1e-3
+
+
+@pytest.mark.parametrize('step', [1, 7, 25])
+def test_a_lower_rate_is_every_so_many_th_sample(step: int) -> None:
+    signal = rng(1).normal(size=(1500, 2, 3))
+    whole = convolved(signal.reshape(1500, -1), FILTER.taps())[::step]
+    np.testing.assert_allclose(decimated(signal, FILTER.taps(), step).reshape(len(whole), -1),
+                               whole, atol=1e-12)
+
+
+def test_white_noise_is_told_from_the_signal() -> None:
+    noisy = wave(2.0) + 1e-5 * rng(2).normal(size=(4000, 1))
+    assert white_deviation(noisy)[0] == pytest.approx(1e-5, rel=0.05)
+
+
+def test_the_motion_of_lengths_is_the_motion_they_come_from() -> None:
+    platform = StewartPlatform(GIVEN)
+    times = np.arange(200) * 0.005
+    truth = fourier(3)(times)
+    result = platform.inverse_dynamics(truth)
+    # accelerations of the legs by differences of the exact rates
+    h = 1e-5
+    ahead, behind = (platform.inverse_dynamics(fourier(3)(times + s)).rates for s in (h, -h))
+    found = poses(platform, result.lengths, pose_near(platform, result.lengths[0]))
+    rows = motions(platform, found, result.rates, (ahead - behind) / (2.0 * h))
+    np.testing.assert_allclose(rows[:, :18], truth.rows[:, :18], atol=1e-9)
+    np.testing.assert_allclose(rows[:, 18:], truth.rows[:, 18:], atol=1e-6)
+
+
+def test_uneven_stamps_are_interpolated_and_wild_values_replaced() -> None:
+    random = rng(3)
+    times = TIMES + 2e-4 * random.uniform(-1.0, 1.0, 4000)
+    exact = np.tile(wave(2.0, 0, times), (1, 6))
+    np.testing.assert_allclose(
+        interpolated(times, exact, TIMES[10:-10]), np.tile(wave(2.0)[10:-10], (1, 6)), atol=1e-9)
+    noisy = exact + 1e-5 * random.normal(size=exact.shape)
+    spoiled = noisy.copy()
+    spoiled[1000, 2] += 0.5
+    spoiled[2000:, 4] += 0.1  # a step is none
+    stamps = np.round(times * 1e9).astype(np.int64) + 10 ** 12
+    window = uniform(Signal(stamps, spoiled), Signal(stamps, noisy), PERIOD, False)
+    assert window is not None
+    assert window.rates is None
+    near = np.flatnonzero(window.outliers.any(axis=1))
+    assert len(near) == 1 and abs(near[0] - 1000) < 3
+    assert window.outliers[near[0]].tolist() == [False, False, True, False, False, False]
+    assert np.abs(window.positions[1000, 2] - wave(2.0)[1000, 0]) < 1e-3
+
+
+def test_unknowns_are_in_the_terms_of_the_file() -> None:
+    u = Unknowns(GIVEN, ['platform', 'friction', 'piston', 'offset'])
+    assert u.names[0] == 'platform.mass'
+    assert len(u.names) == len(u.units) == len(u.start) == 10 + 12 + 18 + 6
+    values = u.start * 1.1 + 0.01
+    step = 1e-6
+    for n in range(len(values)):
+        change = step * np.eye(len(values))[n]
+        difference = (u.theta(values + change) - u.theta(values - change)) / (2.0 * step)
+        np.testing.assert_allclose(u.derivative(values)[:, n], difference, atol=1e-6)
+    same = u.parameters(u.start)
+    assert same == GIVEN
+    with pytest.raises(ParameterError, match='cannot be identified; known are mass, '):
+        Unknowns(GIVEN, ['colour'])
+
+
+def test_what_is_no_body_becomes_the_nearest_one() -> None:
+    u = Unknowns(GIVEN)
+    values = u.start.copy()
+    values[4:10] = [1.0, 0.0, 0.0, 1.0, 0.0, 5.0]  # one moment larger than the sum of the others
+    values[12] = -3.0
+    matrix = np.diag(1e4 / u.scales ** 2)
+    information = Information(matrix, matrix @ values, 0.0, 1000)
+    found, beyond = consistent(u, values, information, identifiability(matrix, u.scales))
+    assert is_consistent(u.inertial(found))
+    assert found[12] == 0.0
+    assert set(beyond) == {*u.names[:10], u.names[12]}
+    np.testing.assert_allclose(found[[0, 1, 2, 3]], values[[0, 1, 2, 3]], rtol=1e-3, atol=1e-4)
+    # all three moments give way
+    assert found[4] > 1.0 and found[7] > 1.0 and found[9] < 5.0
+    u.parameters(found)
+
+
+def recording_of(tmp_path: Path, seconds: float = 5.0) -> Recorded:
+    """Return a recording without noise."""
+    times = np.arange(round(seconds * 100.0)) / 100.0
+    result = StewartPlatform(GIVEN).inverse_dynamics(fourier(3)(times))
+    return Recorded(times, result.lengths - GIVEN['geometry.zero_length'], result.rates,
+                    result.forces)
+
+
+def test_windows_end_at_gaps(tmp_path: Path) -> None:
+    given = recording_of(tmp_path)
+    kept = np.r_[0:200, 260:500]
+    bag = write_bag(tmp_path / 'bag', Recorded(*(each[kept] for each in given)), GIVEN['joints'])
+    recording = Recording(bag)
+    topics = find_topics(recording, '/stewart_dynamics', None, None)
+    legs = RecordedLegs(recording, topics, GIVEN['joints'], 1.0)
+    windows = list(legs.windows())
+    recording.close()
+    assert [len(window.positions) for window in windows] == [200, 240]
+    assert legs.samples == 440
+    assert legs.rates and legs.period == pytest.approx(0.01)
+    as_recorded = ~windows[1].outliers
+    assert as_recorded.mean() > 0.98
+    np.testing.assert_allclose(windows[1].efforts[as_recorded], given.efforts[260:][as_recorded],
+                               rtol=1e-9)
+
+
+@pytest.mark.parametrize(('options', 'named'), [
+    (('--measured', '/other'), 'has no topic /other; of type sensor_msgs/msg/JointState it has '),
+    (('--cutoff', '0.5'), 'nothing to identify from: 500 samples, of which no'),
+    (('--identify', 'mass,colour'), "'colour': cannot be identified"),
+    (('--motor-torque',), 'actuator.screw_lead: has no value'),
+], ids=['topic', 'short', 'unknown', 'lead'])
+def test_bad_input_is_rejected_in_one_line(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...],
+        named: str) -> None:
+    bag = write_bag(tmp_path / 'bag', recording_of(tmp_path), GIVEN['joints'])
+    arguments = [str(bag), '--params', str(ROOT / 'config' / 'platform.yaml'), '--output',
+                 str(tmp_path / 'found'), *options]
+    try:
+        assert main(arguments) == 2
+    except SystemExit as exc:  # argparse
+        assert exc.code == 2
+    assert named in capsys.readouterr().err
+    assert not (tmp_path / 'found').exists()
+
+
+@pytest.mark.parametrize(('change', 'named'), [
+    (lambda p: p.replaced({'base.source': 'imu'}), 'base.source: imu: hexapods are identified'),
+    (lambda p: p.replaced({'joints': list('abcdef')}), 'no message contains a, b, c, d, e, f'),
+])
+def test_parameters_that_do_not_fit_are_rejected(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        change: Callable[[Parameters], Parameters], named: str) -> None:
+    bag = write_bag(tmp_path / 'bag', recording_of(tmp_path), GIVEN['joints'])
+    params = tmp_path / 'params.yaml'
+    change(GIVEN).to_yaml(params)
+    assert main([str(bag), '--params', str(params), '--output', str(tmp_path / 'found')]) == 2
+    assert named in capsys.readouterr().err
+
+
+def test_a_bag_without_measured_legs_is_rejected(tmp_path: Path) -> None:
+    recording = Recording(ROOT / 'bags' / 'clear')
+    with pytest.raises(BagError, match='has no topic /stewart_dynamics/measured_legs'):
+        find_topics(recording, '/stewart_dynamics', None, None)
+    recording.close()
