@@ -55,13 +55,13 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stewart_dynamics import BagError, Parameters, StewartError
+from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import kept, Task
 from stewart_dynamics.replay.bags import folders_of_results
 from stewart_dynamics.replay.local_processes import _uninterrupted
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
-from stewart_dynamics.replay.options import (
-    BAD_INPUT, DONE, LIMIT_MET, NODE, Options, PARTLY_READ)
+from stewart_dynamics.replay.options import LIMIT_MET, NODE, Options
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)

@@ -52,9 +52,10 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
-from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
+from stewart_dynamics.replay.options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)

@@ -30,8 +30,9 @@ from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.command_line import main
-from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
+from stewart_dynamics.replay.options import LIMIT_MET, NODE
 from stewart_dynamics.runtime.base_wrench import BaseWrench
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)

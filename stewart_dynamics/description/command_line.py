@@ -20,38 +20,28 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
-from stewart_dynamics.errors import one_line, StewartError
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.program import DONE, Program
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters import Parameters
 
-DONE, LIKELY_MISTAKE, BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
+LIKELY_MISTAKE = 1
+_PROGRAM = Program('stewart_describe')
 _INTERFACES = ('position', 'velocity', 'effort')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; the exit code is explained in its help."""
     given = _arguments().parse_args(arguments)
-    try:
-        return _read(given) if given.source else _write(given)
-    except StewartError as exc:
-        _complain(one_line(exc))
-        return BAD_INPUT
-    except OSError as exc:
-        where = f'{exc.filename}: ' if exc.filename else ''
-        _complain(f'{where}cannot be written: {exc.strerror or exc}')
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        _complain('interrupted')
-        return _INTERRUPTED
+    return _PROGRAM.exit_code(lambda: _read(given) if given.source else _write(given))
 
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='stewart_describe', formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
                     'into a parameter file.',
         epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.\n\n'
@@ -126,7 +116,7 @@ def _read(given: argparse.Namespace) -> int:
     found.parameters.to_yaml(path)
     print(path)
     for remark in found.remarks:
-        _complain(remark)
+        _PROGRAM.complain(remark)
     return _judge(found.parameters, given)
 
 
@@ -136,7 +126,7 @@ def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
 
     mistakes = likely_mistakes(parameters)
     for mistake in mistakes:
-        _complain(f'warning: {mistake}')
+        _PROGRAM.complain(f'warning: {mistake}')
     return LIKELY_MISTAKE if mistakes and given.strict else DONE
 
 
@@ -155,7 +145,3 @@ def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
     for path, text in paths.items():
         path.write_text(text, encoding='utf-8')
         print(path)
-
-
-def _complain(what: object) -> None:
-    print(f'stewart_describe: {what}', file=sys.stderr)

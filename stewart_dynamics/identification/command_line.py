@@ -18,21 +18,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import io
 from pathlib import Path
-import re
-import signal
-import sys
 
-from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification import design_command
 from stewart_dynamics.identification.options import CUTOFF, HOLD_OUT, Options
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
-from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, PARTLY_READ
-from stewart_dynamics.replay.unexpected_errors import unexpected
+from stewart_dynamics.program import (
+    DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
+from stewart_dynamics.replay.options import NODE
 
-_INTERRUPTED = 130
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+NOT_ALL_TOLD = 1
+_PROGRAM = Program('stewart_identify')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,29 +38,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if bool(given.bags) == given.design:
         parser.error('--design takes no BAG' if given.design else
                      'the following arguments are required: BAG')
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
-            stream.reconfigure(errors='backslashreplace')
-    try:
-        return _run(given)
-    except StewartError as exc:
-        _complain(exc)
-        return BAD_INPUT
-    except OSError as exc:  # what cannot be read is a StewartError
-        where = f'{exc.filename}: ' if exc.filename else ''
-        _complain(f'{where}cannot be written: {exc.strerror or exc}')
-        return BAD_INPUT
-    except Exception as exc:  # exit codes and one line also for errors that no rule covers
-        _complain(unexpected(exc))
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        _complain('interrupted')
-        return _INTERRUPTED
+    return _PROGRAM.exit_code(lambda: _run(given))
 
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='stewart_identify', formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Identify mass, center of mass, inertia and friction of a hexapod from the '
                     'measured legs of recorded motions.',
         epilog='DIR/ gets identified.yaml (the whole parameter file, for the node), '
@@ -86,7 +65,7 @@ def _arguments() -> argparse.ArgumentParser:
                              'asked for')
     parser.add_argument('--no-report', action='store_true', help='write no report.html')
     topics = parser.add_argument_group('topics')
-    topics.add_argument('--node', default=NODE, metavar='NAME', type=_node,
+    topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help=f'name before the usual topic, NAME/measured_legs (default: {NODE})')
     topics.add_argument('--measured', metavar='TOPIC',
                         help='JointState with positions and efforts, and rates where they are')
@@ -123,8 +102,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.parameters import Parameters
     from stewart_dynamics.replay.bags import find_bags
 
-    for each in _SIGNALS:
-        signal.signal(each, _interrupted)
+    interrupt_on_signals()
     options = Options(
         given.node, given.measured, given.efforts, given.identify, given.motor_torque,
         given.cutoff, given.prior, given.hold_out, not given.no_delay, given.accept_mistakes,
@@ -136,45 +114,22 @@ def _run(given: argparse.Namespace) -> int:
     output = given.output or Path('identified')
     bags = [bag for path in given.bags for bag in find_bags(path, output)]
     if HINT:
-        print(f'stewart_identify: {HINT}', file=sys.stderr)
+        _PROGRAM.complain(HINT)
     prepare(FUNCTIONS)
     for mistake in likely_mistakes(parameters):
-        _complain(f'warning: {mistake}')
-    result = run(bags, parameters, output, options, _complain)
-    print(_printable(result_text(result)))
-    print(_printable(f'results: {output}'))
+        _PROGRAM.complain(f'warning: {mistake}')
+    result = run(bags, parameters, output, options, _PROGRAM.complain)
+    _PROGRAM.say(result_text(result))
+    _PROGRAM.say(f'results: {output}')
     missing = [f'{bag["bag"]}: part of it could not be read: {"; ".join(bag["missing"])}'
                for bag in result['bags'] if bag['missing']]
     for text in missing:
-        _complain(text)
+        _PROGRAM.complain(text)
     if missing:
         return PARTLY_READ
     everything = all(each['state'] == 'identified' and not each['at_bound']
                      for each in result['parameters'])
-    return LIMIT_MET if given.strict and not everything else DONE
-
-
-def _interrupted(number: int, frame: object) -> None:
-    """Stop; further signals are ignored while partial results are removed."""
-    for each in _SIGNALS:
-        signal.signal(each, signal.SIG_IGN)
-    raise KeyboardInterrupt
-
-
-def _complain(what: object) -> None:
-    print(f'stewart_identify: {_printable(" ".join(str(what).split()))}', file=sys.stderr)
-
-
-def _printable(text: str) -> str:
-    """Return text in which control characters, as names in bags may hold, are escaped."""
-    return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)
-
-
-def _node(text: str) -> str:
-    name = '/' + text.strip('/')
-    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
-        raise argparse.ArgumentTypeError(f'{text!r}: not a valid node name')
-    return name
+    return NOT_ALL_TOLD if given.strict and not everything else DONE
 
 
 def _kinds(text: str) -> tuple[str, ...]:

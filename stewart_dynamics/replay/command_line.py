@@ -19,22 +19,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import io
 from pathlib import Path
-import re
-import signal
-import sys
 from typing import TYPE_CHECKING
 
-from stewart_dynamics.errors import StewartError
-from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, NODE, Options
-from stewart_dynamics.replay.unexpected_errors import unexpected
+from stewart_dynamics.program import DONE, interrupt_on_signals, node_name, Program
+from stewart_dynamics.replay.options import LIMIT_MET, NODE, Options
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters import Parameters
 
-_INTERRUPTED = 130
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_PROGRAM = Program('stewart_replay')
 _CUTOFF = 10.0
 _TOPICS = {
     'pose': 'poses', 'twist': 'twists', 'accel': 'accelerations',
@@ -52,36 +46,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.cutoff and not given.differentiate:
         parser.error('--cutoff: needs --differentiate')
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
-            stream.reconfigure(errors='backslashreplace')
-    try:
-        return _run(given, _options(given))
-    except StewartError as exc:
-        _complain(exc)
-        return BAD_INPUT
-    except OSError as exc:  # what cannot be read is a StewartError
-        where = f'{exc.filename}: ' if exc.filename else ''
-        _complain(f'{where}cannot be written: {exc.strerror or exc}')
-        return BAD_INPUT
-    except Exception as exc:  # exit codes and one line also for errors that no rule covers
-        _complain(unexpected(exc))
-        return BAD_INPUT
-    except KeyboardInterrupt as exc:
-        _complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
-        return _INTERRUPTED
-
-
-def _interrupted(number: int, frame: object) -> None:
-    """Stop; further signals are ignored while partial results are removed."""
-    for each in _SIGNALS:
-        signal.signal(each, signal.SIG_IGN)
-    raise KeyboardInterrupt
+    return _PROGRAM.exit_code(lambda: _run(given, _options(given)))
 
 
 def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='stewart_replay', formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Compute leg lengths, forces and singularity warnings of recorded setpoints, '
                     'as the node does, bit for bit.',
         epilog='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node), '
@@ -102,7 +72,7 @@ def _arguments() -> argparse.ArgumentParser:
                         help='exit code 1 when a limit or singularity warning was met')
     topics = parser.add_argument_group(
         'topics', 'Inputs are looked for under the usual names, then by their type.')
-    topics.add_argument('--node', default=NODE, metavar='NAME', type=_node,
+    topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
                         help=f'name before the usual topics (default: {NODE})')
     for name, what in _TOPICS.items():
         topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
@@ -151,28 +121,27 @@ def _run(given: argparse.Namespace, options: Options) -> int:
     from stewart_dynamics.replay.one_bag import FUNCTIONS
     from stewart_dynamics.replay.report import share_plotly
 
-    for each in _SIGNALS:
-        signal.signal(each, _interrupted)
+    interrupt_on_signals()
     parameters = Parameters.from_yaml(given.params, given.node)
     bags = folders_of_results(given.bags, given.output)
     if options.report and given.plotly == 'shared':
         options = options._replace(plotly=share_plotly(given.output))
     if HINT:
-        print(f'stewart_replay: {HINT}', file=sys.stderr)
+        _PROGRAM.complain(HINT)
     prepare(FUNCTIONS)  # now, side by side, and not in each process
     for mistake in likely_mistakes(parameters):
-        _complain(f'warning: {mistake}')
+        _PROGRAM.complain(f'warning: {mistake}')
     if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
         return _one(*bags[0], parameters, options, given.strict)
     fleet = replay_fleet(
         bags, parameters, given.output, options, given.jobs, given.scheduler)
     for ended in fleet.ended:
         if ended.text and len(bags) <= _FEW:
-            _say(f'{ended.text}\n')
+            _PROGRAM.say(f'{ended.text}\n')
         if ended.error:
-            _complain(ended.error)
-    _say(fleet.text().partition('\n')[0])
-    _say(f'results: {given.output / FLEET_PAGE}')
+            _PROGRAM.complain(ended.error)
+    _PROGRAM.say(fleet.text().partition('\n')[0])
+    _PROGRAM.say(f'results: {given.output / FLEET_PAGE}')
     return fleet.code(given.strict)
 
 
@@ -195,31 +164,12 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
             bar.update(read)
 
         replayed = replay(bag, parameters, folder, options, progress)
-    _say(replayed.text)
-    _say(f'results: {folder}')
+    _PROGRAM.say(replayed.text)
+    _PROGRAM.say(f'results: {folder}')
     if replayed.summary['missing']:
-        _complain(f'{bag}: part of it could not be read: {"; ".join(replayed.summary["missing"])}')
+        missing = '; '.join(replayed.summary['missing'])
+        _PROGRAM.complain(f'{bag}: part of it could not be read: {missing}')
     return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
-
-
-def _say(text: str) -> None:
-    print(_printable(text))
-
-
-def _complain(what: object) -> None:
-    print(f'stewart_replay: {_printable(" ".join(str(what).split()))}', file=sys.stderr)
-
-
-def _printable(text: str) -> str:
-    """Return text in which control characters, as names in bags may hold, are escaped."""
-    return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)
-
-
-def _node(text: str) -> str:
-    name = '/' + text.strip('/')
-    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
-        raise argparse.ArgumentTypeError(f'{text!r}: not a valid node name')
-    return name
 
 
 def _frequency(text: str) -> float:

@@ -27,9 +27,10 @@ import tempfile
 from typing import Any, NamedTuple, TextIO
 from urllib.parse import quote
 
+from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.html_pages import page
-from stewart_dynamics.replay.options import BAD_INPUT, DONE, LIMIT_MET, PARTLY_READ
+from stewart_dynamics.replay.options import LIMIT_MET
 from stewart_dynamics.replay.spreadsheet import harmless
 from stewart_dynamics.replay.summary_text import plural
 from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN

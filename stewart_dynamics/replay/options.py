@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Options of a replay, and the exit codes."""
+"""Options of a replay, and its exit code."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-DONE, LIMIT_MET, BAD_INPUT, PARTLY_READ = range(4)
+from stewart_dynamics.program import DONE, PARTLY_READ
+
+LIMIT_MET = 1
 NODE = '/stewart_dynamics'
 
 

@@ -1,0 +1,111 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the programs without ROS have in common: exit codes, messages in one line, signals."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import io
+from pathlib import Path
+import re
+import signal
+import sys
+
+from stewart_dynamics.errors import one_line, StewartError
+
+DONE, BAD_INPUT, PARTLY_READ, INTERRUPTED = 0, 2, 3, 130
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Program:
+    """
+    A program: what it prints, and how it ends.
+
+    Parameters
+    ----------
+    name : str
+        Of the executable, before each message on stderr.
+
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def exit_code(self, run: Callable[[], int]) -> int:
+        """Run and return the exit code; errors of any kind end it with one line on stderr."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):  # names in bags may not be encodable
+                stream.reconfigure(errors='backslashreplace')
+        try:
+            return run()
+        except StewartError as exc:
+            self.complain(exc)
+            return BAD_INPUT
+        except OSError as exc:  # what cannot be read is a StewartError
+            where = f'{exc.filename}: ' if exc.filename else ''
+            self.complain(f'{where}cannot be written: {exc.strerror or exc}')
+            return BAD_INPUT
+        except Exception as exc:  # exit codes and one line also for errors that no rule covers
+            self.complain(unexpected(exc))
+            return BAD_INPUT
+        except KeyboardInterrupt as exc:
+            self.complain(f'interrupted: {exc}' if str(exc) else 'interrupted')
+            return INTERRUPTED
+
+    def say(self, text: str) -> None:
+        """Print on stdout."""
+        print(_printable(text))
+
+    def complain(self, what: object) -> None:
+        """Print one line on stderr."""
+        print(f'{self.name}: {_printable(one_line(what))}', file=sys.stderr)
+
+
+def interrupt_on_signals() -> None:
+    """From now on raise KeyboardInterrupt on the first signal that ends programs."""
+    for each in _SIGNALS:
+        signal.signal(each, _interrupted)
+
+
+def _interrupted(number: int, frame: object) -> None:
+    """Stop; further signals are ignored while partial results are removed."""
+    for each in _SIGNALS:
+        signal.signal(each, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def unexpected(exc: BaseException) -> str:
+    """Return what an error is that should not occur, in one line, and where it was raised."""
+    if isinstance(exc, MemoryError):
+        return f'out of memory: {one_line(exc)}' if str(exc) else 'out of memory'
+    at = exc.__traceback__
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    where = f' ({Path(at.tb_frame.f_code.co_filename).name}, line {at.tb_lineno})' if at else ''
+    return f'unexpected error, please report it: {type(exc).__name__}: {one_line(exc)}{where}'
+
+
+def node_name(text: str) -> str:
+    """Return the name of a node as an option gives it, with its first slash."""
+    name = '/' + text.strip('/')
+    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', name):
+        raise argparse.ArgumentTypeError(f'{text!r}: not a valid node name')
+    return name
+
+
+def _printable(text: str) -> str:
+    """Return text in which control characters, as names in bags may hold, are escaped."""
+    return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)
