@@ -565,7 +565,7 @@ def without(profile: Path, elements: str) -> str:
     return str(lacking)
 
 
-@pytest.mark.skipif(KILTED, reason='Fast DDS 3 does not report a peer without certificate')
+@pytest.mark.skipif(KILTED, reason='not yet proven with Fast DDS 3: see security/README.md')
 @pytest.mark.slow
 def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
