@@ -133,7 +133,6 @@ environment() {
   cat > "$making/$1/environment.sh" << END
 STEWART_KEYS=\$(cd "\$(dirname "\${BASH_SOURCE[0]}")" && pwd)
 export STEWART_KEYS FASTRTPS_DEFAULT_PROFILES_FILE="\$STEWART_KEYS/profile.xml"
-export FASTDDS_DEFAULT_PROFILES_FILE="\$FASTRTPS_DEFAULT_PROFILES_FILE"  # as Kilted calls it
 export ROS_AUTOMATIC_DISCOVERY_RANGE=SYSTEM_DEFAULT SKIP_DEFAULT_XML_FILE=1
 export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
 ${2:-unset OPENSSL_CONF}

@@ -135,8 +135,8 @@ def test_the_node_describes_each_parameter(declared: Any) -> None:
         assert each.dynamic_typing == (parameter.sizes == (1, 6))
         assert not each.integer_range
         assert bounds(each) == (
-            [(parameter.minimum, parameter.maximum, 0.0)] if parameter.minimum == 0.0
-            or parameter.minimum == 1.0 else [])
+            [(parameter.minimum, parameter.maximum, 0.0)] if parameter.minimum > -math.inf
+            else [])
         assert parameter.rule in each.additional_constraints
         assert each.additional_constraints.endswith(
             'set also while active' if parameter.while_active else 'set only while unconfigured')

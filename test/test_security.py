@@ -232,6 +232,8 @@ def test_without_dds_security_nothing_starts(domain: int, tmp_path: Path, name: 
 
 
 KILTED = PROFILES == 'FASTDDS_DEFAULT_PROFILES_FILE'
+# What make_keys.sh sets: Kilted reads it as well.
+OF_KEYS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 KEYSTORE = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce',
             'ROS_SECURITY_KEYSTORE': '{tmp}/keystore'}
 TLS = {PROFILES: '{tmp}/profile.xml', 'STEWART_KEYS': '{tmp}',
@@ -563,6 +565,7 @@ def without(profile: Path, elements: str) -> str:
     return str(lacking)
 
 
+@pytest.mark.skipif(KILTED, reason='not yet proven with Fast DDS 3: see security/README.md')
 @pytest.mark.slow
 def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
@@ -583,7 +586,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     turned_away = [
         crowd.partner('self_signed', 2, file=of['node'], **own),
         crowd.partner('no_certificate', 3, file=of['node'],
-                      **{PROFILES: without(dials, NO_CERTIFICATE)}),
+                      **{OF_KEYS: without(dials, NO_CERTIFICATE)}),
         crowd.partner('certificate_of_a_listener', 4, file=of['node'],
                       STEWART_KEYS=str(folder / 'source'))]
     crowd.until(lambda: all('Handshake failed' in printed(each) for each in turned_away),
@@ -591,7 +594,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     # Not before: a peer that connects without TLS delays the next ones.
     unheard = [
         crowd.partner('plain_tcp', 5, file=of['node'],
-                      **{PROFILES: without(dials, 'tls')}),
+                      **{OF_KEYS: without(dials, 'tls')}),
         crowd.partner('udp_and_shm', 6)]
     crowd.until_tried(turned_away + unheard)
     crowd.until(flows(receiver, 1), 'forces flow on')
@@ -608,7 +611,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
 
     assert node.stdout == ''
     plain = crowd.partner('plain_tcp_listens', 7, file=of['bare'], **{
-        PROFILES: without(folder / 'bare' / 'profile.xml', 'tls')})
+        OF_KEYS: without(folder / 'bare' / 'profile.xml', 'tls')})
     crowd.until_tried([plain])
     crowd.until(flows(receiver, 1), 'forces flow on')
     impostor = crowd.partner('self_signed_listens', 8, file=of['spare'], **own)
@@ -622,7 +625,6 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     assert_only(receiver, 1)
 
 
-@pytest.mark.skipif(KILTED, reason='with Fast DDS 3 the node did not answer it')
 @pytest.mark.slow
 def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
@@ -639,10 +641,10 @@ def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None
     stranger = crowd.partner('udp_and_shm', 3)
     reader = crowd.partner(
         'no_certificate', 4, file=read / 'node' / 'environment.sh',
-        **{PROFILES: without(read / 'node' / 'profile.xml', NO_CERTIFICATE)})
+        **{OF_KEYS: without(read / 'node' / 'profile.xml', NO_CERTIFICATE)})
     crowd.node('open')
     crowd.node('fooled', file=fooled / 'node' / 'environment.sh',
-               **{PROFILES: without(fooled / 'node' / 'profile.xml', 'verify_mode')})
+               **{OF_KEYS: without(fooled / 'node' / 'profile.xml', 'verify_mode')})
     crowd.until(lambda: reader.heard('setpoint/pose', 1), 'who has no certificate reads')
     crowd.until(flows(impostor, 2), 'who has signed its own is answered')
     crowd.until(flows(stranger, 3), 'who has neither keys nor profile is answered')

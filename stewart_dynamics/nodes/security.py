@@ -107,14 +107,13 @@ def _check_dds_security(arguments: Sequence[str]) -> str:
 
 
 def _check_profiles() -> None:
-    """Check the file of profiles that is in effect; Kilted takes the old name, too."""
+    """Check the file of profiles; Kilted takes the old name, too."""
     new, old = os.environ.get(_NEW), os.environ.get(_OLD)
     if PROFILES == _OLD and new and not old:
         raise StewartError(f'{_NEW}: {new}: this Fast DDS reads {_OLD} in its place')
-    if PROFILES == _NEW and new:
-        _check_profile(_NEW, Path(new))
-    elif old:
-        _check_profile(_OLD, Path(old))
+    for variable, path in ((_NEW, new), (_OLD, old)):
+        if path and variable in (PROFILES, _OLD):
+            _check_profile(variable, Path(path))
 
 
 def _check_profile(variable: str, path: Path) -> None:
