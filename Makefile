@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
 .PHONY: bags bench bench-identify bench-loop bench-node bench-planned bench-replay clean demo \
-  demo-loop demo-mujoco demo-ship docs docs-site environment lint test
+  demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
 PYTHONS := $(or $(PYTHON),python3 python3.12 python3.13 python3.11 python3.10)
@@ -85,6 +85,9 @@ demo-mujoco: $(INSTALLED)
 
 demo-ship: $(INSTALLED)
 	@$(VENV)/bin/python demo/ship.py
+
+demo-identify: $(INSTALLED)
+	@$(VENV)/bin/python demo/identify.py
 
 bench: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/bench.py --write

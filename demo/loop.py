@@ -24,7 +24,7 @@ for each command, so that no figure depends on the load of the computer.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import json
 import math
 from pathlib import Path
@@ -130,15 +130,40 @@ class Loop:
         A command ``simulator`` takes the place of stewart_simulator, with its topics.
         """
         mass, inertia = self._payload
+        simulated = {
+            'platform.mass': payload * mass, 'platform.inertia': (payload * inertia).tolist()}
+        return Run(feed_forward, payload, self.errors(
+            feed_forward, simulated, progress, Recorder(), simulator=simulator))
+
+    def errors(self, feed_forward: bool, simulated: Mapping[str, Any],
+               progress: Callable[[int], object], recorder: Recorder,
+               hexapod: Path | None = None, simulator: Sequence[str | Path] = ()) -> Errors:
+        """
+        Run the four programs and return the errors.
+
+        Parameters
+        ----------
+        feed_forward : bool
+            Whether the controller adds the node's forces.
+        simulated : mapping
+            Parameters of the simulator that are not those of the hexapod's file.
+        progress : callable
+            Called with the simulated time [ns].
+        recorder : Recorder
+            Records, and is destroyed.
+        hexapod : Path, optional
+            Another parameter file for the node.
+        simulator : sequence of str, optional
+            A command in the place of stewart_simulator, with its topics.
+
+        """
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
         given['leg_controller']['ros__parameters']['feed_forward'] = feed_forward
-        given['stewart_simulator']['ros__parameters'].update({
-            'platform.mass': payload * mass, 'platform.inertia': (payload * inertia).tolist()})
-        recorder = Recorder()
+        given['stewart_simulator']['ros__parameters'].update(simulated)
+        files = self._files | ({'stewart_dynamics': [hexapod]} if hexapod else {})
         programs = {**PROGRAMS, 'stewart_simulator': simulator} if simulator else PROGRAMS
-        simulate(programs, self._files, given, recorder, int(self.times[-1]), progress)
-        return Run(feed_forward, payload, recorder.errors(
-            self.times, self._lengths, self._motion))
+        simulate(programs, files, given, recorder, int(self.times[-1]), progress)
+        return recorder.errors(self.times, self._lengths, self._motion)
 
 
 def _angles(r: Array) -> list[float]:

@@ -280,6 +280,21 @@ def test_forces_of_the_wrong_sign_are_named() -> None:
     assert outcome.message.endswith('likely they have another sign')
 
 
+@pytest.mark.parametrize(('factor', 'said'), [
+    (1e-3, 'the measured forces are 0.001'), (1e200, 'the measured forces are 1.'),
+    (1e304, 'numbers overflow'),
+    (5.0, 'the measured forces do not tell the mass: what no body explains is '),
+])
+def test_forces_of_another_size_are_named(factor: float, said: str) -> None:
+    history, wrong = recorded(excited, seconds=4.0, rate=200.0), LegHistory(10.0)
+    for row in history.rows(0, history.count):
+        wrong.add(tuple(factor * row[19:25]), Estimate(
+            int(row[:1].view(np.int64)[0]), tuple(row[1:19]), None, None), NO_WRENCH)
+    outcome = outcome_of(wrong)
+    assert outcome.payload is None
+    assert outcome.message.startswith(said)
+
+
 def test_after_a_restart_only_what_follows_counts() -> None:
     history = recorded(excited, true=HEXAPOD)
     for row in recorded(excited, seconds=4.0).rows(0, 2001):

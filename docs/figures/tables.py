@@ -18,13 +18,14 @@ Write the generated tables of README.md and docs/.
     python docs/figures/tables.py
 
 Parameters come from the tables of the code, measured figures from benchmarks/README.md, the
-errors in the loop from docs/figures/loop.json. Each table is between two comments of its page.
+errors in the loop from the files in docs/figures/. Each table is between two comments of its page.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,34 @@ def ship(figures: Mapping[str, Any]) -> str:
     return '\n'.join(lines)
 
 
+def identified(figures: Mapping[str, Any]) -> str:
+    """Return the table of the parameters that demo/identify.py identified."""
+    lines = ['| parameter | unit | file before | identified, 95 % interval | true |',
+             '| --- | --- | --- | --- | --- |']
+    for each in figures['parameters']:
+        half = each['half_width']
+        digits = max(1 - math.floor(math.log10(half)), 0) if half > 0.0 else 4
+        lines.append(f'| `{each["name"]}` | {each["unit"]} | {each["before"]:g} | '
+                     f'{each["after"]:.{digits}f} +- {half:.{digits}f} | {each["true"]:g} |')
+    return '\n'.join(lines)
+
+
+def before_and_after(figures: Mapping[str, Any]) -> str:
+    """Return the table of the errors that demo/identify.py measured: RMS and peak."""
+    lines = ['| forces of the node | legs, um | platform, um | platform, urad | legs, to before |',
+             '| --- | --- | --- | --- | --- |']
+    labels = {'before': 'by the file before', 'after': 'by the identified file',
+              'true parameters': 'by the true parameters'}
+    first = figures['runs'][0]['rms']['all legs']
+    for run in figures['runs']:
+        line = f'| {labels[run["name"]]} |'
+        for name in ('all legs', 'position', 'rotation'):
+            line += f' {_digits(run["rms"][name])} ({_digits(run["peak"][name])}) |'
+        ratio = first / run['rms']['all legs']
+        lines.append(f'{line} {f"1/{ratio:.0f}" if ratio > 1.0 else ""} |')
+    return '\n'.join(lines)
+
+
 def _digits(number: float) -> str:
     """Return three digits of a number, or all before its point."""
     return f'{number:.0f}' if number >= 100.0 else f'{number:.3g}'
@@ -152,8 +181,8 @@ def accuracy_and_speed() -> str:
 
 def pages() -> dict[Path, dict[str, str]]:
     """Return of each page with generated tables their names and texts."""
-    figures, on_a_ship = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
-                          for name in ('loop', 'ship'))
+    figures, on_a_ship, known = (json.loads((HERE / f'{name}.json').read_text(encoding='utf-8'))
+                                 for name in ('loop', 'ship', 'identify'))
     return {
         ROOT / 'README.md': {
             'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
@@ -163,7 +192,10 @@ def pages() -> dict[Path, dict[str, str]]:
             'parameters of stewart_trajectory': parameters_of(ReferenceMotionParameters),
             'parameters of stewart_simulator': parameters_of(SimulatorParameters)},
         ROOT / 'docs' / 'simulator.md': {
-            'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)}}
+            'errors in the loop': loop(figures), 'errors on a ship': ship(on_a_ship)},
+        ROOT / 'docs' / 'identify_from_bags.md': {
+            'identified on the simulator': identified(known),
+            'errors before and after': before_and_after(known)}}
 
 
 def generated(text: str, tables: Mapping[str, str]) -> str:

@@ -66,6 +66,9 @@ _FOURTH_VARIANCE = float(_FOURTH @ _FOURTH)
 # Friction is uncertain by its own size; what holds a leg at rest is anything up to Coulomb's.
 _STATIC = 1.0 / math.sqrt(3.0)
 
+# What overflows is found by its result.
+_QUIET = np.errstate(over='ignore', invalid='ignore')
+
 _LEGS = np.arange(6)
 _COLUMNS = TEN + FRICTION  # of a leg; then its force less that of the model, and that
 
@@ -122,10 +125,15 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
     seconds = float(stamps[-1] - stamps[0]) * 1e-9
     samples = work.samples()
     if samples is None:
-        yield Outcome(f'too short: {seconds:.1f} s of measured legs, '
-                      f'{LEAST_WINDOWS * work.half_width:.1f} s without gaps are needed')
+        needed = LEAST_WINDOWS * work.half_width
+        more = '' if needed < p['payload.window'] else ', more than payload.window'
+        yield Outcome(f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps '
+                      f'are needed{more}')
         return
     yield None
+    if not math.isfinite(work.scale):
+        yield Outcome('numbers overflow')
+        return
     if not _LEAST_SCALE < work.scale < _MOST_SCALE:
         what = 'sign' if work.scale < 0.0 else 'unit'
         yield Outcome(f'the measured forces are {work.scale:.3g} times those of the model: likely '
@@ -133,10 +141,15 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
         return
     given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
     fit = BodyFit(samples, given, p['singularity.characteristic_length'])
-    for _ in range(ROUNDS):
-        fit.improve()
-        yield None
-    yield _outcome(Payload(int(stamps[-1]), seconds, fit.result(), given))
+    try:
+        for _ in range(ROUNDS):
+            fit.improve()
+            yield None
+        fitted = fit.result()
+    except np.linalg.LinAlgError as exc:
+        yield Outcome(f'the fit failed: {exc}')
+        return
+    yield _outcome(Payload(int(stamps[-1]), seconds, fitted, given))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -176,6 +189,7 @@ class _Windows:
         # Of the noise of an acceleration, by that of a twist: the window's slope.
         self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
 
+    @_QUIET
     def add(self, history: LegHistory, begin: int, first: int, end: int) -> None:
         """Add measurements from one to another; the first of all is ``begin``."""
         low, high = max(begin, first - 2), min(begin + len(self._stamps), end + 2)
@@ -238,6 +252,7 @@ class _Windows:
         self._sums[low:high] += np.tensordot(share, values, 1)
         self._covered[low:high] += share.sum(axis=1)
 
+    @_QUIET
     def samples(self) -> Samples | None:
         """Return the means over the windows, None where they are too few."""
         sound = self._covered > _COVERED * self.half_width
@@ -269,8 +284,8 @@ def _outcome(payload: Payload) -> Outcome:
     if not mass > 0.0:
         return Outcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
     if not fitted.known[0]:
-        return Outcome(f'the measured forces do not tell the mass: {mass:.6g} +- '
-                       f'{fitted.half_widths[0]:.3g} kg')
+        return Outcome('the measured forces do not tell the mass: what no body explains is '
+                       f'{fitted.residual:.3g} N (RMS)')
     return Outcome(_words(payload), payload)
 
 

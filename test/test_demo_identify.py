@@ -1,0 +1,91 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The demo of the identification: its bag, its tables, and what it cannot do in one line."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+from running import PLATFORM, ROOT
+from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.identification.identify import Identification
+from stewart_dynamics.identification.options import Options
+from stewart_dynamics.identification.results import document
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.messages.joint_state import JointStateWriter
+
+
+@pytest.fixture(scope='module')
+def demo() -> ModuleType:
+    """Return the demo as a module."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / 'demo'))
+        return importlib.import_module('identify')
+
+
+def states_of(parameters: Parameters, motion: Motion, stamps: np.ndarray) -> list[bytes]:
+    """Return what the simulator would publish, without noise."""
+    result = StewartPlatform(parameters).inverse_dynamics(motion)
+    return [each.tobytes() for each in JointStateWriter(parameters['joints']).layout(True).write(
+        stamps, result.lengths - parameters['geometry.zero_length'], result.rates, result.forces)]
+
+
+def test_the_recorded_states_tell_the_true_parameters(demo: ModuleType, tmp_path: Path) -> None:
+    given = Parameters.from_yaml(PLATFORM)
+    true = given.replaced(demo.TRUE)
+    settings = ReferenceMotionParameters.from_yaml(ROOT / 'config' / 'trajectory_fourier.yaml')
+    times = np.arange(0.0, 20.0, 0.002)
+    stamps = demo.BEGIN + np.rint(times * 1e9).astype(np.int64)
+    states = states_of(true, motion_at(settings, times), stamps)
+    # While it waits for the first command, the simulator repeats its state.
+    assert demo.write_bag(tmp_path / 'bag', [states[0]] * 5 + states) == len(states) - 1
+    work = Identification(given, Options())
+    work.read(tmp_path / 'bag', lambda many: None)
+    found = work.result()
+    numbers = demo.values(document(found, Options()), true)
+    work.close()
+    by_name = {each.name: each for each in numbers}
+    assert len(by_name) == 12
+    assert by_name['platform.mass'].before == 150.0
+    nearly = {'kg': 0.05, 'm': 1e-4, 'kg m^2': 0.05, 'N s/m': 2.0, 'N': 1.0}
+    for each in numbers:
+        assert abs(each.after - each.true) < nearly[each.unit], each
+    lines = demo.table(numbers, []).splitlines()
+    assert lines[1].split() == ['platform.mass', 'kg', '150', *lines[1].split()[3:6], '190']
+
+
+@pytest.mark.parametrize('option, said', [
+    ('--params', 'nowhere.yaml'), ('--motion', 'nowhere.yaml'), ('--recorded', 'at least 2')])
+def test_what_cannot_be_run_is_reported_in_one_line(
+        demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
+        said: str) -> None:
+    for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
+        monkeypatch.setenv(name, '1')  # main sets what is missing
+    value = '0.5' if option == '--recorded' else 'nowhere.yaml'
+    monkeypatch.setattr(sys, 'argv', [
+        'identify.py', '--output', str(tmp_path / 'out'), option, value])
+    with pytest.raises(SystemExit) as ended:
+        demo.main()
+    line = ended.value.code
+    assert isinstance(line, str)
+    assert line.startswith('demo-identify: ')
+    assert '\n' not in line
+    assert said in line
