@@ -45,10 +45,12 @@ from stewart_dynamics.identification.intervals import errors_of, TWO_SIDED
 from stewart_dynamics.identification.sums import sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.reference_motion import motion_at
+from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 
 sys.path.append(str(HERE.parent / 'test'))
 from recorded import (  # noqa: E402, I100, I202
-    about, at_rest, fourier, NOISE, pinocchio_forces, Recorded, recorded, write_bag)
+    about, at_rest, fourier, MotionAt, NOISE, pinocchio_forces, Recorded, recorded, write_bag)
 from referees import random_motion, random_parameters, rng  # noqa: E402, I202
 
 BEGIN, END = '<!-- identification: begin -->', '<!-- identification: end -->'
@@ -107,13 +109,25 @@ def identify(folder: Path, bags: Sequence[Path], *options: str,
     return found, seconds, usage.ru_maxrss / 1024.0, said
 
 
-def accuracy(folder: Path, forces: Array) -> list[str]:
-    """Return the lines of errors on the motion of a minute, with and without measured rates."""
-    rows = [('largest error, one minute at 1 kHz', 'with rates', 'without', 'at most', 'unit')]
+def designed(folder: Path) -> MotionAt:
+    """Return the motion of a minute that the program designs from the parameter file."""
+    subprocess.run([executable('stewart_identify'), '--design', '--params', str(FILE), '--output',
+                    str(folder / 'designed')], check=True, stdout=subprocess.DEVNULL)
+    motion = ReferenceMotionParameters.from_yaml(folder / 'designed' / 'trajectory.yaml')
+    return lambda times: motion_at(motion, np.maximum(times, 0.0))
+
+
+def accuracy(folder: Path) -> list[str]:
+    """Return the lines of errors on a designed motion, with and without measured rates."""
+    motion = designed(folder)
+    times = np.arange(round(SECONDS * RATE)) / RATE
+    forces = pinocchio_forces(TRUE, motion(times - NOISE.delay))
+    rows = [('largest error, one minute of a designed motion at 1 kHz', 'with rates', 'without',
+             'at most', 'unit')]
     columns = []
     seconds = memory = 0.0
     for with_rates in (True, False):
-        given = recorded(TRUE, fourier(SEED), SECONDS, RATE, 1, NOISE, forces, with_rates)
+        given = recorded(TRUE, motion, SECONDS, RATE, 1, NOISE, forces, with_rates)
         bag = write_bag(folder / f'minute {with_rates}', given, GIVEN['joints'])
         found, took, peak, said = identify(folder, [bag])
         assert found is not None, said
@@ -275,7 +289,7 @@ def main() -> None:
         folder = Path(name)
         times = np.arange(round(SECONDS * RATE)) / RATE
         forces = pinocchio_forces(TRUE, fourier(SEED)(times - NOISE.delay))
-        for part in (accuracy(folder, forces), coverage(forces, options.seeds), not_told(folder),
+        for part in (accuracy(folder), coverage(forces, options.seeds), not_told(folder),
                      five_masses(folder), volume(folder)):
             print('\n'.join(part), flush=True)
             lines += [*part, '']
