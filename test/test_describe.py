@@ -52,6 +52,13 @@ def test_what_exists_is_kept_unless_it_may_be_replaced(tmp_path, capsys):
     assert (tmp_path / 'a.sdf').read_text() != 'mine'
 
 
+def test_the_parameters_are_those_of_a_node_by_its_name(tmp_path):
+    stacked = PLATFORM.with_name('stacked.yaml')
+    assert run('--params', stacked, '--node', 'upper_hexapod', '--output', tmp_path) == 0
+    assert '<link name="stage">' in (tmp_path / 'stacked.urdf').read_text()
+    assert run('--params', stacked, '--output', tmp_path, '--force') == 2
+
+
 @pytest.mark.parametrize('kind', ['urdf', 'sdf', 'xml'])
 def test_each_file_is_read_into_a_parameter_file_that_the_node_takes(kind, tmp_path, capsys):
     if kind == 'xml':

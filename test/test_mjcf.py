@@ -193,3 +193,14 @@ def test_legs_without_mass_are_given_one_that_changes_forces_by_less_than_their_
     assert relative(forces, truth) < 1e-3
     assert simulation.model.body('leg_1_piston').mass[0] == pytest.approx(
         1e-4 * p['platform.mass'])
+
+
+def test_meshes_with_a_uri_do_not_keep_mujoco_from_loading():
+    p = Parameters.from_yaml(PLATFORM).replaced({
+        'meshes.platform': 'package://my_hexapod/top.stl', 'meshes.piston': 'rod.obj'})
+    text = mjcf(Hexapod(p), 'hexapod')
+    assert 'package:' not in text
+    triangle = b'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n'
+    model = mujoco.MjModel.from_xml_string(text, {'rod.obj': triangle})
+    assert model.nmesh == 1
+    assert model.body('leg_1_piston').mass[0] == 6.0

@@ -66,6 +66,9 @@ def _arguments() -> argparse.ArgumentParser:
                         help='folder of the results (default: the current one)')
     parser.add_argument('--name', type=_name, metavar='NAME',
                         help='name of the model and of the files (default: that of FILE)')
+    parser.add_argument('--node', default='', metavar='NAME',
+                        help='name of the node whose parameters are read (default: '
+                             'stewart_dynamics)')
     parser.add_argument('--force', action='store_true', help='replace files that exist')
     parser.add_argument('--strict', action='store_true',
                         help='exit code 1 where a likely mistake was found')
@@ -102,7 +105,7 @@ def _write(given: argparse.Namespace) -> int:
     from stewart_dynamics.description.urdf import Ros2Control, urdf
     from stewart_dynamics.parameters import Parameters
 
-    parameters = Parameters.from_yaml(given.params)
+    parameters = Parameters.from_yaml(given.params, given.node)
     hexapod, name = Hexapod(parameters), given.name or given.params.stem
     control = None
     if given.ros2_control is not None:
@@ -146,7 +149,7 @@ def _check_new(paths: Iterable[Path], given: argparse.Namespace) -> None:
 
 
 def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
-    """Write all files or none."""
+    """Write all files, or none where one exists."""
     paths = {given.output / name: text for name, text in files.items()}
     _check_new(paths, given)
     for path, text in paths.items():

@@ -60,7 +60,7 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     # What is in the hexapod's world collides with it, but not its parts with each other.
     add(add(root, 'default'), 'geom', contype='1', conaffinity='0', mass='0')
     add(add(root, 'visual'), 'headlight', ambient='0.4 0.4 0.4', diffuse='0.5 0.5 0.5')
-    looks = shapes(hexapod)
+    looks = shapes(hexapod, uris=False)  # MuJoCo knows paths alone
     _assets(root, looks)
     world = add(root, 'worldbody')
     base = add(world, 'body', name=hexapod.base_body)

@@ -62,20 +62,20 @@ class Shape(NamedTuple):
     scale: float = 1.0
 
 
-def shapes(hexapod: Hexapod) -> dict[str, tuple[Shape, ...]]:
-    """Return the shapes of each body, by its name."""
+def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[Shape, ...]]:
+    """Return the shapes of each body, by its name; without ``uris`` only meshes that are paths."""
     p = hexapod.parameters
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
     size = float(np.mean(np.linalg.norm(platform - platform.mean(axis=0), axis=1)))
     found = {}
     for name, kind, joints in ((hexapod.base, 'base', base),
                                (hexapod.platform, 'platform', platform)):
-        found[name] = _mesh(hexapod, kind) or (_plate(kind, joints, _PLATE * size), *(
+        found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, _PLATE * size), *(
             Shape('sphere', 'joint', joint, np.eye(3), _BALL * size) for joint in joints))
     for leg in hexapod.legs:
-        found[leg.cylinder.name] = _mesh(hexapod, 'cylinder') or (
+        found[leg.cylinder.name] = _mesh(hexapod, 'cylinder', uris) or (
             _rod('cylinder', _BARREL * size, _BARREL_LENGTH * _shortest(leg), 1.0),)
-        found[leg.piston.name] = _mesh(hexapod, 'piston') or (
+        found[leg.piston.name] = _mesh(hexapod, 'piston', uris) or (
             _rod('piston', _ROD * size, _ROD_LENGTH * _shortest(leg), -1.0),)
     return found
 
@@ -101,10 +101,10 @@ def _plate(kind: str, joints: Array, thickness: float) -> Shape:
     return Shape('cylinder', kind, center, axes.T, max(radius, thickness), thickness)
 
 
-def _mesh(hexapod: Hexapod, kind: str) -> tuple[Shape, ...]:
+def _mesh(hexapod: Hexapod, kind: str, uris: bool) -> tuple[Shape, ...]:
     p = hexapod.parameters
     file = p[f'meshes.{kind}']
-    if not file:
+    if not file or (not uris and '://' in file):
         return ()
     offset = p[f'meshes.{kind}_offset']
     return (Shape('mesh', kind, offset[:3], from_euler(offset[3:]), file=file,

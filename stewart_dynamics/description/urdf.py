@@ -194,8 +194,8 @@ def _ros2_control(root: ET.Element, hexapod: Hexapod, name: str, control: Ros2Co
     hardware = add(system, 'hardware')
     add(hardware, 'plugin', HARDWARE.get(control.hardware, control.hardware))
     if control.hardware == TOPIC:
-        add(hardware, 'param', 'stewart_simulator/commands', name='joint_commands_topic')
-        add(hardware, 'param', 'stewart_simulator/leg_states', name='joint_states_topic')
+        add(hardware, 'param', '/hexapod/joint_commands', name='joint_commands_topic')
+        add(hardware, 'param', '/hexapod/joint_states', name='joint_states_topic')
     for leg in hexapod.legs:
         joint = add(system, 'joint', name=leg.name)
         for interface in control.interfaces:
