@@ -46,7 +46,7 @@ def tables(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_generated_tables_are_current(tables: ModuleType) -> None:
     pages = tables.pages()
     assert {path.relative_to(ROOT).as_posix() for path in pages} == {
-        'README.md', 'docs/parameters.md', 'docs/simulator.md'}
+        'README.md', 'docs/parameters.md', 'docs/simulator.md', 'docs/identify_from_bags.md'}
     for path, own in pages.items():
         text = path.read_text(encoding='utf-8')
         assert tables.generated(text, own) == text, 'run: python docs/figures/tables.py'
