@@ -43,9 +43,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.least_squares import Information, Solution, solve
-from stewart_dynamics.mechanics.linear_parameters import about_origin, FIRST_MOMENT, INERTIA, MASS
-from stewart_dynamics.mechanics.pseudo_inertia import (
-    inertial_parameters, is_consistent, pseudo_inertia)
+from stewart_dynamics.mechanics.linear_parameters import FIRST_MOMENT, INERTIA, MASS
+from stewart_dynamics.mechanics.pseudo_inertia import is_consistent
 
 TEN = 10
 FRICTION = 3
@@ -146,15 +145,23 @@ class Samples(NamedTuple):
 
 def about(center: Array) -> Array:
     """Return the matrix (10, 10) from ten parameters about a point to those about the origin."""
-    shift = np.eye(4)
-    shift[:3, 3] = center
-    return np.column_stack([
-        inertial_parameters(shift @ pseudo_inertia(unit) @ shift.T) for unit in np.eye(TEN)])
+    matrix = np.eye(TEN)
+    coupling = _coupling(center)
+    matrix[FIRST_MOMENT, MASS], matrix[INERTIA, MASS] = center, 0.5 * coupling @ center
+    matrix[INERTIA, FIRST_MOMENT] = coupling
+    return matrix
+
+
+def _coupling(a: Array) -> Array:
+    """Return the derivative (6, 3) of the inertia of a mass of 1 at a point, by the point."""
+    x, y, z = a
+    return np.array([[0.0, 2.0 * y, 2.0 * z], [-y, -x, 0.0], [-z, 0.0, -x],
+                     [2.0 * x, 0.0, 2.0 * z], [0.0, -z, -y], [2.0 * x, 2.0 * y, 0.0]])
 
 
 class BodyFit:
     """
-    The fit, step by step: ``improve`` ROUNDS times, then ``result``.
+    The fit, step by step: ``improve`` ROUNDS times, ``correlate`` all lags, then ``result``.
 
     Parameters
     ----------
@@ -208,6 +215,20 @@ class BodyFit:
         return (np.einsum('kip,kiq->pq', columns, of.columns_by_acceleration),
                 np.einsum('kip,ki->p', columns, of.model_by_acceleration))
 
+    def correlate(self, lag: int) -> None:
+        """Take the correlation of the residuals over a lag, 0 to LAGS, into account."""
+        many = len(self._samples.differences)
+        if lag == 0:
+            self._columns = np.ascontiguousarray(self._left.swapaxes(0, 1)).reshape(many, -1)
+            self._meat = np.zeros((TEN, TEN))
+        residuals = self._residuals[..., 0].T
+        later, earlier = slice(lag, None), slice(None, many - lag)
+        correlation = residuals[later].T @ residuals[earlier] / many
+        products = (self._columns[later].T @ self._columns[earlier]).reshape(6, TEN, 6, TEN)
+        product = np.einsum('ipjq,ij->pq', products, correlation)
+        weight = 1.0 - lag / (LAGS + 1)
+        self._meat += weight * (product + product.T) if lag else product
+
     def result(self) -> FittedBody:
         """Return the body."""
         solution = self._solution
@@ -223,9 +244,7 @@ class BodyFit:
             known[INERTIA] = False
             inertia = self._given.inertia
         center = np.where(known[FIRST_MOMENT], body.center, self._given.center)
-        derivative = np.column_stack([
-            (_flat(self._body(change + step)) - _flat(self._body(change - step))) / (
-                2.0 * step.max()) for step in np.diag(1e-4 * self._scales)])
+        derivative = self._derivative(change)
         covariance = derivative @ self._covariance(solution) @ derivative.T
         quantile = _NORMAL_95 + _STUDENT_95 / self._freedom
         half_widths = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -238,30 +257,27 @@ class BodyFit:
         mass = self._given.mass + float(change[MASS])
         offset = change[FIRST_MOMENT] / mass
         inertia = (self._given.inertia + change[INERTIA]
-                   - about_origin(mass, offset, np.zeros(6)))
+                   - 0.5 * mass * _coupling(offset) @ offset)
         return Body(mass, self._given.center + offset, inertia)
+
+    def _derivative(self, change: Array) -> Array:
+        """Return the derivative (10, 10) of mass, center and inertia by the change."""
+        mass = self._given.mass + float(change[MASS])
+        offset = change[FIRST_MOMENT] / mass
+        coupling = _coupling(offset)
+        matrix = np.eye(TEN)
+        matrix[FIRST_MOMENT, MASS] = -offset / mass
+        matrix[FIRST_MOMENT, FIRST_MOMENT] /= mass
+        matrix[INERTIA, MASS] = 0.5 * coupling @ offset
+        matrix[INERTIA, FIRST_MOMENT] = -coupling
+        return matrix
 
     def _covariance(self, solution: Solution) -> Array:
         """Return the covariance of the change, for residuals that are correlated in time."""
-        many = len(self._samples.differences)
-        meat = np.zeros((TEN, TEN))
-        columns = np.ascontiguousarray(self._left.swapaxes(0, 1)).reshape(many, -1)
-        residuals = self._residuals[..., 0].T
-        for lag in range(LAGS + 1):
-            of = slice(lag, None), slice(None, many - lag)
-            correlation = residuals[of[0]].T @ residuals[of[1]] / many
-            products = (columns[of[0]].T @ columns[of[1]]).reshape(6, TEN, 6, TEN)
-            product = np.einsum('ipjq,ij->pq', products, correlation)
-            weight = 1.0 - lag / (LAGS + 1)
-            meat += weight * (product + product.T) if lag else product
         # Of the degrees of freedom the fit takes these.
-        meat *= self._freedom / (self._freedom - FRICTION - TEN / 6)
+        meat = self._meat * (self._freedom / (self._freedom - FRICTION - TEN / 6))
         # What the friction, uncertain as it is, may shift.
         by_friction = self._eliminate @ self._p
         meat += np.einsum('ikp,ikq->pq', by_friction, by_friction)
         covariance: Array = solution.covariance @ meat @ solution.covariance
         return covariance
-
-
-def _flat(body: Body) -> Array:
-    return np.array([body.mass, *body.center, *body.inertia])

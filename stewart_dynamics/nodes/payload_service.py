@@ -28,11 +28,13 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from stewart_dynamics.compilation.preparation import Preparation
-from stewart_dynamics.nodes.planned_trajectory_queue import PAUSE
 from stewart_dynamics.nodes.rclpy_workarounds import create_later_service
 from stewart_dynamics.runtime.payload import FUNCTIONS, Outcome, Payload
 
 IDENTIFY_PAYLOAD = 'identify_payload'
+
+# Between two pieces of the work [s]: it takes less than a tenth of the time, and a second in all.
+_PAUSE = 0.004
 
 
 class PayloadService:
@@ -55,7 +57,7 @@ class PayloadService:
         self.code = Preparation(*FUNCTIONS)
         self._node, self._begin, self._done = node, work, done
         self._timer = node.create_timer(
-            PAUSE, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            _PAUSE, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._timer.cancel()
         self._work: Iterator[Outcome | None] | None = None
         self._begun = 0.0

@@ -83,8 +83,11 @@ class LegHistory:
     def stamps(self, begin: int, end: int) -> Stamps:
         """Return the stamps of measurements from one to another [ns]."""
         column: Stamps = self._rows.view(np.int64)[:, _STAMP.start]
-        stamps: Stamps = column[np.arange(begin, end) % self.capacity]
-        return stamps
+        low, high = begin % self.capacity, (end - 1) % self.capacity + 1
+        if end <= begin:
+            return column[:0]
+        return column[low:high].copy() if low < high else np.concatenate([
+            column[low:], column[:high]])
 
     def rows(self, begin: int, end: int) -> Array:
         """Return a copy of the rows of measurements from one to another."""

@@ -37,7 +37,7 @@ from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.mechanics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.body_fit import (
-    about, Body, BodyFit, FittedBody, FRICTION, ROUNDS, Samples, TEN)
+    about, Body, BodyFit, FittedBody, FRICTION, LAGS, ROUNDS, Samples, TEN)
 from stewart_dynamics.mechanics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.linear_parameters import (
     COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
@@ -144,6 +144,9 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
     try:
         for _ in range(ROUNDS):
             fit.improve()
+            yield None
+        for lag in range(LAGS + 1):
+            fit.correlate(lag)
             yield None
         fitted = fit.result()
     except np.linalg.LinAlgError as exc:
