@@ -146,8 +146,9 @@ def of_shared_memory(domain: int) -> list[Path]:
             if 0 <= int(re.findall(r'port(\d+)', path.name)[0]) - first < 250]
 
 
-# By the node, or by Kilted's rclpy itself.
-TRANSITION_REJECTED = re.compile('transition rejected: |Unable to start transition ')
+def says(words: str, text: str) -> bool:
+    """Return whether a log says that a transition is rejected; Kilted has its own words."""
+    return words in text or 'Unable to start transition ' in text
 
 
 def participants(domain: int) -> int:
