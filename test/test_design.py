@@ -180,6 +180,18 @@ def test_the_file_is_for_stewart_trajectory(
     assert run(capsys, *QUICK, '--output', folder, '--force')[0] == 0
 
 
+def test_a_motion_may_be_designed_for_the_tilt_as_well(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / 'designed'
+    code, out, err = run(capsys, *QUICK[:-1], 'platform,friction,tilt', '--output', folder)
+    assert (code, err) == (0, '')
+    half_widths = {words[0]: (float(words[2]), words[3]) for words in (
+        line.split() for line in out.splitlines()[1:15])}
+    for axis in 'xy':
+        half, unit = half_widths[f'gravity.tilt_{axis}']
+        assert unit == 'rad' and 1e-6 < half < 1e-3
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     ((*QUICK, '--highest-frequency', 20), '--highest-frequency 20 Hz: must be at most --cutoff'),
     ((*QUICK[:-1], 'cylinder,piston'), 'no motion within the limits tells all of cylinder, '

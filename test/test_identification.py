@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from recorded import about, at_rest, fourier, MotionAt, Noise, Recorded, recorded, write_bag
-from referees import ROOT
+from referees import ROOT, rotation_about
 
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.identification.command_line import main
@@ -39,6 +39,9 @@ TRUE = GIVEN.replaced({
     'platform.mass': 180.0, 'platform.center_of_mass': [0.03, -0.02, 0.15],
     'platform.inertia': [14.0, 0.5, -0.3, 16.0, 0.4, 24.0],
     'actuator.viscous_friction': 400.0, 'actuator.coulomb_friction': 50.0})
+# The same on a base that is not level.
+TILTED = TRUE.replaced({'gravity': rotation_about(
+    np.array([np.cos(0.7), np.sin(0.7), 0.0]), np.radians(1.5)) @ GIVEN['gravity']})
 RATE = 100.0
 SECONDS = 20.0
 # Of 100 samples per second, each the mean of ten at 1 kHz.
@@ -49,11 +52,12 @@ Change = Callable[[Recorded], Recorded]
 @pytest.fixture(scope='module')
 def motions() -> dict[str, Recorded]:
     """Return recordings of the true hexapod."""
-    given: dict[str, tuple[MotionAt, float]] = {
-        'fourier': (fourier(3), SECONDS), 'rest': (at_rest, 6.0),
-        'diagonal': (about([1.0, 1.0, 0.0]), 10.0)}
-    return {name: recorded(TRUE, motion, seconds, RATE, 1, NOISE)
-            for name, (motion, seconds) in given.items()}
+    given: dict[str, tuple[Parameters, MotionAt, float]] = {
+        'fourier': (TRUE, fourier(3), SECONDS), 'rest': (TRUE, at_rest, 6.0),
+        'diagonal': (TRUE, about([1.0, 1.0, 0.0]), 10.0),
+        'tilted': (TILTED, fourier(3), SECONDS), 'tilted at rest': (TILTED, at_rest, 6.0)}
+    return {name: recorded(p, motion, seconds, RATE, 1, NOISE)
+            for name, (p, motion, seconds) in given.items()}
 
 
 @pytest.fixture
@@ -157,6 +161,85 @@ def test_turning_about_one_axis_tells_the_inertia_about_it(identified: Callable[
     assert not sums
 
 
+WITH_TILT = ('--identify', 'platform,friction,tilt')
+
+
+def _turned(result: Any) -> Array:
+    """Return the gravity that was identified, of the file's length."""
+    gravity: Array = np.array(result['identified']['gravity'])
+    assert np.linalg.norm(gravity) == pytest.approx(np.linalg.norm(GIVEN['gravity']), rel=1e-12)
+    return gravity
+
+
+def _degrees_between(one: Array, other: Array) -> float:
+    return float(np.degrees(np.linalg.norm(np.cross(one, other)) / (
+        np.linalg.norm(one) * np.linalg.norm(other))))
+
+
+def test_the_tilt_of_a_base_is_found_within_its_interval(
+        identified: Callable[..., Any], tmp_path: Path) -> None:
+    code, result, out, err = identified('tilted', *WITH_TILT, '--no-report', '--strict')
+    assert (code, err) == (0, '')
+    assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
+    assert _degrees_between(GIVEN['gravity'], TILTED['gravity']) > 1.4  # that of the file
+    truth = Unknowns(TRUE)
+    true = dict(zip(truth.names, truth.start, strict=True)) | {
+        'gravity.tilt_x': np.radians(1.5) * np.cos(0.7),
+        'gravity.tilt_y': np.radians(1.5) * np.sin(0.7)}
+    values, errors = values_of(result), values_of(result, 'standard_error')
+    assert set(values) == set(true)
+    for axis in 'xy':
+        low, high = values_of(result, 'interval')[f'gravity.tilt_{axis}']
+        assert low < true[f'gravity.tilt_{axis}'] < high
+        assert high - low < np.radians(0.03)
+    off = [(values[name] - value) / errors[name] for name, value in true.items()]
+    assert np.max(np.abs(off)) < 4.0
+    assert values['platform.mass'] == pytest.approx(180.0, rel=0.002)
+    for axis, center in zip('xyz', TRUE['platform.center_of_mass'], strict=True):
+        assert values[f'platform.center_of_mass.{axis}'] == pytest.approx(center, abs=1e-3)
+    assert result['residuals']['after_rms_n'] < 0.01 * result['residuals']['measured_rms_n']
+
+    assert 'gravity.tilt_y ' in out
+    written = tmp_path / 'found' / 'identified.yaml'
+    assert _degrees_between(
+        StewartPlatform.from_yaml(written).parameters['gravity'], TILTED['gravity']) < 0.02
+    (line,) = [each for each in written.read_text().splitlines() if 'gravity:' in each]
+    assert f'# m/s^2; identified {result["date"][:10]}, 95 %: turned about x by 0.0200' in line
+    assert ' rad, turned about y by 0.016' in line
+
+
+def test_a_tilted_base_is_a_likely_mistake_unless_it_is_asked_for(
+        identified: Callable[..., Any]) -> None:
+    code, result, out, err = identified('tilted', '--no-report')
+    assert (code, result, out) == (2, None, '')
+    assert 'the base looks tilted by 1.5 degrees against gravity' in err
+    assert err.count('\n') == 1
+
+
+def test_at_rest_the_tilt_is_told_unless_efforts_have_offsets(
+        identified: Callable[..., Any]) -> None:
+    # Six forces at rest: the weight's three components, and its moment.
+    _, result, _, _ = identified('tilted at rest', *WITH_TILT, '--no-report')
+    assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
+    states = values_of(result, 'state')
+    assert states['platform.center_of_mass.z'] == 'not_told'
+    moments = [np.cross(p['platform.center_of_mass'], p['gravity'])
+               for p in (Parameters(result['identified']), TILTED)]
+    np.testing.assert_allclose(*moments, atol=5e-3)
+    # With offsets it is told in combination with them only, as weight and center of mass are.
+    _, result, out, _ = identified(
+        'tilted at rest', '--identify', 'platform,offset,tilt', '--no-report', '--force')
+    states = values_of(result, 'state')
+    assert {states[name] for name in (
+        'platform.mass', 'platform.center_of_mass.x', 'platform.center_of_mass.y',
+        'gravity.tilt_x', 'gravity.tilt_y')} == {'in_combination'}
+    sums = {each['parameters'][0]: each for each in result['combinations']}
+    for axis in 'xy':
+        found = sums[f'gravity.tilt_{axis}']
+        assert all(name.startswith('effort_offset.') for name in found['parameters'][1:])
+        assert found['words'] in out
+
+
 def _swapped(given: Recorded) -> Recorded:
     order = [0, 2, 1, 3, 4, 5]
     assert given.rates is not None
@@ -164,6 +247,7 @@ def _swapped(given: Recorded) -> Recorded:
                     given.efforts[:, order])
 
 
+@pytest.mark.parametrize('options', [(), WITH_TILT], ids=['level', 'tilt'])
 @pytest.mark.parametrize(('change', 'named'), [
     (lambda given: given._replace(efforts=-given.efforts), 'opposite sign: + must push'),
     (lambda given: given._replace(efforts=1e-3 * given.efforts), 'likely kN in place of N'),
@@ -176,8 +260,10 @@ def _swapped(given: Recorded) -> Recorded:
      'lengths belong to no pose of this hexapod'),
 ], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])
 def test_likely_mistakes_are_named_and_nothing_is_written(
-        identified: Callable[..., Any], tmp_path: Path, change: Change, named: str) -> None:
-    code, result, out, err = identified('fourier', '--no-report', change=change)
+        identified: Callable[..., Any], tmp_path: Path, change: Change, named: str,
+        options: tuple[str, ...]) -> None:
+    code, result, out, err = identified(
+        'tilted' if options else 'fourier', '--no-report', *options, change=change)
     assert (code, result, out) == (2, None, '')
     assert named in err
     assert err.startswith('stewart_identify: ')

@@ -27,6 +27,7 @@ from referees import rng, ROOT
 
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.errors import BagError, ParameterError
+from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.command_line import main
 from stewart_dynamics.identification.filters import (
     convolved, decimated, LowPass, white_deviation)
@@ -136,6 +137,37 @@ def test_unknowns_are_in_the_terms_of_the_file() -> None:
     assert same == GIVEN
     with pytest.raises(ParameterError, match='cannot be identified; known are mass, '):
         Unknowns(GIVEN, ['colour'])
+
+
+def test_forces_under_a_turned_gravity_are_those_of_the_hexapod_with_it() -> None:
+    u = Unknowns(GIVEN, ['platform', 'friction', 'cylinder', 'piston', 'tilt'])
+    values = 1.1 * u.start
+    values[-2:] = 0.3, -0.5
+    step = 1e-6
+    for n in range(len(values)):
+        change = step * np.eye(len(values))[n]
+        difference = (u.theta(values + change) - u.theta(values - change)) / (2.0 * step)
+        np.testing.assert_allclose(u.derivative(values)[:, n], difference, atol=1e-6)
+    motion = fourier(3)(np.arange(50) * 0.1)
+    regressor, known = regression(StewartPlatform(GIVEN), u, motion.rows)
+    turned = u.parameters(values)
+    assert turned['gravity'][2] > GIVEN['gravity'][2] + 1.0
+    forces = StewartPlatform(turned).inverse_dynamics(motion).forces
+    np.testing.assert_allclose(regressor @ u.theta(values) + known, forces, rtol=1e-9, atol=1e-9)
+    # To first order about the library's columns.
+    columns = regressor @ u.derivative(u.start)
+    matrix = StewartPlatform(GIVEN).regressor(motion, tilt=True).matrix
+    np.testing.assert_allclose(columns[..., -2:], matrix[..., -2:], rtol=1e-9, atol=1e-7)
+
+
+def test_gravity_turns_about_the_axes_across_it() -> None:
+    on_a_wall = GIVEN.replaced({'gravity': [0.1, -9.8, 0.3]})
+    u = Unknowns(on_a_wall, ['tilt'])
+    assert u.names == ('gravity.tilt_x', 'gravity.tilt_z')
+    turned = u.parameters(np.array([0.02, -0.01]))['gravity']
+    np.testing.assert_allclose(
+        turned - on_a_wall['gravity'], np.cross([0.02, 0.0, -0.01], on_a_wall['gravity']),
+        atol=5e-3)
 
 
 def test_what_is_no_body_becomes_the_nearest_one() -> None:

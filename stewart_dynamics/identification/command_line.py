@@ -73,7 +73,8 @@ def _arguments() -> argparse.ArgumentParser:
                         help='another JointState with the efforts, at stamps of its own')
     what = parser.add_argument_group('what is identified, and how')
     what.add_argument('--identify', type=_kinds, default=DEFAULT, metavar='LIST',
-                      help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)})')
+                      help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)}); '
+                           'tilt is the direction of gravity, for a base that is not level')
     what.add_argument('--motor-torque', action='store_true',
                       help='efforts are torques of the motors [N m]; needs actuator.screw_lead')
     what.add_argument('--cutoff', type=_frequency, default=CUTOFF, metavar='HZ',

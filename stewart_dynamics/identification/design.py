@@ -35,6 +35,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.design_limits import DesignLimits
 from stewart_dynamics.identification.design_options import DesignOptions
 from stewart_dynamics.identification.intervals import TWO_SIDED
@@ -145,9 +146,9 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
 
 def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
     """Return how efforts (N, 6) change with the unknowns, (N, 6, k), of rows of motion."""
-    matrices: Array = platform.regressors(rows)[..., unknowns.linear] @ unknowns.derivative(
-        unknowns.start)
-    return matrices
+    regressor, _ = regression(platform, unknowns, rows)
+    columns: Array = regressor @ unknowns.derivative(unknowns.start)
+    return columns
 
 
 class _Search:

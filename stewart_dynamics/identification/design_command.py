@@ -117,7 +117,7 @@ def _lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
     of_legs: dict[str, tuple[float, str]] = {}
     for n, (name, unit, half) in enumerate(zip(
             unknowns.names, unknowns.units, designed.half_widths, strict=True)):
-        if n >= unknowns.many_of_platform:  # its name ends with that of the leg
+        if n in unknowns.legs:  # its name ends with that of the leg
             name = name.rpartition('.')[0]
         of_legs[name] = max(of_legs.get(name, (0.0, unit)), (float(half), unit))
     for name, (half, unit) in of_legs.items():

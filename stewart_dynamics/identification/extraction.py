@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.filters import (
     convolved, decimated, LowPass, white_deviation)
 from stewart_dynamics.identification.kinematics import motions, poses
@@ -57,7 +58,7 @@ class Extract(NamedTuple):
     times: Array
     """(N,) since the begin of the window [s]"""
     regressor: Array
-    """(N, 6, n) of the linear parameters that depend on the unknowns"""
+    """(N, 6, n) of ``Unknowns.theta``"""
     known: Array
     """(N, 6) force of all other parameters [N]"""
     efforts: Array
@@ -163,17 +164,17 @@ class Extraction:
 
     def _decimated(self, rows: Array) -> tuple[Array, Array]:
         """Return the regressor and the known forces of rows of motion, at the lower rate."""
-        taps, linear = self._narrow.taps(), self._unknowns.linear
-        fixed = self._unknowns.fixed
+        taps = self._narrow.taps()
         parts, known = [], []
         # A part begins where the next output does.
         stride = max(1, _TOGETHER // self.step) * self.step
         last = len(rows) - len(taps)
         for first in range(0, last + 1, stride):
             end = min(first + stride - self.step, (last - first) // self.step * self.step + first)
-            matrix = self.platform.regressors(rows[first:end + len(taps)])
-            parts.append(decimated(matrix[..., linear], taps, self.step))
-            known.append(decimated(matrix @ fixed, taps, self.step))
+            regressor, forces = regression(
+                self.platform, self._unknowns, rows[first:end + len(taps)])
+            parts.append(decimated(regressor, taps, self.step))
+            known.append(decimated(forces, taps, self.step))
         return np.concatenate(parts), np.concatenate(known)
 
     def _wrong(self, window: Window) -> tuple[Flags, int]:

@@ -16,8 +16,8 @@
 Likely mistakes in a recording or a parameter file, by what they do to the fit.
 
 Efforts of the wrong sign or unit scale everything, also the weight and inertia of what the file
-knows: legs and actuators. Swapped legs and a wrong zero length make another machine, which fits
-worse than the right one.
+knows: legs and actuators. Swapped legs, a wrong zero length and a tilted base make another
+machine, which fits worse than the right one.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Likely(NamedTuple):
     """A likely mistake."""
 
     what: str
-    """One word for programs: sign, unit, torque, scale, swapped or zero_length."""
+    """One word for programs: sign, unit, torque, scale, swapped, zero_length, tilt or misfit."""
     text: str
     """In one line."""
 
@@ -169,6 +169,11 @@ def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, win
     if not suspicious:
         yield from _best(found, now)
         return
+    if unknowns.tilt is None:
+        misfit, angle = _tilt(p, unknowns, extraction, piece, fit)
+        found.append((misfit, 'tilt', (
+            f'the base looks tilted by {np.degrees(angle):.1f} degrees against gravity as the '
+            'parameters have it: tilt in --identify takes that into account')))
     for a, b in combinations(range(6), 2):
         order = list(range(6))
         order[a], order[b] = b, a
@@ -231,10 +236,28 @@ def _zero_length(p: Parameters, unknowns: Unknowns, extraction: Extraction, wind
     return offset, last
 
 
+def _tilt(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
+          ) -> tuple[float, float]:
+    """Return the residual with a tilt of gravity [N], and the tilt that fits [rad]."""
+    tilted = unknowns.with_tilt()
+    with_tilt = Extraction(extraction.platform, tilted, window.period, extraction.cutoff)
+    try:
+        extract = with_tilt(window, pose_near(
+            extraction.platform, window.positions[0] + p['geometry.zero_length']))
+    except (PoseError, SingularityError):
+        return float('inf'), 0.0
+    derivative = tilted.derivative(np.append(fit.values, np.zeros(2)))
+    misfit, theta, _ = _fitted(unknowns, extract._replace(regressor=np.concatenate([
+        extract.regressor[..., :len(unknowns.linear)], extract.regressor @ derivative[:, -2:],
+    ], axis=-1)), fit)
+    return misfit, float(np.hypot(*theta[-2:]))
+
+
 def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, float]:
     """Return the scale of the efforts by least squares, and its standard error."""
-    many = len(unknowns.linear)
+    many = len(unknowns.linear)  # a tilt changes no scale
     theta = unknowns.theta(unknowns.start)
+    known = len(theta)
     total = nothing(many + 1)
     for bag in range(len(sums.counts)):
         for leg in range(6):
@@ -244,11 +267,11 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
             # efforts = scale known + Y theta'
             columns = np.zeros((len(gram), many + 1))
             columns[:many, :many] = np.eye(many)
-            columns[many, many] = 1.0
+            columns[known, many] = 1.0
             if platform_too:
-                columns[:many, many] = theta
+                columns[:known, many] = theta
             effort = np.zeros(len(gram))
-            effort[many + 1] = 1.0
+            effort[known + 1] = 1.0
             total = total.plus(Information(
                 columns.T @ gram @ columns, columns.T @ gram @ effort,
                 float(effort @ gram @ effort), int(count)))

@@ -154,11 +154,12 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
         name = name.replace('first_moment', 'center_of_mass').replace('second_moment', 'inertia')
         if each['state'] == IDENTIFIED:
             text = f'+-{TWO_SIDED * each["standard_error"]:.2g}'
+            if name == 'gravity':  # its value is not that of the file
+                text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
         else:
             text = 'kept' if each['state'] == NOT_TOLD else 'partly told'
         texts.setdefault(name, []).append(text)
-    return {name: f'identified {result["date"][:10]}, 95 %: {", ".join(dict.fromkeys(each))}'
-            if len(set(each)) == 1 else
-            f'identified {result["date"][:10]}, 95 %: {", ".join(each)}'
-            if any(text.startswith('+') for text in each) else 'kept: the motion does not tell it'
+    return {name: 'kept: the motion does not tell it' if set(each) == {'kept'} else
+            f'identified {result["date"][:10]}, 95 %: '
+            + ', '.join(each if len(set(each)) > 1 else each[:1])
             for name, each in texts.items()}

@@ -17,7 +17,8 @@ What is asked for: parameters by the names and in the terms of the parameter fil
 
 The platform's are mass, center of mass and inertia about it, so that what a motion cannot tell
 keeps the value of the file. Of those the ten inertial parameters in which forces are linear are
-functions; all others are linear themselves: of parts of a leg mass, first and second moment.
+functions; of legs the parameters are linear themselves: of their parts mass, first and second
+moment. The tilt of gravity comes last; its change multiplies what weighs.
 """
 
 from __future__ import annotations
@@ -29,9 +30,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.identification.tilt import Tilt
 from stewart_dynamics.mechanics.linear_parameters import (
-    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR,
-    linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
+    about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT,
+    LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.parameters import Parameters
 
@@ -49,10 +51,17 @@ _OF_LEGS = {'cylinder': (CYLINDER_FIRST, CYLINDER_SECOND),
             'reflected_mass': (REFLECTED_MASS,), 'viscous_friction': (VISCOUS_FRICTION,),
             'coulomb_friction': (COULOMB_FRICTION,),
             'friction': (VISCOUS_FRICTION, COULOMB_FRICTION), 'offset': (OFFSET,)}
-KINDS = (*_OF_PLATFORM, *_OF_LEGS)
+TILT = 'tilt'
+KINDS = (*_OF_PLATFORM, *_OF_LEGS, TILT)
 """What can be asked for."""
 DEFAULT = ('platform', 'viscous_friction', 'coulomb_friction')
 
+# Of the linear parameters, those in whose forces gravity is.
+_WEIGHING = np.concatenate([[0], *(np.arange(LINEAR)[part] for part in (
+    FIRST_MOMENT, CYLINDER_FIRST, PISTON_MASS, PISTON_FIRST))])
+
+# A tilt that matters [rad].
+_TILT = 0.1
 # Friction that matters is that which makes a leg's share of the weight at this rate [m/s].
 _RATE = 0.25
 # An effect of motion matters if it makes that share at this acceleration [m/s^2].
@@ -78,8 +87,14 @@ class Unknowns:
         The values of the file.
     scales : (k,)
         For each the change that would matter.
-    linear : (n,)
+    linear : (m,)
         Which of the LINEAR parameters depend on them; the platform's ten come first.
+    weighing : (w,)
+        Those of ``linear`` in whose forces gravity is.
+    legs : range
+        Which of the unknowns are those of legs: after the platform's, before the tilt.
+    tilt : Tilt or None
+        How gravity turns; None: not asked for.
 
     """
 
@@ -87,7 +102,8 @@ class Unknowns:
         for kind in kinds:
             if kind not in KINDS:
                 raise ParameterError(f'{kind}: cannot be identified; known are {", ".join(KINDS)}')
-        self._parameters = p = parameters
+        self._parameters, self._kinds = parameters, tuple(kinds)
+        p = parameters
         self._theta = linear_parameters(p)
         of_platform = np.zeros(PLATFORM, dtype=bool)
         of_legs: Flags = np.zeros(LINEAR, dtype=bool)
@@ -99,19 +115,31 @@ class Unknowns:
         self._platform: Integers = np.flatnonzero(of_platform)
         legs: Integers = np.flatnonzero(of_legs)
         self.linear: Integers = np.concatenate([np.arange(PLATFORM), legs])
+        self.weighing: Integers = self.linear[np.isin(self.linear, _WEIGHING)]
+        self.legs = range(len(self._platform), len(self._platform) + len(legs))
+        self.tilt = Tilt(p['gravity']) if TILT in kinds else None
+        of_tilt = () if self.tilt is None else self.tilt.names
         names = names_of(p)
-        self.names = (*(_PLATFORM[n] for n in self._platform), *(names[n] for n in legs))
-        self.units = (*(_PLATFORM_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs))
+        self.names = (
+            *(_PLATFORM[n] for n in self._platform), *(names[n] for n in legs), *of_tilt)
+        self.units = (*(_PLATFORM_UNITS[n] for n in self._platform), *(UNITS[n] for n in legs),
+                      *len(of_tilt) * ['rad'])
         self._of_file: Array = np.concatenate([
             [p['platform.mass']], p['platform.center_of_mass'], p['platform.inertia']])
-        self.start: Array = np.concatenate([self._of_file[self._platform], self._theta[legs]])
-        of_kinds = np.concatenate([_platform_scales(p)[self._platform], _leg_scales(p)[legs]])
-        self.scales: Array = of_kinds
+        self.start: Array = np.concatenate(
+            [self._of_file[self._platform], self._theta[legs], np.zeros(len(of_tilt))])
+        self.scales: Array = np.concatenate([
+            _platform_scales(p)[self._platform], _leg_scales(p)[legs],
+            np.full(len(of_tilt), _TILT)])
 
     @property
     def many_of_platform(self) -> int:
         """Return how many are the platform's; they come first."""
         return len(self._platform)
+
+    def with_tilt(self) -> Unknowns:
+        """Return the same and the tilt of gravity."""
+        return Unknowns(self._parameters, (*self._kinds, TILT))
 
     @property
     def fixed(self) -> Array:
@@ -121,18 +149,42 @@ class Unknowns:
         return theta
 
     def theta(self, values: Array) -> Array:
-        """Return the linear parameters (n,) of values (k,)."""
-        theta: Array = np.concatenate(
-            [_inertial(self._whole(values)), values[self.many_of_platform:]])
-        return theta
+        """
+        Return what forces are linear in (n,) of values (k,): the m parameters ``linear``.
+
+        With the tilt, for each axis the change of gravity times those that weigh, and times one:
+        for all that is fixed, n = m + 3 (w + 1).
+        """
+        theta = self._level(values)
+        if self.tilt is None:
+            return theta
+        change = self.tilt.change(values[self.legs.stop:])
+        return np.concatenate([theta, np.outer(change, self._carried(theta)).ravel()])
 
     def derivative(self, values: Array) -> Array:
-        """Return the derivative of the linear parameters, (n, k)."""
+        """Return the derivative of ``theta``, (n, k)."""
         d: Array = np.zeros((len(self.linear), len(values)))
         d[:PLATFORM, :self.many_of_platform] = _inertial_derivative(
             self._whole(values))[:, self._platform]
-        d[PLATFORM:, self.many_of_platform:] = np.eye(len(values) - self.many_of_platform)
-        return d
+        d[PLATFORM:, self.legs] = np.eye(len(self.legs))
+        if self.tilt is None:
+            return d
+        angles = values[self.legs.stop:]
+        weighs = np.isin(self.linear, self.weighing)
+        of_carried = np.concatenate([d[weighs], np.zeros((1, len(values)))])
+        products = self.tilt.change(angles)[:, None, None] * of_carried
+        products[..., self.legs.stop:] += (
+            self._carried(self._level(values))[:, None] * self.tilt.derivative(angles)[:, None])
+        return np.concatenate([d, products.reshape(-1, len(values))])
+
+    def _level(self, values: Array) -> Array:
+        """Return the parameters ``linear`` (m,)."""
+        theta: Array = np.concatenate([_inertial(self._whole(values)), values[self.legs]])
+        return theta
+
+    def _carried(self, theta: Array) -> Array:
+        """Return what the change of gravity is multiplied by, (w + 1,)."""
+        return np.append(theta[np.isin(self.linear, self.weighing)], 1.0)
 
     def with_inertial(self, values: Array, ten: Array) -> Array:
         """Return values whose platform has these inertial parameters (10,), as far as asked."""
@@ -156,7 +208,7 @@ class Unknowns:
     def parameters(self, values: Array) -> Parameters:
         """Return the parameter file's with these values (k,); ParameterError if none can have."""
         theta = self._theta.copy()
-        theta[self.linear] = self.theta(values)
+        theta[self.linear] = self._level(values)
         theta[CYLINDER_MASS] = self._masses_of_cylinders(theta)
         try:
             found = parameter_values(theta, self._parameters)
@@ -165,6 +217,8 @@ class Unknowns:
         platform = self._whole(values)
         found |= {'platform.mass': platform[0], 'platform.center_of_mass': platform[CENTER],
                   'platform.inertia': platform[INERTIA]}
+        if self.tilt is not None:
+            found['gravity'] = self.tilt.gravity(values[self.legs.stop:])
         changed: dict[str, Any] = {name: value for name, value in found.items()
                                    if not _alike(value, self._parameters[name])}
         return self._parameters.replaced(changed, 'identified')
