@@ -21,6 +21,7 @@ ages. With --values it is printed with all numbers, once in a second.
 
 import argparse
 import re
+import signal
 import sys
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -56,6 +57,10 @@ class Monitor(Node):
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--values', action='store_true', help='print all values, too')
+    signals: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # Python's KeyboardInterrupt is lost where it comes within a callback of a C library.
+        signal.signal(number, lambda number, frame: signals.append(number))
     # The handlers of rclpy would shut ROS down in the middle of a call.
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -63,10 +68,8 @@ def main() -> None:
         sys.exit(f'show_diagnostics: {exc}')
     monitor = Monitor(parser.parse_args(remove_ros_args(sys.argv)[1:]).values)
     try:
-        while True:
+        while not signals:
             rclpy.spin_once(monitor, timeout_sec=0.1)
-    except KeyboardInterrupt:
-        pass
     finally:
         rclpy.try_shutdown()
 

@@ -95,7 +95,9 @@ def test_parameters_that_help_lists_as_not_used_change_nothing() -> None:
         elif rule.kind == 'string':
             changes[name] = f'other_{value}'
         else:
-            changes[name] = 0.01 if value is None or np.ndim(value) else 0.5 + 1.5 * value
+            changes[name] = (0.5 + 1.5 * value if value is not None and not np.ndim(value)
+                             else 0.01 if rule.sizes == () or 1 in rule.sizes
+                             else np.linspace(0.01, 0.02, rule.sizes[-1]))
     one, other = Plant(given), Plant(given.replaced(changes))
     load = 0.2 * given['platform.mass'] * 9.81 * np.arange(6.0)
     for _ in range(20):

@@ -318,6 +318,15 @@ def test_rosbags_reads_what_mcap_reads(name: str, replayed: dict[str, Outputs]) 
             elif hasattr(ours, 'wrench'):
                 assert nanoseconds(ours) == nanoseconds(theirs)
                 assert six_of(ours) == six_of(theirs)
+            elif hasattr(ours, 'transforms'):
+                (one,), (other,) = ours.transforms, theirs.transforms
+                assert nanoseconds(one) == nanoseconds(other)
+                assert (one.header.frame_id, one.child_frame_id) == (
+                    other.header.frame_id, other.child_frame_id)
+                for part, names in (('translation', 'xyz'), ('rotation', 'xyzw')):
+                    for name in names:
+                        assert getattr(getattr(one.transform, part), name) == getattr(
+                            getattr(other.transform, part), name)
             else:
                 assert np.array_equal(ours.data, theirs.data)
 
