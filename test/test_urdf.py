@@ -15,9 +15,11 @@
 
 """The URDF by Pinocchio's reader: closed loops, and the same leg forces."""
 
+import os
 from pathlib import Path
 import shutil
 import subprocess
+import sys
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -139,12 +141,17 @@ def test_the_urdf_has_the_joints_of_the_closed_form_and_the_limits_of_the_parame
     assert limit == pytest.approx({'lower': 0.0, 'upper': 0.7, 'velocity': 0.5, 'effort': 6000.0})
 
 
-@pytest.mark.skipif(shutil.which('check_urdf') is None, reason='needs check_urdf of urdfdom')
+# Beside Python, where it comes with Pinocchio from PyPI.
+CHECK_URDF = shutil.which('check_urdf', path=os.pathsep.join(
+    [str(Path(sys.executable).parent), os.environ.get('PATH', '')]))
+
+
+@pytest.mark.skipif(CHECK_URDF is None, reason='needs check_urdf of urdfdom')
 def test_urdfdom_reads_the_urdf(tmp_path):
     file = tmp_path / 'hexapod.urdf'
     file.write_text(urdf(Hexapod(Parameters.from_yaml(PLATFORM)), 'hexapod',
                          Ros2Control(['effort'], 'mock')), encoding='utf-8')
-    done = subprocess.run(['check_urdf', str(file)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([CHECK_URDF, str(file)], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0
     assert 'root Link: base has 7 child(ren)' in done.stdout
     assert 'error' not in (done.stdout + done.stderr).lower()
