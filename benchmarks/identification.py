@@ -41,10 +41,11 @@ from stewart_dynamics.executables import executable
 from stewart_dynamics.identification.extraction import Extraction
 from stewart_dynamics.identification.extracts import Extracts
 from stewart_dynamics.identification.fit import fit
-from stewart_dynamics.identification.intervals import errors_of, TWO_SIDED
+from stewart_dynamics.identification.intervals import errors_of
 from stewart_dynamics.identification.sums import sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 

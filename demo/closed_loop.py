@@ -55,6 +55,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SIMULATOR = '/stewart_simulator'
 QOS = QoSProfile(depth=1000)
 BEGIN = 1_000_000_000  # of simulated time [ns]
+PLOTS = {'font.size': 10, 'axes.grid': True, 'grid.color': '0.88', 'axes.spines.top': False,
+         'axes.spines.right': False}  # parameters of matplotlib
 BANDWIDTH = 8.0  # natural frequency of a leg under PD control [Hz]
 # Longer than any wait on an idle computer, including the compilation of two programs [s].
 PATIENCE = 60.0
@@ -127,12 +129,12 @@ class Recorder(Node):
     @property
     def time(self) -> int:
         """Return the simulated time since its start [ns]."""
-        last = min((_stamp(each[-1]) for each in (self.states, self.poses) if each), default=0)
+        last = min((stamp_of(each[-1]) for each in (self.states, self.poses) if each), default=0)
         return max(last - BEGIN, 0)
 
     def errors(self, times: NDArray[np.int64], lengths: Array, desired: Motion) -> Errors:
         """Return the errors from a motion (N,) and its leg positions (N, 6) at its times."""
-        states = {_stamp(data): np.array(deserialize_message(data, JointState).position)
+        states = {stamp_of(data): np.array(deserialize_message(data, JointState).position)
                   for data in self.states}
         poses = {stamp: numbers for stamp, _, numbers in map(pose, self.poses)}
         stamps = (BEGIN + times).tolist()
@@ -151,7 +153,7 @@ class Recorder(Node):
             1e6 * np.arcsin(np.minimum(sine, 1.0)))
 
 
-def _stamp(message: bytes) -> int:
+def stamp_of(message: bytes) -> int:
     """Return the stamp of any message with a header, from this computer [ns]."""
     sec, nanosec = struct.unpack_from('<iI', message, 4)
     return int(sec) * 1_000_000_000 + int(nanosec)

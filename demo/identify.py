@@ -33,7 +33,8 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, BEGIN, demonstration, Errors, Failure, progress_bar, Recorder, ROOT, UNITS)
+    BANDWIDTH, BEGIN, demonstration, Errors, Failure, PLOTS, progress_bar, Recorder, ROOT,
+    stamp_of, UNITS)
 from loop import Loop, RATE
 import matplotlib
 import numpy as np
@@ -86,7 +87,7 @@ def stewart_identify(*arguments: str | Path | float) -> None:
 
 def write_bag(folder: Path, states: Sequence[bytes]) -> int:
     """Write states of the legs as a bag of ~/measured_legs, and return how many."""
-    stamped = sorted({_stamp(each): each for each in states if _stamp(each) > BEGIN}.items())
+    stamped = sorted({stamp_of(each): each for each in states if stamp_of(each) > BEGIN}.items())
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection(
             '/stewart_dynamics/measured_legs', 'sensor_msgs/msg/JointState',
@@ -94,11 +95,6 @@ def write_bag(folder: Path, states: Sequence[bytes]) -> int:
         for stamp, data in stamped:
             writer.write(connection, stamp, data)
     return len(stamped)
-
-
-def _stamp(message: bytes) -> int:
-    return (int.from_bytes(message[4:8], 'little') * 1_000_000_000
-            + int.from_bytes(message[8:12], 'little'))
 
 
 def values(document: Mapping[str, Any], true: Parameters) -> list[Value]:
@@ -147,8 +143,7 @@ def table(numbers: Sequence[Value], runs: Sequence[Run]) -> str:
 
 def draw(path: Path, runs: Sequence[Run]) -> None:
     """Draw the errors of the legs over time, with either file."""
-    pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
-                            'axes.spines.top': False, 'axes.spines.right': False})
+    pyplot.rcParams.update(PLOTS)
     figure, axes = pyplot.subplots(figsize=(9, 4), layout='constrained')
     labels = {BEFORE: 'forces by the file before', AFTER: 'by the identified file',
               BEST: 'by the true parameters'}

@@ -33,8 +33,8 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, demonstration, Errors, Failure, leg_mass, progress_bar, Recorder, ROOT, simulate,
-    UNITS)
+    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, progress_bar, Recorder, ROOT,
+    simulate, UNITS)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +154,7 @@ class Loop:
         hexapod : Path, optional
             Another parameter file for the node.
         simulator : sequence of str, optional
-            A command in the place of stewart_simulator, with its topics.
+            A command to be run instead of stewart_simulator, with the same topics.
 
         """
         given = {name: {'ros__parameters': dict(values)} for name, values in self._given.items()}
@@ -177,11 +177,10 @@ def payload_name(payload: float) -> str:
     return f'payload {more:+.0f} %' if more else 'as in the parameters'
 
 
-def table(runs: Sequence[Run]) -> str:
-    """Return the table of all runs: without and with feed-forward, side by side."""
+def table(runs: Sequence[Run], titles: Sequence[str]) -> str:
+    """Return the table of all runs: without and with feed-forward, each pair with its title."""
     pairs = list(zip(runs[::2], runs[1::2], strict=True))
-    lines = ['tracking error        '
-             + ''.join(f'{payload_name(pd.payload):^36}' for pd, _ in pairs),
+    lines = ['tracking error        ' + ''.join(f'{title:^36}' for title in titles),
              'RMS (peak)            ' + f'{"PD only":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
     for name, unit in UNITS.items():
         line = f'{name:12}{unit:>5}     '
@@ -195,8 +194,7 @@ def table(runs: Sequence[Run]) -> str:
 
 def draw(path: Path, runs: Sequence[Run]) -> None:
     """Draw the errors of the legs over time, without and with feed-forward."""
-    pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
-                            'axes.spines.top': False, 'axes.spines.right': False})
+    pyplot.rcParams.update(PLOTS)
     figure, panels = pyplot.subplots(1, 2, figsize=(11, 4), sharey=True, layout='constrained')
     for axes, pair in zip(panels, zip(runs[::2], runs[1::2], strict=True), strict=True):
         for run, color in zip(pair, ('#d55e00', '#0072b2'), strict=True):
@@ -249,7 +247,7 @@ def main() -> None:
                     runs.append(loop.run(feed_forward, payload, lambda reached, before=before: (
                         progress.update(before + min(reached * 1e-9, options.seconds)
                                         - progress.n))))
-        print(f'\n{table(runs)}\n')
+        print(f'\n{table(runs, [payload_name(run.payload) for run in runs[::2]])}\n')
         draw(options.output / 'loop.png', runs)
         (options.output / 'loop.json').write_text(
             json.dumps(summary(loop, runs), indent=1) + '\n', encoding='utf-8')

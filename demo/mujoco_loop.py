@@ -24,33 +24,17 @@ does not know its equations.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 import json
 from pathlib import Path
 import sys
 import time
 
-from closed_loop import BANDWIDTH, demonstration, progress_bar, ROOT, UNITS
-from loop import Loop, Run, summary
+from closed_loop import BANDWIDTH, demonstration, progress_bar, ROOT
+from loop import Loop, Run, summary, table
 import rclpy
 
 PHYSICS: dict[str, list[str | Path]] = {
     'stewart_simulator': [], 'MuJoCo': [sys.executable, ROOT / 'demo' / 'mujoco_plant.py']}
-
-
-def table(runs: Sequence[Run]) -> str:
-    """Return the table of all runs: without and with feed-forward, both physics side by side."""
-    pairs = list(zip(runs[::2], runs[1::2], strict=True))
-    lines = ['tracking error        ' + ''.join(f'{name:^36}' for name in PHYSICS),
-             'RMS (peak)            ' + f'{"PD only":>15}{"PD + forces":>15}{"":6}' * len(pairs)]
-    for name, unit in UNITS.items():
-        line = f'{name:12}{unit:>5}     '
-        for pd, forward in pairs:
-            line += ''.join(f'{each.errors.rms[name]:8.1f} {f"({each.errors.peak[name]:.0f})":>6}'
-                            for each in (pd, forward))
-            line += f'{pd.errors.rms[name] / forward.errors.rms[name]:5.0f}x'
-        lines.append(line)
-    return '\n'.join(lines)
 
 
 def main() -> None:
@@ -78,7 +62,7 @@ def main() -> None:
                     runs.append(loop.run(feed_forward, 1.0, lambda reached, before=before: (
                         progress.update(before + min(reached * 1e-9, options.seconds)
                                         - progress.n)), command))
-        print(f'\n{table(runs)}\n')
+        print(f'\n{table(runs, [*PHYSICS])}\n')
         (options.output / 'mujoco.json').write_text(
             json.dumps(summary(loop, runs) | {'physics': [*PHYSICS]}, indent=1) + '\n',
             encoding='utf-8')

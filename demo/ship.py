@@ -32,8 +32,8 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, demonstration, Errors, Failure, leg_mass, progress_bar, Recorder, ROOT, simulate,
-    SIMULATOR, UNITS)
+    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, progress_bar, Recorder, ROOT,
+    simulate, SIMULATOR, UNITS)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
@@ -177,8 +177,7 @@ def table(runs: Sequence[Run]) -> str:
 
 def draw(path: Path, ship: Ship, runs: Sequence[Run]) -> None:
     """Draw the motion of the deck above the errors of the platform's position in the world."""
-    pyplot.rcParams.update({'font.size': 10, 'axes.grid': True, 'grid.color': '0.88',
-                            'axes.spines.top': False, 'axes.spines.right': False})
+    pyplot.rcParams.update(PLOTS)
     figure, (above, below) = pyplot.subplots(
         2, 1, figsize=(9, 6), sharex=True, height_ratios=(2, 3), layout='constrained')
     seconds = ship.times * 1e-9

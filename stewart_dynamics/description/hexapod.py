@@ -29,7 +29,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
 from stewart_dynamics.mechanics.home_pose import homes
-from stewart_dynamics.mechanics.leg_joints import joint_names, mounts
+from stewart_dynamics.mechanics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
 _WORLD = 'world'  # in SDFormat and MJCF
@@ -158,11 +158,11 @@ class Hexapod:
 
     def _leg(self, n: int, mount: Array) -> Leg:
         p = self.parameters
-        name = p['joints'][n]
+        first, second, name = self.joints[len(PLATFORM_JOINTS) + 3 * n:][:3]
         base, platform = p['geometry.base_joints'][n], p['geometry.platform_joints'][n]
         length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
         return Leg(
-            name, f'{name}_cross', (f'{name}_universal_x', f'{name}_universal_y'),
+            name, f'{name}_cross', (first, second),
             f'{name}_platform_joint', base, platform, mount,
             float(p['geometry.zero_length'][n]), length,
             self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),

@@ -20,7 +20,6 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.rows import BASE, GRAVITY, POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 
@@ -42,14 +41,9 @@ def regression(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> tu
     regressor: Array = matrix[..., unknowns.linear]
     known: Array = matrix @ fixed
     if unknowns.tilt is not None:
-        still = np.zeros_like(rows)
-        still[:, POSE] = rows[:, POSE]
         parts = [regressor]
-        for axis in range(3):
-            # At rest under one unit of gravity along an axis.
-            base = np.zeros((1, BASE))
-            base[0, GRAVITY.start + axis] = 1.0
-            matrix = platform.regressors(still, base)
+        for axis in np.eye(3):
+            matrix = platform.regressors_at_rest(rows, axis[None])
             parts += [matrix[..., unknowns.weighing], (matrix @ fixed)[..., None]]
         regressor = np.concatenate(parts, axis=-1)
     return regressor, known

@@ -38,8 +38,8 @@ from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.design_limits import DesignLimits
 from stewart_dynamics.identification.design_options import DesignOptions
-from stewart_dynamics.identification.intervals import TWO_SIDED
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.mechanics.motion import Motion
 from stewart_dynamics.mechanics.reference_motion import motion_at
 from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters

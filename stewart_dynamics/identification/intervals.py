@@ -40,8 +40,6 @@ from stewart_dynamics.identification.fit import directions, Fit, without_delay
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 
-# Of a normal distribution: 95 % of it are within so many standard deviations.
-TWO_SIDED = 1.959964
 # Half width of the smoothing of spectra [Hz]; blocks of time [s], at least so many.
 _SMOOTHING = 0.4
 _BLOCK = 2.5

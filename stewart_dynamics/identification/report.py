@@ -28,10 +28,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.intervals import TWO_SIDED
 from stewart_dynamics.identification.results import IDENTIFIED, IN_COMBINATION, NOT_TOLD
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.text import decimals, grouped
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.replay.html_pages import base64_of, page, plotly_script
 from stewart_dynamics.replay.report_plots import COLORS
 from stewart_dynamics.replay.spectrum import drawn, Spectrum

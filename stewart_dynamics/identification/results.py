@@ -26,10 +26,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.fit import LEAST_TOLD
 from stewart_dynamics.identification.identify import Identified
-from stewart_dynamics.identification.intervals import TWO_SIDED
 from stewart_dynamics.identification.options import Options
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.least_squares import combinations
+from stewart_dynamics.mechanics.least_squares import combinations, TWO_SIDED
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
 
 # Of identification.json; increased when the meaning of a key changes.

@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from stewart_dynamics.identification.intervals import TWO_SIDED
 from stewart_dynamics.identification.results import IDENTIFIED, NOT_TOLD
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.replay.summary_text import plural
 
 

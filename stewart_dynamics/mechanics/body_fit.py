@@ -42,7 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.mechanics.least_squares import Information, Solution, solve
+from stewart_dynamics.mechanics.least_squares import Information, Solution, solve, TWO_SIDED
 from stewart_dynamics.mechanics.linear_parameters import FIRST_MOMENT, INERTIA, MASS
 from stewart_dynamics.mechanics.pseudo_inertia import is_consistent
 
@@ -61,7 +61,6 @@ _NOISE = 0.2
 # Iterations of the noise.
 ROUNDS = 4
 LAGS = 8
-_NORMAL_95 = 1.959964
 # Student's t of n degrees of freedom, by n, above the normal distribution's: the first term.
 _STUDENT_95 = 2.372
 # The noise is at least this part of the largest effort: no sensor is better.
@@ -246,7 +245,7 @@ class BodyFit:
         center = np.where(known[FIRST_MOMENT], body.center, self._given.center)
         derivative = self._derivative(change)
         covariance = derivative @ self._covariance(solution) @ derivative.T
-        quantile = _NORMAL_95 + _STUDENT_95 / self._freedom
+        quantile = TWO_SIDED + _STUDENT_95 / self._freedom
         half_widths = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         residual = float(np.sqrt(np.mean(self._residuals ** 2)))
         return FittedBody(Body(body.mass, center, inertia),

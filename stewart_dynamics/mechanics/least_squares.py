@@ -35,6 +35,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 
+# Of a normal distribution: 95 % of it are within so many standard deviations.
+TWO_SIDED = 1.959964
+
 # A direction is known if its standard error is at most this, by the parameters' scales.
 LARGEST_ERROR = 0.25
 # And if its information exceeds this many times that of the noise in the regressor.

@@ -203,17 +203,10 @@ class StewartPlatform:
     def _tilt_columns(self, rows: Array, base: BaseMotion | None, shape: tuple[int, ...],
                       ) -> Array:
         """Return the derivatives of the forces (N, 6, 2) by turns of gravity about x and y."""
-        still = np.zeros_like(rows)
-        still[:, POSE] = rows[:, POSE]
         gravity = copies((self._still if base is None else base).rows[..., GRAVITY], shape)
         theta = linear_parameters(self.parameters)
-        columns = []
-        for axis in np.eye(3)[:2]:
-            # Forces at rest are linear in gravity.
-            turned = np.zeros((len(gravity), BASE))
-            turned[:, GRAVITY] = np.cross(axis, gravity)
-            columns.append(self.regressors(still, turned) @ theta)
-        return np.stack(columns, axis=-1)
+        return np.stack([self.regressors_at_rest(rows, np.cross(axis, gravity)) @ theta
+                         for axis in np.eye(3)[:2]], axis=-1)
 
     def regressors(self, rows: Array, bases: Array | None = None) -> Array:
         """Return ``regressor`` (N, 6, LINEAR) of rows of motion, unchecked, see ``solve``."""
@@ -222,6 +215,19 @@ class StewartPlatform:
         batch.in_parts(regressor.regressors, self.constants, *map(
             batch.compact, (rows, bases)), matrices, scratch=regressor.WORK)
         return matrices
+
+    def regressors_at_rest(self, rows: Array, gravity: Array) -> Array:
+        """
+        Return ``regressors`` in the poses of rows of motion at rest, under any gravity.
+
+        Forces are linear in gravity: those under a change of it are the change of the forces.
+        ``gravity`` (N, 3) or (1, 3) is in base axes [m/s^2].
+        """
+        still = np.zeros_like(rows)
+        still[:, POSE] = rows[:, POSE]
+        bases = np.zeros((len(gravity), BASE))
+        bases[:, GRAVITY] = gravity
+        return self.regressors(still, bases)
 
     def base_wrench(self, motion: Motion, wrench: ArrayLike | None = None,
                     base: BaseMotion | None = None) -> Array:

@@ -19,11 +19,12 @@ from __future__ import annotations
 from typing import Any
 
 from stewart_dynamics.nodes.markers import Markers
+from stewart_dynamics.nodes.publisher_at_rate import PublisherAtRate
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.step import Output, Setpoint
 
 
-class MarkersPublisher:
+class MarkersPublisher(PublisherAtRate):
     """
     Publishes the markers of the last answer.
 
@@ -37,28 +38,17 @@ class MarkersPublisher:
     """
 
     def __init__(self, parameters: Parameters, publisher: Any) -> None:
-        self._publisher = publisher
-        self._due = 0.0
-        self._unpublished: tuple[Setpoint, Output] | None = None
+        super().__init__(publisher, parameters['visualization_rate'])
         self.use(parameters)
 
     def use(self, parameters: Parameters) -> None:
         """Show other parameters from now on: a payload has another centre of mass."""
         if self._publisher is not None:
             self._markers = Markers(parameters)
-            self._period = 1.0 / parameters['visualization_rate']
 
     def answered(self, setpoint: Setpoint, output: Output) -> None:
         """Note the last answer."""
         self._unpublished = setpoint, output
 
-    def publish_due(self, now: float) -> None:
-        """Publish the markers of the last answer if they are due and there is a subscriber."""
-        if self._unpublished is None or self._publisher is None or now < self._due:
-            return
-        setpoint, output = self._unpublished
-        # A later subscriber gets no markers of an old setpoint.
-        self._unpublished = None
-        self._due = now + self._period
-        if self._publisher.get_subscription_count():
-            self._publisher.publish(self._markers.write(setpoint.motion, output))
+    def _write(self, setpoint: Setpoint, output: Output) -> bytes:
+        return self._markers.write(setpoint.motion, output)

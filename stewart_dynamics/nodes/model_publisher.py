@@ -23,10 +23,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from stewart_dynamics.nodes.publisher_at_rate import PublisherAtRate
 from stewart_dynamics.runtime.model_messages import ModelMessages
 
 
-class ModelPublisher:
+class ModelPublisher(PublisherAtRate):
     """
     Publishes the last pose.
 
@@ -43,11 +44,8 @@ class ModelPublisher:
 
     def __init__(self, messages: ModelMessages, rate: float, joint_states: Any, transforms: Any,
                  ) -> None:
-        self._messages = messages
-        self._joint_states, self._transforms = joint_states, transforms
-        self._period = 1.0 / rate if rate else 0.0
-        self._due = 0.0
-        self._unpublished: tuple[int, Sequence[float]] | None = None
+        super().__init__(joint_states, rate)
+        self._messages, self._transforms = messages, transforms
         self._read = False  # somebody subscribes to the transforms
 
     def moved(self, stamp: int, pose: Sequence[float]) -> None:
@@ -60,13 +58,5 @@ class ModelPublisher:
         """Look whether somebody subscribes to the transforms."""
         self._read = bool(self._transforms and self._transforms.get_subscription_count())
 
-    def publish_due(self, now: float) -> None:
-        """Publish the joints in the last pose if they are due and there is a subscriber."""
-        if self._unpublished is None or self._joint_states is None or now < self._due:
-            return
-        stamp, pose = self._unpublished
-        # A later subscriber gets no joints of an old setpoint.
-        self._unpublished = None
-        self._due = now + self._period
-        if self._joint_states.get_subscription_count():
-            self._joint_states.publish(self._messages.joint_states(stamp, pose))
+    def _write(self, stamp: int, pose: Sequence[float]) -> bytes:
+        return self._messages.joint_states(stamp, pose)

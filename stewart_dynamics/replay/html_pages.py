@@ -71,7 +71,7 @@ def _typeset(text: str) -> str:
 
 @functools.lru_cache(maxsize=2)
 def _environment(folder: Path) -> Environment:
-    made = Environment(loader=FileSystemLoader(folder), autoescape=True,
+    made = Environment(loader=FileSystemLoader([folder, FOLDER]), autoescape=True,
                        undefined=StrictUndefined, keep_trailing_newline=True)
     made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr)
     made.tests['finite'] = lambda value: value is not None and math.isfinite(value)

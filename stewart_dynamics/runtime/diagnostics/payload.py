@@ -17,19 +17,15 @@
 from __future__ import annotations
 
 from stewart_dynamics.runtime.diagnostics.periodic_report import (
-    Level, LevelLog, LogLine, OK, Status, WARN)
+    LastOutcome, Level, OK, Status, WARN)
 from stewart_dynamics.runtime.payload import NAMES, numbers_of, Outcome, Payload, UNITS
 
-_NAME = 'payload'
 
-
-class PayloadDiagnostics:
+class PayloadDiagnostics(LastOutcome):
     """Keeps the outcome of the last request."""
 
     def __init__(self) -> None:
-        self._status: Status | None = None
-        self._log = LevelLog(_NAME)
-        self._lines: list[LogLine] = []
+        super().__init__('payload')
 
     def done(self, outcome: Outcome, seconds: float) -> None:
         """Note an outcome, and how long the work took [s]."""
@@ -39,21 +35,8 @@ class PayloadDiagnostics:
             f'not identified: {outcome.message}')
         values = _values(payload) if payload else []
         self._status = Status(
-            _NAME, level, message, (*values, ('time it took (s)', f'{seconds:.3f}')))
+            self._name, level, message, (*values, ('time it took (s)', f'{seconds:.3f}')))
         self._lines += self._log.lines(Level(level, message))
-
-    def level(self, now: float) -> int:
-        """Return the present level."""
-        return self._status.level if self._status else OK
-
-    def status(self, now: float) -> Status | None:
-        """Return the status, None before the first request."""
-        return self._status
-
-    def log_lines(self, now: float) -> list[LogLine]:
-        """Return the changes of level."""
-        lines, self._lines = self._lines, []
-        return lines
 
 
 def _values(payload: Payload) -> list[tuple[str, str]]:

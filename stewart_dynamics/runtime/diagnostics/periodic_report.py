@@ -150,6 +150,29 @@ class LevelLog:
         return [LogLine(state.level, f'{self._name}: {state.message}')]
 
 
+class LastOutcome:
+    """A status that outcomes change; there is none before the first."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._status: Status | None = None
+        self._log = LevelLog(name)
+        self._lines: list[LogLine] = []
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+        return self._status.level if self._status else OK
+
+    def status(self, now: float) -> Status | None:
+        """Return the status, None before the first outcome."""
+        return self._status
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return the lines since the last call."""
+        lines, self._lines = self._lines, []
+        return lines
+
+
 class Report:
     """
     The statuses of all parts, and when they are due.

@@ -19,28 +19,25 @@ from __future__ import annotations
 from collections import Counter
 
 from stewart_dynamics.runtime.diagnostics.periodic_report import (
-    ERROR, Level, LevelLog, LogLine, OK, Status, WARN)
+    ERROR, LastOutcome, Level, LogLine, OK, Status, WARN)
 from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
 
-_NAME = 'planned trajectory'
 _LONG = 2.0  # [s]
 
 
-class PlannedTrajectoryDiagnostics:
+class PlannedTrajectoryDiagnostics(LastOutcome):
     """Keeps the outcome of the last planned trajectory, and counts them all."""
 
     def __init__(self) -> None:
-        self._status: Status | None = None
+        super().__init__('planned trajectory')
         self._counts: Counter[str] = Counter()
-        self._log = LevelLog(_NAME)
-        self._lines: list[LogLine] = []
 
     def done(self, outcome: Outcome, seconds: float) -> None:
         """Note an outcome, and how long it took from the message on [s]."""
         level = ERROR if outcome.reason else WARN if outcome.warning else OK
         counts = self._counts
         counts[f'rejected: {outcome.reason}' if outcome.reason else 'accepted'] += 1
-        self._status = Status(_NAME, level, outcome.message, (
+        self._status = Status(self._name, level, outcome.message, (
             ('accepted', str(counts['accepted'])),
             ('rejected', str(counts.total() - counts['accepted'])),
             *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'accepted'),
@@ -48,20 +45,7 @@ class PlannedTrajectoryDiagnostics:
         message = outcome.message + (f' (took {seconds:.1f} s)' if seconds > _LONG else '')
         lines = self._log.lines(Level(level, message))
         if outcome.reason:  # each, whatever came before
-            lines = [LogLine(ERROR, f'{_NAME} {message}', outcome.reason)]
+            lines = [LogLine(ERROR, f'{self._name} {message}', outcome.reason)]
         elif seconds > _LONG:
-            lines = [LogLine(level, f'{_NAME}: {message}')]
+            lines = [LogLine(level, f'{self._name}: {message}')]
         self._lines += lines
-
-    def level(self, now: float) -> int:
-        """Return the present level."""
-        return self._status.level if self._status else OK
-
-    def status(self, now: float) -> Status | None:
-        """Return the status, None before the first planned trajectory."""
-        return self._status
-
-    def log_lines(self, now: float) -> list[LogLine]:
-        """Return rejections, changes of level, and outcomes that took long."""
-        lines, self._lines = self._lines, []
-        return lines
