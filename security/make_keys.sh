@@ -133,6 +133,8 @@ environment() {
   cat > "$making/$1/environment.sh" << END
 STEWART_KEYS=\$(cd "\$(dirname "\${BASH_SOURCE[0]}")" && pwd)
 export STEWART_KEYS FASTRTPS_DEFAULT_PROFILES_FILE="\$STEWART_KEYS/profile.xml"
+# The name of the same in Kilted.
+export FASTDDS_DEFAULT_PROFILES_FILE="\$FASTRTPS_DEFAULT_PROFILES_FILE"
 export ROS_AUTOMATIC_DISCOVERY_RANGE=SYSTEM_DEFAULT SKIP_DEFAULT_XML_FILE=1
 export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
 ${2:-unset OPENSSL_CONF}

@@ -231,9 +231,8 @@ def test_without_dds_security_nothing_starts(domain: int, tmp_path: Path, name: 
     assert line.startswith(f'{name}: ROS_SECURITY_ENABLE: true: but this Fast DDS is built ')
 
 
-KILTED = PROFILES == 'FASTDDS_DEFAULT_PROFILES_FILE'
-# What make_keys.sh sets: Kilted reads it as well.
-OF_KEYS = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+NAMES = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
+OTHER, = {*NAMES} - {PROFILES}  # the name in the other of Jazzy and Kilted
 KEYSTORE = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce',
             'ROS_SECURITY_KEYSTORE': '{tmp}/keystore'}
 TLS = {PROFILES: '{tmp}/profile.xml', 'STEWART_KEYS': '{tmp}',
@@ -255,8 +254,7 @@ def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
     (tmp_path / 'profile.xml').write_text(LISTENS)
     (tmp_path / 'openssl.cnf').write_text('[tls]\nVerifyMode = Require\n')
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', *KEYSTORE, *TLS,
-                 'ROS_SECURITY_ENCLAVE_OVERRIDE', 'FASTDDS_DEFAULT_PROFILES_FILE',
-                 'FASTRTPS_DEFAULT_PROFILES_FILE'):
+                 'ROS_SECURITY_ENCLAVE_OVERRIDE', *NAMES):
         monkeypatch.delenv(name, raising=False)
 
     def change(**variables: str) -> None:
@@ -321,14 +319,20 @@ def test_a_variable_of_the_profile_must_be_set(environment: Callable[..., None],
         check_environment([])
 
 
-@pytest.mark.skipif(KILTED, reason='Kilted reads it')
-def test_the_name_that_the_variable_has_in_kilted_is_rejected_in_jazzy(
+def test_the_name_that_the_variable_has_in_another_ros_is_rejected(
         environment: Callable[..., None]) -> None:
-    environment(FASTDDS_DEFAULT_PROFILES_FILE=str(ONE_HOST))
+    environment(**{OTHER: str(ONE_HOST)})
     with pytest.raises(StewartError, match=f'this Fast DDS reads {PROFILES} in its place'):
         check_environment([])
     environment(**{PROFILES: str(ONE_HOST)})
     check_environment([])
+
+
+@pytest.mark.skipif(PROFILES == NAMES[0], reason='Jazzy reads one of them')
+def test_two_files_are_rejected_where_ros_loads_both(environment: Callable[..., None]) -> None:
+    environment(**{PROFILES: str(ONE_HOST), OTHER: '/another.xml'})
+    with pytest.raises(StewartError, match=f'{OTHER}: /another.xml: must not be set, or be the'):
+        check_environment([])
 
 
 # Participants and intruders
@@ -565,7 +569,11 @@ def without(profile: Path, elements: str) -> str:
     return str(lacking)
 
 
-@pytest.mark.skipif(KILTED, reason='not yet proven with Fast DDS 3: see security/README.md')
+def using(profile: str) -> dict[str, str]:
+    """Return the variables of make_keys.sh with another profile."""
+    return dict.fromkeys(NAMES, profile)
+
+
 @pytest.mark.slow
 def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
@@ -586,7 +594,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     turned_away = [
         crowd.partner('self_signed', 2, file=of['node'], **own),
         crowd.partner('no_certificate', 3, file=of['node'],
-                      **{OF_KEYS: without(dials, NO_CERTIFICATE)}),
+                      **using(without(dials, NO_CERTIFICATE))),
         crowd.partner('certificate_of_a_listener', 4, file=of['node'],
                       STEWART_KEYS=str(folder / 'source'))]
     crowd.until(lambda: all('Handshake failed' in printed(each) for each in turned_away),
@@ -594,7 +602,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     # Not before: a peer that connects without TLS delays the next ones.
     unheard = [
         crowd.partner('plain_tcp', 5, file=of['node'],
-                      **{OF_KEYS: without(dials, 'tls')}),
+                      **using(without(dials, 'tls'))),
         crowd.partner('udp_and_shm', 6)]
     crowd.until_tried(turned_away + unheard)
     crowd.until(flows(receiver, 1), 'forces flow on')
@@ -610,8 +618,8 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     assert not shares_memory(node)
 
     assert node.stdout == ''
-    plain = crowd.partner('plain_tcp_listens', 7, file=of['bare'], **{
-        OF_KEYS: without(folder / 'bare' / 'profile.xml', 'tls')})
+    plain = crowd.partner('plain_tcp_listens', 7, file=of['bare'], **using(
+        without(folder / 'bare' / 'profile.xml', 'tls')))
     crowd.until_tried([plain])
     crowd.until(flows(receiver, 1), 'forces flow on')
     impostor = crowd.partner('self_signed_listens', 8, file=of['spare'], **own)
@@ -641,10 +649,10 @@ def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None
     stranger = crowd.partner('udp_and_shm', 3)
     reader = crowd.partner(
         'no_certificate', 4, file=read / 'node' / 'environment.sh',
-        **{OF_KEYS: without(read / 'node' / 'profile.xml', NO_CERTIFICATE)})
+        **using(without(read / 'node' / 'profile.xml', NO_CERTIFICATE)))
     crowd.node('open')
     crowd.node('fooled', file=fooled / 'node' / 'environment.sh',
-               **{OF_KEYS: without(fooled / 'node' / 'profile.xml', 'verify_mode')})
+               **using(without(fooled / 'node' / 'profile.xml', 'verify_mode')))
     crowd.until(lambda: reader.heard('setpoint/pose', 1), 'who has no certificate reads')
     crowd.until(flows(impostor, 2), 'who has signed its own is answered')
     crowd.until(flows(stranger, 3), 'who has neither keys nor profile is answered')

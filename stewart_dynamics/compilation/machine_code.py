@@ -80,7 +80,7 @@ def _print(text: str) -> None:
     print(f'stewart_dynamics: {text}', file=sys.stderr, flush=True)
 
 
-announce: Callable[[str], None] = _print
+announce: Callable[[str], object] = _print
 """Called with a line when a compilation begins; a program may put a function of its own here."""
 
 

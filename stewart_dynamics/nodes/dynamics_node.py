@@ -108,7 +108,7 @@ class DynamicsNode(LifecycleNode):
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
         self._base_wrench_read = False  # somebody subscribes to it
-        self._planned = PlannedTrajectoryQueue(
+        self._planned: PlannedTrajectoryQueue = PlannedTrajectoryQueue(
             timer.reset, timer.cancel, self._planned_code, self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
         self.add_on_set_parameters_callback(self._on_set_parameters)

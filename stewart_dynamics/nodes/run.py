@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import sys
+from typing import Any
 import warnings
 
 import rclpy
@@ -67,8 +68,12 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         warning = check_environment(sys.argv)
         reject_impossible_times()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        machine_code.announce = get_logger(kind.node).info
-        warnings.showwarning = lambda message, *_: get_logger(kind.node).warning(str(message))
+        logger = get_logger(kind.node)
+
+        def show(message: Warning | str, *_: Any, **__: Any) -> None:
+            logger.warning(str(message))
+
+        machine_code.announce, warnings.showwarning = logger.info, show
         with without_security_libraries():
             node = make_node()
         if warning:
@@ -77,7 +82,7 @@ def run(make_node: Callable[[], Node], kind: type[ParameterSet],
         executor.add_node(node)
         stop = done or Future()
         spin(executor, node, stop, lambda: SIGNALS.received)
-        return int(stop.result())
+        return stop.result() or 0
     except KeyboardInterrupt:  # while it compiled
         return 0
     except UnknownROSArgsError as exc:

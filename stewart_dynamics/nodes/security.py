@@ -107,26 +107,34 @@ def _check_dds_security(arguments: Sequence[str]) -> str:
 
 
 def _check_profiles() -> None:
-    """Check the file of profiles; Kilted takes the old name, too."""
-    new, old = os.environ.get(_NEW), os.environ.get(_OLD)
-    if PROFILES == _OLD and new and not old:
-        raise StewartError(f'{_NEW}: {new}: this Fast DDS reads {_OLD} in its place')
-    for variable, path in ((_NEW, new), (_OLD, old)):
-        if path and variable in (PROFILES, _OLD):
-            _check_profile(variable, Path(path))
+    """
+    Check the file of profiles, which must be given by the name that this Fast DDS reads.
+
+    Kilted loads a file of the old name as well, with a warning, but its processes do not get the
+    transports in it.
+    """
+    other = _OLD if PROFILES == _NEW else _NEW
+    path, of_other = os.environ.get(PROFILES), os.environ.get(other)
+    if of_other and not path:
+        raise StewartError(f'{other}: {of_other}: this Fast DDS reads {PROFILES} in its place')
+    if PROFILES == _NEW and of_other and of_other != path:
+        raise StewartError(
+            f'{other}: {of_other}: must not be set, or be the file of {PROFILES}: ROS loads both')
+    if path:
+        _check_profile(Path(path))
 
 
-def _check_profile(variable: str, path: Path) -> None:
+def _check_profile(path: Path) -> None:
     try:
         # Fast DDS takes an empty line before <?xml, and -- in a comment.
         text = _COMMENT.sub('', path.read_text(encoding='utf-8')).lstrip()
         root = ElementTree.fromstring(text)
     except (OSError, UnicodeDecodeError, ElementTree.ParseError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else f'not XML: {exc}'
-        raise StewartError(f'{variable}: {path}: cannot be read: {reason}') from exc
+        raise StewartError(f'{PROFILES}: {path}: cannot be read: {reason}') from exc
     unset = [name for name in _VARIABLE.findall(text) if name not in os.environ]
     if unset:
-        raise StewartError(f'{variable}: {path}: the variable {unset[0]} is not set')
+        raise StewartError(f'{PROFILES}: {path}: the variable {unset[0]} is not set')
     elements = [(element.tag.rpartition('}')[2], _VARIABLE.sub(
         lambda found: os.environ[found[1]], element.text or '').strip())
         for element in root.iter()]
@@ -135,13 +143,13 @@ def _check_profile(variable: str, path: Path) -> None:
                     or os.environ.get('ROS_LOCALHOST_ONLY') == '1')
     if (on_localhost and ('useBuiltinTransports', 'false') in elements
             and kinds & {'interfaceWhiteList', 'tls'}):
-        raise StewartError(f'{variable}: {path}: is not in effect where '
+        raise StewartError(f'{PROFILES}: {path}: is not in effect where '
                            'ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST, which adds shared memory '
                            'and UDP on all addresses: set it to SYSTEM_DEFAULT, and '
                            'ROS_LOCALHOST_ONLY not at all')
     for kind, name in elements:
         if kind in _KEY_FILES:
-            _read(Path(name), f'{variable}: {path}: {kind}')
+            _read(Path(name), f'{PROFILES}: {path}: {kind}')
     if {'tls', 'listening_ports'} <= kinds:
         name = os.environ.get('OPENSSL_CONF', '')
         if not name or not _ASKS_FOR_CERTIFICATES.search(_read(Path(name), 'OPENSSL_CONF')):

@@ -223,5 +223,5 @@ def _quaternion(four: list[float]) -> Any:
 
 def main() -> int:
     """Run the node; exit code 0, or 1 where its parameters break a rule."""
-    done = Future()
+    done: Future = Future()
     return run(lambda: TrajectoryNode(done), ReferenceMotionParameters, done)

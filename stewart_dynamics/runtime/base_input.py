@@ -68,7 +68,7 @@ class BaseInput:
     """
 
     def __init__(self, parameters: Parameters, rejections: Rejections,
-                 noticed: Callable[[str], None]) -> None:
+                 noticed: Callable[[str], object]) -> None:
         source = parameters['base.source']
         self.topics = BASE_SOURCES[source]
         """Which topics; none where the base is still."""

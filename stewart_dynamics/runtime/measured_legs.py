@@ -69,7 +69,7 @@ class MeasuredLegs:
     def __init__(
             self, parameters: Parameters, step: ExternalWrench,
             rejected: Callable[[Rejection, str], None],
-            noticed: Callable[[str], None], history: LegHistory | None = None) -> None:
+            noticed: Callable[[str], object], history: LegHistory | None = None) -> None:
         self.step = step
         self._reader = JointStateReader(parameters['joints'])
         self._zero_lengths = tuple(parameters['geometry.zero_length'].tolist())

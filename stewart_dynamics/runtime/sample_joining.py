@@ -69,7 +69,7 @@ class SampleJoining:
     """
 
     def __init__(self, topics: Sequence[str], frame: str | None, tolerance: float, timeout: float,
-                 rejections: Rejections, noticed: Callable[[str], None]) -> None:
+                 rejections: Rejections, noticed: Callable[[str], object]) -> None:
         self.topics = tuple(topics)
         self._reject = rejections.reject
         self._readers = {topic: SampleReader(topic, frame, rejections) for topic in self.topics}

@@ -62,7 +62,7 @@ class Setpoints:
 
     def __init__(
             self, parameters: Parameters, rejected: Callable[[Rejection, str], None],
-            noticed: Callable[[str], None]) -> None:
+            noticed: Callable[[str], object]) -> None:
         self.topics = SOURCES[parameters['setpoint.source']]
         self._rejections = Rejections(rejected)
         self._wrench_input = WrenchInput(parameters, self._rejections)

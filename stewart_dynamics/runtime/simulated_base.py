@@ -120,7 +120,7 @@ class BaseOfTopics:
     """
 
     def __init__(self, parameters: SimulatorParameters, rejections: Rejections,
-                 noticed: Callable[[str], None]) -> None:
+                 noticed: Callable[[str], object]) -> None:
         self.input = BaseInput(parameters.replaced(
             {'base.source': 'motion'}, 'base_motion.source'), rejections, noticed)
         """Takes the messages."""
