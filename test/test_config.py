@@ -18,13 +18,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import json
+from pathlib import Path
 import re
 from typing import Any
 
 import numpy as np
 import pytest
 from referees import ROOT
+from rosbags.highlevel import AnyReader
 from stewart_dynamics import Parameters, Pose, StewartPlatform
+from stewart_dynamics.program import DONE
+from stewart_dynamics.replay import main
+from stewart_dynamics.replay.recorded_model import MODEL_TYPES, ROBOT_DESCRIPTION
 import yaml
 
 CONFIG = ROOT / 'config'
@@ -33,6 +38,9 @@ CONTROLLERS = sorted((CONFIG / 'controllers').glob('*.yaml'))
 
 # Published only with ~/measured_legs connected.
 MONITOR = '/stewart_dynamics/external_wrench'
+BASE_WRENCH = '/stewart_dynamics/base_wrench'
+# Foxglove's layouts: with a running node, and for the replay's output bags.
+LIVE, OF_BAG = 'foxglove.json', 'foxglove_bag.json'
 
 
 def rviz() -> dict[str, Any]:
@@ -42,9 +50,9 @@ def rviz() -> dict[str, Any]:
     return document['Visualization Manager']
 
 
-def foxglove() -> dict[str, Any]:
-    """Return Foxglove's layout."""
-    layout: dict[str, Any] = json.loads((CONFIG / 'foxglove.json').read_text(encoding='utf-8'))
+def foxglove(name: str = LIVE) -> dict[str, Any]:
+    """Return one of Foxglove's layouts."""
+    layout: dict[str, Any] = json.loads((CONFIG / name).read_text(encoding='utf-8'))
     return layout
 
 
@@ -74,13 +82,14 @@ def topics_of_rviz() -> dict[str, str]:
     return found
 
 
-def topics_of_foxglove() -> dict[str, str]:
+def topics_of_foxglove(layout: str = LIVE) -> dict[str, str]:
     """Return the topics that Foxglove is to show, and of which type."""
     found = {}
-    for name, panel in foxglove()['configById'].items():
+    for name, panel in foxglove(layout)['configById'].items():
         kind = name.partition('!')[0]
         if kind == '3D':
-            found.update(dict.fromkeys(panel['topics'], MARKERS))
+            found.update({topic: MODEL_TYPES.get(topic, MARKERS) for topic in panel['topics']})
+            assert ROBOT_DESCRIPTION in found
         elif kind in ('DiagnosticSummary', 'DiagnosticStatusPanel'):
             found[panel['topicToRender']] = DIAGNOSTICS
         else:
@@ -110,8 +119,9 @@ def leaves(layout: Any) -> Iterator[str]:
     yield from leaves(layout['second'])
 
 
-def test_each_panel_of_foxglove_has_its_place() -> None:
-    layout = foxglove()
+@pytest.mark.parametrize('name, wrench', [(LIVE, MONITOR), (OF_BAG, BASE_WRENCH)])
+def test_each_panel_of_foxglove_has_its_place(name: str, wrench: str) -> None:
+    layout = foxglove(name)
     assert set(layout) == {'configById', 'globalVariables', 'userNodes', 'playbackConfig',
                            'layout'}
     assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
@@ -120,8 +130,8 @@ def test_each_panel_of_foxglove_has_its_place() -> None:
     for topic in ('leg_forces', 'leg_lengths'):
         assert [value for value in plotted if f'/{topic}.' in value] == [
             f'/stewart_dynamics/{topic}.data[{n}]' for n in range(6)]
-    assert [value for value in plotted if value.startswith(MONITOR)] == [
-        f'{MONITOR}.wrench.{part}.{axis}' for part in ('force', 'torque') for axis in 'xyz']
+    assert [value for value in plotted if '.wrench.' in value] == [
+        f'{wrench}.wrench.{part}.{axis}' for part in ('force', 'torque') for axis in 'xyz']
     frames = [panel['followTf'] for panel in layout['configById'].values() if 'followTf' in panel]
     assert frames == ['base']
 
@@ -144,6 +154,15 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
         marker.header.frame_id for marker in message.markers} == {parameters['base_frame']}
 
 
+def test_the_layout_for_bags_shows_topics_of_the_output_bag(tmp_path: Path) -> None:
+    assert main([str(CONFIG.parent / 'bags' / 'clear'), '--params', str(CONFIG / 'platform.yaml'),
+                 '--output', str(tmp_path / 'results'), '--no-report']) == DONE
+    with AnyReader([tmp_path / 'results' / 'clear' / 'bag']) as reader:
+        written = {each.topic: each.msgtype for each in reader.connections}
+    shown = topics_of_foxglove(OF_BAG)
+    assert shown == {topic: written[topic] for topic in shown}
+
+
 def test_topics_are_those_that_the_node_publishes(node: Any) -> None:
     node.answer()
 
@@ -151,6 +170,7 @@ def test_topics_are_those_that_the_node_publishes(node: Any) -> None:
         return dict(node.peer.node.get_publisher_names_and_types_by_node('stewart_dynamics', '/'))
 
     shown = {**topics_of_rviz(), **topics_of_foxglove()}
+    del shown[ROBOT_DESCRIPTION]  # of robot_state_publisher
     assert {'/stewart_dynamics/markers', '/stewart_dynamics/leg_forces',
             '/stewart_dynamics/jacobian_determinant', '/diagnostics', MONITOR} <= set(shown)
     node.until(lambda: set(shown) - {MONITOR} <= set(published()), 'its topics are known')

@@ -27,7 +27,8 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import Parameters
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.leg_joints import mounts
-from stewart_dynamics.runtime.model_messages import JOINT_STATES, MODEL_TYPES, ModelMessages, TF
+from stewart_dynamics.replay.recorded_model import MODEL_TYPES
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, ModelMessages, TF
 
 STAMP = 1_700_000_000_123_456_789
 
@@ -110,19 +111,6 @@ def test_the_transform_is_the_pose(frame: str, child: str) -> None:
         np.testing.assert_allclose(
             Rotation.from_quat([r.x, r.y, r.z, r.w]).as_matrix(), motion.rotation[n],
             rtol=0.0, atol=1e-14)
-
-
-def test_rows_give_the_same_bytes() -> None:
-    random = rng()
-    p = random_parameters(random)
-    messages, rows = ModelMessages(p), random_motion(p, random, 20).rows
-    stamps = STAMP + np.arange(20)
-    found = dict(messages.of_rows(stamps, rows))
-    assert set(found) == set(MODEL_TYPES)
-    for topic, write in ((JOINT_STATES, messages.joint_states), (TF, messages.transform)):
-        assert [each.tobytes() for each in found[topic]] == [
-            write(stamp, row) for stamp, row in zip(stamps.tolist(), rows.tolist(), strict=True)]
-    assert not dict(messages.of_rows(stamps[:0], rows[:0]))
 
 
 def test_two_joints_of_one_name_are_rejected() -> None:

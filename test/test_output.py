@@ -38,8 +38,8 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.replay.output import OutputBag
+from stewart_dynamics.replay.recorded_model import RecordedModel
 from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.model_messages import ModelMessages
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.runtime.step import Batch, Outputs, Step
 import yaml  # type: ignore[import-untyped]
@@ -75,7 +75,8 @@ def base_wrenches_of(outputs: Outputs) -> Array:
 
 
 def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]]) -> Path:
-    bag = OutputBag(folder, NODE, OutputMessages(PARAMETERS), ModelMessages(PARAMETERS), 0.0)
+    bag = OutputBag(folder, NODE, OutputMessages(PARAMETERS),
+                    RecordedModel(PARAMETERS, 'hexapod'), 0.0)
     for times, outputs in blocks:
         bag.write(times, np.zeros((len(times), MOTION)), outputs, base_wrenches_of(outputs))
     bag.close()

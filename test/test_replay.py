@@ -56,10 +56,12 @@ from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
 from stewart_dynamics.replay.options import LIMIT_MET, NODE
+from stewart_dynamics.replay.recorded_model import (
+    MODEL_TYPES, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
-from stewart_dynamics.runtime.model_messages import JOINT_STATES, MODEL_TYPES, ModelMessages, TF
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 
@@ -203,7 +205,8 @@ def test_the_bag_has_the_topics_and_types_of_the_node(
     with AnyReader([replayed[name].folder / 'bag']) as reader:
         assert {c.topic: c.msgtype for c in reader.connections} == {
             **{f'{NODE}/{topic}': kind for topic, kind in OUTPUT_TYPES.items()},
-            f'{NODE}/{JOINT_STATES}': MODEL_TYPES[JOINT_STATES], TF: MODEL_TYPES[TF]}
+            **{topic if topic.startswith('/') else f'{NODE}/{topic}': kind
+               for topic, kind in MODEL_TYPES.items()}}
     assert not list(replayed[name].folder.parent.glob('.*'))
 
 
@@ -245,14 +248,20 @@ def test_the_bag_shows_the_hexapod_as_a_model(name: str, replayed: dict[str, Out
     given, messages = setpoints_of(name), ModelMessages(PARAMETERS)
     stamps, rows = [*given], library_motion(name).rows.tolist()
     of = recorded(replayed[name].folder / 'bag' / 'bag.mcap')
-    for topic, write in ((JOINT_STATES, messages.joint_states), (TF, messages.transform)):
-        found = [(when, data) for each, when, data in of if each == topic]
-        whens = [when for when, _ in found]
-        assert 240 < len(found) < 305  # in 10 s, at most 30 in a second, of setpoints at 100 Hz
-        assert np.diff(whens).min() >= SECOND // 30
-        expected = {when: write(stamp, row) for stamp, (when, *_), row in zip(
-            stamps, given.values(), rows, strict=True)}
-        assert [expected[when] for when in whens] == [data for _, data in found]
+    joints = {when: data for topic, when, data in of if topic == JOINT_STATES}
+    assert 240 < len(joints) < 305  # in 10 s, at most 30 in a second, of setpoints at 100 Hz
+    assert np.diff([*joints]).min() >= SECOND // 30
+    expected = {when: messages.joint_states(stamp, row) for stamp, (when, *_), row in zip(
+        stamps, given.values(), rows, strict=True)}
+    assert joints == {when: expected[when] for when in joints}
+    assert [when for topic, when, _ in of if topic == TF] == [*joints]
+    first = min(when for _, when, _ in of)
+    for topic in (TF_STATIC, ROBOT_DESCRIPTION):
+        assert [when for each, when, _ in of if each == topic] == [first]
+    with AnyReader([replayed[name].folder / 'bag']) as reader:
+        latched = {each.topic for each in reader.connections for qos in
+                   each.ext.offered_qos_profiles if qos.durability.name == 'TRANSIENT_LOCAL'}
+    assert latched == {TF_STATIC, ROBOT_DESCRIPTION, f'{NODE}/singularity_warning'}
 
 
 @pytest.mark.parametrize('name', BAGS)
@@ -319,14 +328,14 @@ def test_rosbags_reads_what_mcap_reads(name: str, replayed: dict[str, Outputs]) 
                 assert nanoseconds(ours) == nanoseconds(theirs)
                 assert six_of(ours) == six_of(theirs)
             elif hasattr(ours, 'transforms'):
-                (one,), (other,) = ours.transforms, theirs.transforms
-                assert nanoseconds(one) == nanoseconds(other)
-                assert (one.header.frame_id, one.child_frame_id) == (
-                    other.header.frame_id, other.child_frame_id)
-                for part, names in (('translation', 'xyz'), ('rotation', 'xyzw')):
-                    for name in names:
-                        assert getattr(getattr(one.transform, part), name) == getattr(
-                            getattr(other.transform, part), name)
+                for one, other in zip(ours.transforms, theirs.transforms, strict=True):
+                    assert nanoseconds(one) == nanoseconds(other)
+                    assert (one.header.frame_id, one.child_frame_id) == (
+                        other.header.frame_id, other.child_frame_id)
+                    for part, names in (('translation', 'xyz'), ('rotation', 'xyzw')):
+                        for name in names:
+                            assert getattr(getattr(one.transform, part), name) == getattr(
+                                getattr(other.transform, part), name)
             else:
                 assert np.array_equal(ours.data, theirs.data)
 
@@ -566,7 +575,8 @@ def test_another_name_of_the_node(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', motion(5), node='/cell/hexapod')
     assert run(bag, tmp_path / 'out', '--node', 'cell/hexapod') == DONE
     assert set(outputs_of(tmp_path / 'out' / 'bag').messages) == {
-        TF, *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES))}
+        TF, TF_STATIC, ROBOT_DESCRIPTION,
+        *(f'/cell/hexapod/{topic}' for topic in (*OUTPUT_TYPES, JOINT_STATES))}
 
 
 def test_poses_that_cannot_be_solved_have_no_forces(tmp_path: Path) -> None:

@@ -136,6 +136,16 @@ def to_quaternion(rotation: ArrayLike) -> Array:
     return unit
 
 
+def quaternion_product(first: Array, second: Array) -> Array:
+    """Return the quaternions (..., 4) of Ra Rb, for those of Ra and Rb; x, y, z, w."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
+    return np.stack([
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz], axis=-1)
+
+
 def quaternion_of(rotation: Sequence[float]) -> tuple[float, float, float, float]:
     """Return the result of ``to_quaternion`` for the nine numbers of one matrix, much faster."""
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation

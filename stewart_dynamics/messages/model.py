@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Messages that show the hexapod as a model: joint positions alone, and one transform.
+Messages that show the hexapod as a model: joint positions alone, and transforms.
 
 sensor_msgs/JointState without velocity and effort, as robot_state_publisher reads it, and
 tf2_msgs/TFMessage.
@@ -23,7 +23,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from struct import Struct
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.messages.cdr import aligned8, header, LITTLE_ENDIAN, put_count, put_text
 
 _SECOND = 1_000_000_000
@@ -76,10 +81,65 @@ class TransformWriter(_Writer):
     """Writes tf2_msgs/TFMessage of one transform: x y z and the quaternion's x y z w."""
 
     def __init__(self, frame: str, child: str) -> None:
-        body = bytearray()
-        put_count(body, 1)
-        stamp = len(LITTLE_ENDIAN) + len(body)
+        message, ((stamp, numbers),) = _transforms([(frame, child)])
+        super().__init__(message[:numbers], stamp, 7)
+
+
+class TransformsWriter:
+    """
+    Writes many tf2_msgs/TFMessage at once, each with the transforms between the same frames.
+
+    Parameters
+    ----------
+    frames : sequence of (frame, child)
+        Of the transforms (K,).
+
+    """
+
+    def __init__(self, frames: Sequence[tuple[str, str]]) -> None:
+        message, places = _transforms(frames)
+        self._message = np.frombuffer(message, dtype=np.uint8)
+        fields: dict[str, tuple[Any, int]] = {}
+        for n, (stamp, numbers) in enumerate(places):
+            fields |= {f'sec {n}': ('<i4', stamp), f'nanosec {n}': ('<u4', stamp + 4),
+                       f'numbers {n}': (('<f8', (7,)), numbers)}
+        self._dtype = np.dtype({
+            'names': list(fields), 'formats': [kind for kind, _ in fields.values()],
+            'offsets': [at for _, at in fields.values()], 'itemsize': len(message)})
+        self._count = len(places)
+
+    def write(self, stamps: Stamps, transforms: Array) -> NDArray[np.void]:
+        """
+        Return the messages (N,), each an entry of their length.
+
+        Parameters
+        ----------
+        stamps : (N,)
+            The stamp of all transforms of a message [ns].
+        transforms : (N, K, 7)
+            x y z [m] and the quaternion's x y z w.
+
+        """
+        rows = np.empty(len(stamps), dtype=self._dtype)
+        rows.view(np.uint8).reshape(len(stamps), -1)[:] = self._message
+        seconds, nanoseconds = np.divmod(stamps, _SECOND)
+        for n in range(self._count):
+            rows[f'sec {n}'], rows[f'nanosec {n}'] = seconds, nanoseconds
+            rows[f'numbers {n}'] = transforms[:, n]
+        return rows.view(f'V{len(self._message)}')
+
+
+def _transforms(frames: Sequence[tuple[str, str]]) -> tuple[bytes, list[tuple[int, int]]]:
+    """Return a TFMessage with all numbers zero, and where each stamp and its numbers begin."""
+    body = bytearray()
+    put_count(body, len(frames))
+    places = []
+    for frame, child in frames:
+        stamp = len(body)
         body += bytes(8)
         put_text(body, frame)
         put_text(body, child)
-        super().__init__(LITTLE_ENDIAN + body, stamp, 7)
+        body += bytes(-len(body) % 8)
+        places.append((len(LITTLE_ENDIAN) + stamp, len(LITTLE_ENDIAN) + len(body)))
+        body += bytes(7 * 8)
+    return LITTLE_ENDIAN + bytes(body), places

@@ -20,8 +20,8 @@ from collections.abc import Sequence
 from struct import Struct
 
 from stewart_dynamics.messages.cdr import (
-    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, READ_ERRORS,
-    sequence, short_sequence)
+    aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, put_text,
+    READ_ERRORS, sequence, short_sequence)
 from stewart_dynamics.messages.layout import Layout
 
 _FLOAT64 = Struct('<4sd')
@@ -39,6 +39,13 @@ def float64(value: float) -> bytes:
 def boolean(value: bool) -> bytes:
     """Write a std_msgs/Bool."""
     return _BOOL.pack(LITTLE_ENDIAN, value)
+
+
+def string(written: str) -> bytes:
+    """Write a std_msgs/String."""
+    body = bytearray(LITTLE_ENDIAN)
+    put_text(body, written)
+    return bytes(body)
 
 
 def clock(stamp: int) -> bytes:

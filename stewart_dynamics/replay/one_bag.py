@@ -44,6 +44,7 @@ from stewart_dynamics.replay.legs_table import kind_of_table, Table
 from stewart_dynamics.replay.options import code_of, Options
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_efforts import Efforts
+from stewart_dynamics.replay.recorded_model import RecordedModel
 from stewart_dynamics.replay.recording import Recording
 from stewart_dynamics.replay.report import Report
 from stewart_dynamics.replay.residuals import Comparison
@@ -52,7 +53,6 @@ from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.runtime import base_wrench, input_topics as inputs, step
 from stewart_dynamics.runtime.base_wrench import BaseWrench
-from stewart_dynamics.runtime.model_messages import ModelMessages
 from stewart_dynamics.runtime.output_messages import OutputMessages
 from stewart_dynamics.runtime.recorded_messages import Messages
 from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
@@ -181,8 +181,8 @@ class _Run:
             self.report = Report(parameters, measured=options.measured is not None)
             self._breakdown = ForceBreakdownRows(parameters)
         self._bag = OutputBag(
-            folder / 'bag', options.node, OutputMessages(parameters), ModelMessages(parameters),
-            parameters['visualization_rate'])
+            folder / 'bag', options.node, OutputMessages(parameters),
+            RecordedModel(parameters, options.node.strip('/')), parameters['visualization_rate'])
         stack.callback(self._bag.abandon)
         self._table: Table = kind_of_table(options.parquet)(
             folder, parameters['joints'], self._quasi_static,

@@ -33,12 +33,15 @@ from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.mcap_layout import MAGIC
-from stewart_dynamics.runtime.model_messages import MODEL_TYPES, ModelMessages, TF
+from stewart_dynamics.replay.recorded_model import (
+    MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages, Written
 from stewart_dynamics.runtime.step import Outputs
 import yaml  # type: ignore[import-untyped]
 
 _LIBRARY = 'stewart_dynamics'
+# Late subscribers get their last message, in `ros2 bag play`, too.
+_LATCHED = 'singularity_warning', TF_STATIC, ROBOT_DESCRIPTION
 # Of a message record: opcode, length, channel, sequence, log time and publish time.
 _HEAD = 31
 # Opcode, length, times of first and last message, size, checksum, no compression, size.
@@ -59,14 +62,14 @@ class OutputBag:
         Node name, the prefix of the topics.
     messages : OutputMessages
         Serializes the messages.
-    model : ModelMessages
+    model : RecordedModel
         Serializes those that show the hexapod as a model.
     rate : float
         At most so many of these are written in a second [Hz]; 0: none, and no topics of them.
 
     """
 
-    def __init__(self, folder: Path, node: str, messages: OutputMessages, model: ModelMessages,
+    def __init__(self, folder: Path, node: str, messages: OutputMessages, model: RecordedModel,
                  rate: float) -> None:
         self._folder = folder
         self._messages, self._model = messages, model
@@ -86,9 +89,10 @@ class OutputBag:
         self._hashes = {kind: store.hash_rihs01(kind) for kind in kinds}
         self._channels = {
             topic: Channel(
-                id=n, topic=topic if topic == TF else f'{node}/{topic}', message_encoding='cdr',
-                schema_id=kinds.index(kind) + 1, metadata={
-                    'offered_qos_profiles': '', 'topic_type_hash': self._hashes[kind]})
+                id=n, topic=topic if topic.startswith('/') else f'{node}/{topic}',
+                message_encoding='cdr', schema_id=kinds.index(kind) + 1, metadata={
+                    'offered_qos_profiles': yaml.safe_dump(_offered(topic), sort_keys=False),
+                    'topic_type_hash': self._hashes[kind]})
             for n, (topic, kind) in enumerate(self._types.items(), start=1)}
         self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
         self._file.write(self._declarations())
@@ -141,6 +145,9 @@ class OutputBag:
 
     def _of_model(self, times: Stamps, motions: Array, outputs: Outputs) -> Iterator[Written]:
         """Yield the messages that show the model, as often as they are due."""
+        if self._period and self._due is None:
+            for topic, messages in self._model.of_beginning(int(outputs.stamps[0])):
+                yield topic, np.zeros(1, dtype=np.int64), messages
         which = np.array([*self._when_due(times)], dtype=np.int64)
         for topic, messages in self._model.of_rows(outputs.stamps[which], motions[which]):
             yield topic, which, messages
@@ -219,12 +226,24 @@ class OutputBag:
             'topics_with_message_count': [{
                 'topic_metadata': {
                     'name': channel.topic, 'type': self._types[topic],
-                    'serialization_format': 'cdr', 'offered_qos_profiles': [],
+                    'serialization_format': 'cdr', 'offered_qos_profiles': _offered(topic),
                     'type_description_hash': self._hashes[self._types[topic]]},
                 'message_count': self._counts[channel.id],
             } for topic, channel in self._channels.items()],
             'compression_format': '', 'compression_mode': '', 'files': [{'path': name, **span()}],
             'custom_data': None, 'ros_distro': _LIBRARY}}
+
+
+def _offered(topic: str) -> list[dict[str, Any]]:
+    """Return the profile with which a topic is published: the latched ones have one."""
+    if topic not in _LATCHED:
+        return []
+    forever = {'sec': 9223372036, 'nsec': 854775807}
+    return [{
+        'history': 'keep_last', 'depth': 1, 'reliability': 'reliable',
+        'durability': 'transient_local', 'deadline': {**forever}, 'lifespan': {**forever},
+        'liveliness': 'automatic', 'liveliness_lease_duration': {**forever},
+        'avoid_ros_namespace_conventions': False}]
 
 
 def _bytes(record: McapRecord) -> bytes:

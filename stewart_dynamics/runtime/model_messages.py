@@ -20,12 +20,8 @@ For RViz and Foxglove, on ``~/joint_states`` and ``/tf``; from setpoints or from
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.mechanics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rotation import quaternion_of
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
@@ -35,8 +31,6 @@ from stewart_dynamics.parameters import Parameters
 JOINT_STATES = 'joint_states'
 """Under the node's name."""
 TF = '/tf'
-
-MODEL_TYPES = {JOINT_STATES: 'sensor_msgs/msg/JointState', TF: 'tf2_msgs/msg/TFMessage'}
 
 
 class ModelMessages:
@@ -77,11 +71,3 @@ class ModelMessages:
     def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
         """Return the tf2_msgs/TFMessage from ``base_frame`` to ``platform_frame`` at a pose."""
         return self._transform.write(stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))
-
-    def of_rows(self, stamps: Stamps, poses: Array) -> Iterator[tuple[str, NDArray[np.void]]]:
-        """Yield topics and messages (N,) of stamps (N,) [ns] and rows of motion (N, MOTION)."""
-        rows = [*zip(stamps.tolist(), poses.tolist(), strict=True)]
-        for topic, write in ((JOINT_STATES, self.joint_states), (TF, self.transform)):
-            messages = [write(stamp, pose) for stamp, pose in rows]
-            if messages:
-                yield topic, np.frombuffer(b''.join(messages), dtype=f'V{len(messages[0])}')

@@ -1,0 +1,94 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The messages of the output bag that show the hexapod as a model.
+
+The URDF, and the transforms of all its links, as robot_state_publisher publishes them: Foxglove
+and RViz need nothing else. The joint positions are those that the node publishes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.link_transforms import LinkTransforms
+from stewart_dynamics.description.urdf import urdf
+from stewart_dynamics.mechanics.leg_joints import TreeJoints
+from stewart_dynamics.messages.model import PositionsWriter, TransformsWriter
+from stewart_dynamics.messages.standard import string
+from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, TF
+
+TF_STATIC = '/tf_static'
+ROBOT_DESCRIPTION = '/robot_description'
+
+MODEL_TYPES = {
+    JOINT_STATES: 'sensor_msgs/msg/JointState',
+    TF: 'tf2_msgs/msg/TFMessage',
+    TF_STATIC: 'tf2_msgs/msg/TFMessage',
+    ROBOT_DESCRIPTION: 'std_msgs/msg/String',
+}
+Written = tuple[str, NDArray[np.void]]
+
+
+class RecordedModel:
+    """
+    Writes the messages.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+    name : str
+        Of the robot in the URDF.
+
+    Raises
+    ------
+    ParameterError
+        Two joints or links of the URDF would have the same name.
+
+    """
+
+    def __init__(self, parameters: Parameters, name: str) -> None:
+        self._urdf = urdf(Hexapod(parameters), name)
+        self._joints = TreeJoints(parameters)
+        self._links = LinkTransforms(self._urdf)
+        self._positions = PositionsWriter(self._joints.names)
+        self._moving = TransformsWriter(self._links.moving)
+        self._fixed = TransformsWriter(self._links.fixed)
+
+    def of_beginning(self, stamp: int) -> Iterator[Written]:
+        """Yield topics and messages (1,) of what does not change, at a stamp [ns]."""
+        yield TF_STATIC, self._fixed.write(np.array([stamp]), self._links.at_fixed[None])
+        yield ROBOT_DESCRIPTION, _entries([string(self._urdf)])
+
+    def of_rows(self, stamps: Stamps, poses: Array) -> Iterator[Written]:
+        """Yield topics and messages (N,) of stamps (N,) [ns] and rows of motion (N, MOTION)."""
+        if not len(stamps):
+            return
+        positions = [self._joints.of_sample(pose) for pose in poses.tolist()]
+        yield JOINT_STATES, _entries([
+            self._positions.write(stamp, each)
+            for stamp, each in zip(stamps.tolist(), positions, strict=True)])
+        yield TF, self._moving.write(stamps, self._links.at(np.array(positions)))
+
+
+def _entries(messages: list[bytes]) -> NDArray[np.void]:
+    return np.frombuffer(b''.join(messages), dtype=f'V{len(messages[0])}')
