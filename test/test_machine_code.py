@@ -21,6 +21,7 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+import tempfile
 from threading import Thread
 from typing import Any
 
@@ -29,7 +30,7 @@ import pytest
 from referees import ROOT
 
 from stewart_dynamics.compilation import entry_point, machine_code
-from stewart_dynamics.compilation.entry_point import EntryPoint
+from stewart_dynamics.compilation.entry_point import EntryPoint, prepare
 from stewart_dynamics.compilation.functions import entry_point as marked
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.compilation.preparation import Preparation
@@ -228,6 +229,17 @@ def dictionary(numbers):
             r'^dictionary\.dictionary cannot be compiled: .*: the dynamics run uncompiled')):
         imported('dictionary')(numbers)
     assert numbers[0] == 3.0
+
+
+def test_where_no_temporary_file_can_be_written_it_runs_uncompiled_with_a_warning(
+        kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a full disk; the warning is raised where the functions are used, not in a thread."""
+    file_of(kept).unlink()
+    monkeypatch.setattr(tempfile, 'tempdir', '/nowhere')
+    function = imported('scaled_sums')
+    with pytest.warns(RuntimeWarning, match='cannot be compiled: .*No such file.*run uncompiled'):
+        prepare([function])
+    check(function)
 
 
 @pytest.mark.parametrize('python', ['/bin/true', '/bin/false', '/nowhere', '', None])

@@ -225,6 +225,46 @@ def test_five_legs_are_no_hexapod(tmp_path):
         read_hexapod(written(p, 'sdf', tmp_path, without_one))
 
 
+def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path):
+    pytest.importorskip('mujoco')
+    path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
+        text, '(<joint name="leg_5" type="slide" axis)="0 0 1"', r'\1="1 0 0"'))
+    with pytest.raises(StewartError, match='leg_5: the axis of this prismatic joint is inclined '
+                       'to the line between the joints of its leg by 90 degrees: must be along'):
+        read_hexapod(path)
+
+
+def test_a_negative_gear_is_said(tmp_path):
+    pytest.importorskip('mujoco')
+    path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
+        text, '<motor name="leg_6"', '<motor name="leg_6" gear="-1"'))
+    found = read_hexapod(path)
+    assert 'leg_6: the gear of its actuator is negative: forces are along its joint here' in (
+        found.remarks)
+    assert found.parameters['limits.force_max'] == pytest.approx(6000.0)
+
+
+def test_a_leg_without_a_joint_at_one_end_is_rejected(tmp_path):
+    path = written(Parameters.from_yaml(PLATFORM), 'sdf', tmp_path, lambda text: re.sub(
+        '(<joint name="[^"]*") type="ball"', r'\1 type="fixed"', foreign(text)))
+    with pytest.raises(StewartError, match="leg_1: no joint between it and 'platform': a leg of "
+                       'this model turns at both of its ends'):
+        read_hexapod(path)
+
+
+def test_legs_that_are_cut_in_two_are_said(tmp_path):
+    """As CAD programs cut loops: one part hangs from the platform."""
+    def cut(text):
+        return changed(changed(
+            text, '<child>leg_2_piston</child>', '<child>leg_2_end</child>'),
+            '<joint name="leg_2"', '<link name="leg_2_end"/><joint name="leg_2"')
+
+    with pytest.raises(StewartError, match=(
+            "no hexapod: legs with one prismatic joint each between 'base' and 'platform': 5; "
+            "there must be six. 2 bodies have one joint alone, as '.*': joints or constraints")):
+        read_hexapod(written(Parameters.from_yaml(PLATFORM), 'sdf', tmp_path, cut))
+
+
 def test_a_missing_file_is_said(tmp_path):
     with pytest.raises(StewartError, match='cannot be read: No such file'):
         read_hexapod(tmp_path / 'none.urdf')

@@ -138,11 +138,11 @@ def _compile(module: str, name: str) -> bytes:
     """Return what the compiler writes: the modules it has read, and the object file."""
     # The compiler reads this copy of the package, whatever the present folder is.
     paths = [str(_PACKAGE.parent), *(os.path.abspath(path) for path in sys.path if path)]
-    with TemporaryDirectory() as folder:
-        target = Path(folder, 'answer')
-        arguments = json.dumps([paths, os.getpid(), module, name, str(target)])
-        said = ''
-        try:
+    said = ''
+    try:
+        with TemporaryDirectory() as folder:
+            target = Path(folder, 'answer')
+            arguments = json.dumps([paths, os.getpid(), module, name, str(target)])
             # In a session of its own: what a terminal sends to this process is not for it. What it
             # prints is not its answer: numba and the start of Python can be told to print.
             done = subprocess.run(
@@ -150,8 +150,8 @@ def _compile(module: str, name: str) -> bytes:
                 capture_output=True, check=False, start_new_session=True)
             said = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
             return target.read_bytes()
-        except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
-            raise CompilationError(f'{module}.{name} cannot be compiled: {said or exc}') from exc
+    except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
+        raise CompilationError(f'{module}.{name} cannot be compiled: {said or exc}') from exc
 
 
 def _load(answer: bytes, symbol: str) -> int:

@@ -138,6 +138,9 @@ def _actuators(mujoco: Any, model: Any, mechanism: Mechanism) -> None:
             continue
         order.append(joint.name)
         gear = abs(float(model.actuator_gear[n, 0]))
+        if model.actuator_gear[n, 0] < 0.0:
+            mechanism.remarks.append(f'{joint.name}: the gear of its actuator is negative: '
+                                     'forces are along its joint here')
         bounds = []
         if model.actuator_forcelimited[n]:
             bounds.append(gear * np.abs(model.actuator_forcerange[n]).min())

@@ -34,11 +34,13 @@ from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, HERE, HINGE, Mechanism, Part, Placement, UNIVERSAL)
 from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
 from stewart_dynamics.description.xml_text import NOT_CHECKED
+from stewart_dynamics.errors import shown
 from stewart_dynamics.parameters import PARAMETERS, Parameters, STANDARD_GRAVITY
 
 # In terms of the length of a leg, or [rad]; what is smaller is rounding.
 _SMALL = 1e-6
 _INCLINED = 1e-3
+_ACROSS = math.radians(45.0)
 _OFF_AXIS = 1e-3
 _UNEQUAL = 0.01
 _THICK = 0.05
@@ -107,9 +109,9 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
     slide, out = chain.steps[at].joint, chain.steps[at].from_parent
     lower, upper = chain.steps[:at], chain.steps[at + 1:]
     if not lower or not upper:
-        raise DescriptionError(
-            f'{slide.name}: no joint between it and the {"platform" if lower else "base"}: legs '
-            'whose length does not change are not those of this model')
+        end = found.platform if lower else found.base
+        raise DescriptionError(f'{slide.name}: no joint between it and {shown(end.name)}: a leg '
+                               'of this model turns at both of its ends')
     root = _center(lower, 'base', said)
     tip = _center(upper, 'platform', said)
     on_platform = tip if len(upper) > 1 or upper[0].joint.child_anchor is None else upper[-1].far
@@ -121,6 +123,10 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
     if length > 0.0:
         line = (tip - root) / length
         angle = math.acos(min(1.0, float(abs(line @ axis))))
+        if angle > _ACROSS:
+            raise DescriptionError(
+                f'{slide.name}: the axis of this prismatic joint is inclined to the line between '
+                f'the joints of its leg by {math.degrees(angle):.3g} degrees: must be along it')
         if angle > _INCLINED:
             said.append('the axis of its prismatic joint is inclined to the line between the '
                         f'joints by {math.degrees(angle):.3g} degrees: taken along the line')

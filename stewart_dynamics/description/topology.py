@@ -152,9 +152,9 @@ def topology_of(mechanism: Mechanism) -> Topology:
             chains[chain.steps[chain.slide].joint.name] = chain
     if len(chains) != LEGS:
         raise DescriptionError(
-            f'{mechanism.source}: no hexapod: {len(chains)} legs with one prismatic joint each '
-            f'between {_shown(mechanism, groups, base)} and '
-            f'{_shown(mechanism, groups, platform)}; there must be six')
+            f'{mechanism.source}: no hexapod: legs with one prismatic joint each between '
+            f'{_shown(mechanism, groups, base)} and {_shown(mechanism, groups, platform)}: '
+            f'{len(chains)}; there must be six{_open_ends(mechanism, groups)}')
     order = [name for name in mechanism.order if name in chains]
     names = order if len(order) == LEGS else [
         joint.name for joint in slides if joint.name in chains]
@@ -167,6 +167,13 @@ def topology_of(mechanism: Mechanism) -> Topology:
 def _hubs(mechanism: Mechanism, groups: _Groups) -> list[str]:
     return [group for group in dict.fromkeys(groups.of(name) for name in mechanism.parts)
             if len(groups.at(group)) >= LEGS]
+
+
+def _open_ends(mechanism: Mechanism, groups: _Groups) -> str:
+    ends = [group for group in dict.fromkeys(groups.of(name) for name in mechanism.parts)
+            if len(groups.at(group)) == 1]
+    return (f'. {len(ends)} bodies have one joint alone, as {_shown(mechanism, groups, ends[0])}: '
+            'joints or constraints that close the loops are needed') if ends else ''
 
 
 def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:

@@ -36,6 +36,9 @@ from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.symmetry import odd_joint
 from stewart_dynamics.parameters import inertia_matrix, Parameters
 
+# Of the place of a joint in a message.
+_DIGITS = 5
+
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle
 # of 300 m, and the circle of the cabin's joints is 90 times smaller.
 _LARGEST_RADIUS = 1000.0  # [m]
@@ -264,9 +267,10 @@ def _symmetry(p: Parameters) -> Iterator[str]:
             twins = [leg for n, leg in enumerate(p['joints'])
                      if n != odd.joint and np.array_equal(joints[n], joints[odd.joint])]
             same = f', the same as {twins[0]}' if twins else ''
-            yield (f'geometry.{name}: {p["joints"][odd.joint]}: {_listed(joints[odd.joint])} m'
+            yield (f'geometry.{name}: {p["joints"][odd.joint]}: '
+                   f'{_listed(joints[odd.joint], _DIGITS)} m'
                    f'{same}: the other five {odd.symmetry}, as all six would with '
-                   f'{_listed(odd.expected)} m: a sign or a digit?')
+                   f'{_listed(odd.expected, _DIGITS)} m: a sign or a digit?')
 
 
 def _singular(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
@@ -313,5 +317,5 @@ def _conditions(p: Parameters, shape: Shape, heights: Array, rotations: Array) -
     return conditions
 
 
-def _listed(values: Array) -> str:
-    return '[' + ', '.join(f'{value:.3g}' for value in values) + ']'
+def _listed(values: Array, digits: int = 3) -> str:
+    return '[' + ', '.join(f'{value:.{digits}g}' for value in values) + ']'

@@ -29,9 +29,14 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 
-# In terms of the mean distance from the center: how well symmetric joints fit, as tables of two or
-# three digits do, and from which deviation on the odd one is reported.
-_FITS, _OFF = 0.004, 0.03
+# Parts of the mean distance from the center: how well symmetric joints fit, as tables of two or
+# three digits do; what is no mistake in any case; and how far a wrong sign moves a joint at least.
+_FITS, _LEAST, _SIGN = 0.004, 0.0005, 0.03
+# Where joints repeat, one is odd that is off by so many times the misfit of the other five, and by
+# so many units of the table's last digit. Errors of measurement in all six joints make up to 9
+# times, rounding up to 2 units.
+_TIMES, _UNITS = 15.0, 3.0
+_MOST_DIGITS = 9
 
 _THIRDS, _MIRRORED = 'repeat after a third of a turn', 'are mirror images in pairs'
 
@@ -50,26 +55,38 @@ def odd_joint(points: Array) -> OddJoint | None:
     size = float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
     if not np.isfinite(points).all() or size == 0.0:
         return None
-    found = []
+    least = max(_LEAST, _UNITS * _unit(points) / size)
+    odd_ones: list[tuple[float, OddJoint]] = []
+    wrong_signs: list[tuple[float, OddJoint]] = []
+    symmetric = False
     for odd in range(6):
         others = [n for n in range(6) if n != odd]
-        for expected, symmetry in (*_thirds(points, others, size),
-                                   *_mirrored(points, others, size)):
+        for expected, misfit in _thirds(points, others, size):
             off = float(np.linalg.norm(points[odd] - expected)) / size
-            if off <= _FITS:
-                return None
-            sign = bool(np.abs(np.abs(points[odd]) - np.abs(expected)).max() <= _FITS * size)
+            symmetric |= off <= _FITS
+            if off > max(_TIMES * misfit, least):
+                odd_ones.append((off, OddJoint(odd, expected, _THIRDS)))
+        for expected in _mirrored(points, others, size):
+            off = float(np.linalg.norm(points[odd] - expected)) / size
+            symmetric |= off <= _FITS
             # Two pairs of mirror images are on any circle: they tell no more than a sign.
-            if off >= _OFF and (sign or symmetry == _THIRDS):
-                found.append((symmetry != _THIRDS, not sign, off, odd, expected, symmetry))
-    if not found:
-        return None
-    *_, odd, expected, symmetry = min(found, key=lambda each: each[:3])
-    return OddJoint(odd, expected, symmetry)
+            sign = np.abs(np.abs(points[odd]) - np.abs(expected)).max() <= _FITS * size
+            if sign and off >= _SIGN:
+                wrong_signs.append((off, OddJoint(odd, expected, _MIRRORED)))
+    found = odd_ones or ([] if symmetric else wrong_signs)
+    return min(found, key=lambda each: each[0])[1] if found else None
 
 
-def _thirds(points: Array, others: list[int], size: float) -> list[tuple[Array, str]]:
-    """Return where the sixth joint is if joints repeat after a third of a turn."""
+def _unit(points: Array) -> float:
+    """Return the unit of the last digit in a table [m]."""
+    for digits in range(_MOST_DIGITS):
+        if np.array_equal(np.round(points, digits), points):
+            break
+    return float(10.0 ** -digits)
+
+
+def _thirds(points: Array, others: list[int], size: float) -> list[tuple[Array, float]]:
+    """Return where the sixth joint is if joints repeat after a third of a turn, and the misfit."""
     found = []
     for three in combinations(others, 3):
         triple = points[list(three)]
@@ -77,20 +94,22 @@ def _thirds(points: Array, others: list[int], size: float) -> list[tuple[Array, 
         arms = triple - center
         radii = np.linalg.norm(arms, axis=1)
         sides = np.linalg.norm(triple - np.roll(triple, 1, axis=0), axis=1)
-        if np.ptp(sides) > _FITS * size or radii.min() < 0.1 * size:
+        uneven = float(np.ptp(sides)) / size
+        if uneven > _FITS or radii.min() < 0.1 * size:
             continue
         axis = np.cross(arms[0], arms[1])
         axis /= np.linalg.norm(axis)
         first, second = points[[n for n in others if n not in three]] - center
         for angle in (2.0, -2.0):
             turned = _turned(first, axis, angle * np.pi / 3.0)
-            if np.linalg.norm(turned - second) <= 2.0 * _FITS * size:
+            missed = float(np.linalg.norm(turned - second)) / size
+            if missed <= 2.0 * _FITS:
                 last = _turned(second, axis, angle * np.pi / 3.0)
-                found.append((center + last, _THIRDS))
+                found.append((center + last, max(uneven, missed)))
     return found
 
 
-def _mirrored(points: Array, others: list[int], size: float) -> list[tuple[Array, str]]:
+def _mirrored(points: Array, others: list[int], size: float) -> list[Array]:
     """Return where the sixth joint is if joints are mirror images in pairs."""
     found = []
     for alone in others:
@@ -104,7 +123,7 @@ def _mirrored(points: Array, others: list[int], size: float) -> list[tuple[Array
             normal = normal / length
             middle = 0.5 * (points[a] + points[b])
             if np.linalg.norm(_image(points[c], middle, normal) - points[d]) <= 2.0 * _FITS * size:
-                found.append((_image(points[alone], middle, normal), _MIRRORED))
+                found.append(_image(points[alone], middle, normal))
     return found
 
 
