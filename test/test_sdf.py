@@ -45,17 +45,35 @@ def test_libsdformat_finds_the_file_valid(seed, tmp_path):
     assert 'Valid' in done.stdout
 
 
-def test_the_joints_close_the_loops_and_count_from_the_home_pose():
+def test_the_joints_and_the_tips_close_the_loops():
     p = Parameters.from_yaml(PLATFORM)
     model = ET.fromstring(sdf(Hexapod(p), 'hexapod')).find('model')
     joints = {joint.get('name'): joint for joint in model.iter('joint')}
     kinds = [joint.get('type') for joint in joints.values()]
     assert [kinds.count(kind) for kind in ('fixed', 'universal', 'prismatic', 'ball')] == [
         1, 6, 6, 6]
-    ball = joints['leg_3_platform_joint']
-    assert ball.find('pose').get('relative_to') == 'platform'
-    at = [float(each) for each in ball.findtext('pose').split()]
+    tip, = (link for link in model.iter('link') if link.get('name') == 'leg_3_tip')
+    assert tip.find('pose').get('relative_to') == 'platform'
+    at = [float(each) for each in tip.findtext('pose').split()]
     assert at == [*p['geometry.platform_joints'][2], 0.0, 0.0, 0.0]
+    assert joints['leg_3_platform_joint'].find('pose') is None  # at its child, the tip
+    assert joints['leg_3_platform_joint'].findtext('child') == 'leg_3_tip'
+    fixed = {(plugin.findtext('parent_link'), plugin.findtext('child_link'))
+             for plugin in model.iter('plugin')}
+    assert fixed == {('platform', f'{leg}_tip') for leg in p['joints']}
+
+
+def test_no_link_has_two_parent_joints() -> None:
+    """Gazebo's engines reject a joint whose child has a parent already."""
+    model = ET.fromstring(sdf(Hexapod(Parameters.from_yaml(PLATFORM)), 'hexapod')).find('model')
+    children = [joint.findtext('child') for joint in model.iter('joint')]
+    assert len(children) == len(set(children)) == 1 + 6 * 3
+
+
+def test_length_limits_count_from_the_home_pose() -> None:
+    p = Parameters.from_yaml(PLATFORM)
+    model = ET.fromstring(sdf(Hexapod(p), 'hexapod')).find('model')
+    joints = {joint.get('name'): joint for joint in model.iter('joint')}
     home = StewartPlatform(p).inverse_kinematics(StewartPlatform(p).home_pose())
     limit = joints['leg_1'].find('axis/limit')
     assert float(limit.findtext('lower')) == pytest.approx(0.95 - home[0], abs=1e-15)

@@ -72,6 +72,8 @@ class Leg(NamedTuple):
     """Names of these joints."""
     ball: str
     """Name of the joint at the platform, and of the frame on the platform where it is."""
+    tip: str
+    """Name of the end of the leg there."""
     base_joint: Array
     """Base frame (3,) [m]."""
     platform_joint: Array
@@ -148,7 +150,7 @@ class Hexapod:
         """Raise ParameterError where a name is taken; some formats have one list for all."""
         names = [_WORLD, self.base_body, self.platform, *self.joints]
         for leg in self.legs:
-            names += [leg.cross, leg.cylinder.name, leg.piston.name, leg.ball]
+            names += [leg.cross, leg.cylinder.name, leg.piston.name, leg.ball, leg.tip]
         twice = [name for n, name in enumerate(names) if name in names[:n]]
         if twice:
             raise ParameterError(
@@ -163,7 +165,7 @@ class Hexapod:
         length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
         return Leg(
             name, f'{name}_cross', (first, second),
-            f'{name}_platform_joint', base, platform, mount,
+            f'{name}_platform_joint', f'{name}_tip', base, platform, mount,
             float(p['geometry.zero_length'][n]), length,
             self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),
             float(p['actuator.reflected_mass'][n]), float(p['actuator.viscous_friction'][n]),

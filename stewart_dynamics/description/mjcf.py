@@ -103,7 +103,7 @@ def _leg(base: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Sh
             np.subtract(leg.limits.lengths(leg.home_length), leg.zero_length)))
     _inertial(piston, hexapod.solid(leg.piston, leg))
     _geoms(piston, looks[leg.piston.name])
-    add(piston, 'site', name=f'{leg.name}_tip')
+    add(piston, 'site', name=leg.tip)
 
 
 def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[Shape]) -> None:
@@ -120,7 +120,7 @@ def _loops(root: ET.Element, hexapod: Hexapod) -> None:
     equality = add(root, 'equality')
     tendons = add(root, 'tendon')
     for leg in hexapod.legs:
-        add(equality, 'connect', name=leg.ball, site1=f'{leg.name}_tip', site2=leg.ball,
+        add(equality, 'connect', name=leg.ball, site1=leg.tip, site2=leg.ball,
             solref=numbers(_SOLREF), solimp=numbers(_SOLIMP))
         # It has no stiffness: it measures the length from joint to joint.
         length = add(tendons, 'spatial', name=leg.name, rgba='0 0 0 0')

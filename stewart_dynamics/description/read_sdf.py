@@ -33,6 +33,8 @@ from stewart_dynamics.mechanics.rotation import from_euler
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}
 _MODEL = '__model__'
+# The end of the name of Gazebo's system, which was another in Ignition.
+_DETACHABLE = '::systems::DetachableJoint'
 # Before this version axes are in the frame of the model, not of the joint.
 _JOINT_AXES = (1, 5)
 _UNLIMITED = 1e15  # SDFormat's own value is 1e16
@@ -48,6 +50,8 @@ def read_sdf(root: ET.Element, source: Path) -> Mechanism:
         joint.get('type') == 'prismatic' for joint in each.findall('joint')))
     reader = _Model(model, _version(root), source)
     joints = [made for joint in model.findall('joint') for made in [reader.joint(joint)] if made]
+    joints += [made for plugin in model.findall('plugin') for made in [reader.fixed(plugin)]
+               if made]
     mechanism = Mechanism(
         str(source), model.get('name', source.stem),
         {link.get('name', ''): reader.part(link) for link in model.findall('link')}, joints)
@@ -143,6 +147,17 @@ class _Model:
                     if abs(value) < _UNLIMITED and not (value < 0.0 and field.endswith('_max')):
                         setattr(made, field, value)
         return made
+
+    def fixed(self, plugin: ET.Element) -> Joint | None:
+        """Return the joint by which Gazebo fixes a link of the model to another; None if none."""
+        if (not plugin.get('name', '').endswith(_DETACHABLE)
+                or plugin.findtext('child_model', '').strip() != _MODEL):
+            return None
+        parent, child = (plugin.findtext(f'{end}_link', '').strip() for end in ('parent', 'child'))
+        for end in (parent, child):
+            if end not in self._links:
+                raise DescriptionError(f'{self._source}: DetachableJoint: no link {end!r}')
+        return Joint(f'{child} to {parent}', FIXED, parent, child, self.place(child).position)
 
     def _axis(self, joint: ET.Element, axis: ET.Element) -> Array:
         name, xyz = joint.get('name', ''), axis.find('xyz')

@@ -95,7 +95,7 @@ def recognized(mechanism: Mechanism) -> Recognized:
         if key != 'joints':
             values[key] = np.array([leg[key] for leg in legs]).ravel() if all(
                 leg[key] is not None for leg in legs) else None
-    values |= _platform(found, remarks)
+    values |= _platform(mechanism, found, remarks)
     values |= _gravity(mechanism, found, remarks)
     given = {name: value for name, value in (values | _carried(mechanism)).items()
              if value is not None}
@@ -241,12 +241,12 @@ def _together(parts: Iterable[Part], frame: Placement) -> _Body:
     return _Body(float(masses.sum()), center, inertia)
 
 
-def _platform(found: Topology, remarks: list[str]) -> dict[str, Any]:
+def _platform(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[str, Any]:
     body = _together(found.platform_parts, found.platform.placement)
     if not body.mass:
         raise DescriptionError(f'{found.platform.name}: the platform has no mass')
     several = sum(bool(part.mass) for part in found.platform_parts)
-    if several > 1:
+    if several > 1 and 'platform.mass' not in mechanism.carried:
         remarks.append(f'platform: {several} bodies that are fixed to each other are one here')
     return {'platform.mass': body.mass, 'platform.center_of_mass': body.center,
             'platform.inertia': body.inertia[np.triu_indices(3)]}
@@ -277,6 +277,8 @@ def _carried(mechanism: Mechanism) -> dict[str, Any]:
             raise DescriptionError(f'{mechanism.source}: {name}: {text!r}: must be numbers'
                                    ) from exc
         values[name] = numbers
+        if numbers and len(numbers) == 1 and not PARAMETERS[name].sizes:
+            values[name] = numbers[0]
     return values
 
 

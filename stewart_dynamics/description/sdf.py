@@ -16,9 +16,14 @@
 """
 A hexapod as SDFormat, with closed loops, for Gazebo.
 
-A universal joint at the base and a ball joint at the platform close each loop. SDFormat counts the
-positions of joints from the poses in the file, those of the home pose: the position of a leg's
-joint is its length less that at home, and its limits are counted from there, too.
+A universal joint at the base and a ball joint at the platform close each loop. The physics engines
+of Gazebo take trees alone (https://github.com/gazebosim/gz-physics/issues/25), but fix two links
+to each other while they run: each ball joint leads to a tip, a link of its own, which Gazebo's
+system DetachableJoint fixes to the platform.
+
+SDFormat counts the positions of joints from the poses in the file, those of the home pose: the
+position of a leg's joint is its length less that at home, and its limits are counted from there,
+too.
 
 The model is turned so that gravity, given in base axes, points along the world's -z. What SDFormat
 has no place for stands in elements with the prefix ``stewart_dynamics``, which other readers
@@ -43,8 +48,12 @@ _VERSION = '1.9'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'
 _LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 _NOT_IN_SDF = ('gravity', 'geometry.zero_length', 'actuator.reflected_mass')
+# The tips add to it.
+_OF_PLATFORM = ('platform.mass', 'platform.center_of_mass', 'platform.inertia')
 _OF_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
               'legs.piston.inertia')
+# Of a tip: its mass as a part of the platform's, and its radius of gyration [m].
+_TIP_MASS, _TIP_GYRATION = 1e-8, 0.1
 _COMMENT = 'Positions of joints are counted from the home pose.'
 
 
@@ -66,9 +75,8 @@ def sdf(hexapod: Hexapod, name: str) -> str:
     _inertial(platform, hexapod.platform_body)
     _shapes(platform, looks[hexapod.platform])
     for leg in hexapod.legs:
-        ball = _joint(model, leg.ball, 'ball', leg.piston.name, hexapod.platform)
-        _pose(ball, leg.platform_joint, np.eye(3), hexapod.platform)
-    names = [*_NOT_IN_SDF, *(each for each in _OF_BODIES if not p[each].all()),
+        _tip(model, hexapod, leg)
+    names = [*_NOT_IN_SDF, *_OF_PLATFORM, *(each for each in _OF_BODIES if not p[each].all()),
              *without_limit(p, _LIMITS)]
     for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
         add(model, f'{CARRIED}:parameter', name=each, value=text)
@@ -114,6 +122,19 @@ def _leg(model: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[S
     dynamics = add(axis, 'dynamics')
     add(dynamics, 'damping', numbers(leg.viscous_friction))
     add(dynamics, 'friction', numbers(leg.coulomb_friction))
+
+
+def _tip(model: ET.Element, hexapod: Hexapod, leg: Leg) -> None:
+    """Write a ball joint, the tip that it leads to, and what fixes that to the platform."""
+    mass = _TIP_MASS * hexapod.platform_body.mass
+    tip = _link(model, leg.tip, hexapod.platform, leg.platform_joint, np.eye(3))
+    _inertial(tip, Body(leg.tip, mass, np.zeros(3), mass * _TIP_GYRATION ** 2 * np.eye(3)))
+    _joint(model, leg.ball, 'ball', leg.piston.name, leg.tip)
+    fixes = add(model, 'plugin', filename='gz-sim-detachable-joint-system',
+                name='gz::sim::systems::DetachableJoint')
+    add(fixes, 'parent_link', hexapod.platform)
+    add(fixes, 'child_model', '__model__')
+    add(fixes, 'child_link', leg.tip)
 
 
 def _link(model: ET.Element, name: str, relative_to: str, position: Array, rotation: Array,
