@@ -186,29 +186,26 @@ def home_of(p: Parameters, shape: Shape, reach: Reach) -> Home:
     low, high = p['limits.length_min'], p['limits.length_max']
     length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
                            else 0.5 * (low + high)))
-    if _mean_length(shape, 0.0, yaw) < length < _LENGTH_RATIO * shape.radius:
-        heights = [side * _height(shape, side, yaw, length) for side in (1.0, -1.0)]
+    legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
+    if mean_norm(legs) < length < _LENGTH_RATIO * shape.radius:
+        heights = [side * _height(shape, side, legs, length) for side in (1.0, -1.0)]
         return Home(np.array(heights), yaw, length)
     heights = [side * height * shape.radius for side in (1.0, -1.0) for height in HEIGHTS]
     return Home(np.array(heights), yaw, None)
 
 
-def _height(shape: Shape, side: float, yaw: float, length: float) -> float:
+def _height(shape: Shape, side: float, legs: Array, length: float) -> float:
     """Return the height above or below the base at which the mean leg has a length."""
+    raised = legs.copy()
     low, high = 0.0, length + shape.base_radius + shape.platform_radius
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if _mean_length(shape, side * middle, yaw) < length:
+        raised[:, 2] = legs[:, 2] + side * middle
+        if mean_norm(raised) < length:
             low = middle
         else:
             high = middle
     return high
-
-
-def _mean_length(shape: Shape, height: float, yaw: float) -> float:
-    offset = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base
-    offset[:, 2] += height
-    return mean_norm(offset)
 
 
 def poses_of(p: Parameters, shape: Shape, heights: Array, rotations: Array,

@@ -91,7 +91,8 @@ class OutputBag:
             topic: Channel(
                 id=n, topic=topic if topic.startswith('/') else f'{node}/{topic}',
                 message_encoding='cdr', schema_id=kinds.index(kind) + 1, metadata={
-                    'offered_qos_profiles': yaml.safe_dump(_offered(topic), sort_keys=False),
+                    'offered_qos_profiles': yaml.safe_dump(
+                        offered, sort_keys=False) if (offered := _offered(topic)) else '',
                     'topic_type_hash': self._hashes[kind]})
             for n, (topic, kind) in enumerate(self._types.items(), start=1)}
         self._file.write(MAGIC + _bytes(Header(profile='ros2', library=_LIBRARY)))
