@@ -137,9 +137,13 @@ def test_the_transforms_are_those_of_pinocchio(recorded: Recorded) -> None:
 
 def test_the_joints_are_those_of_the_node(recorded: Recorded) -> None:
     messages = ModelMessages(recorded.parameters)
-    assert [each.tobytes() for each in recorded.rows[JOINT_STATES]] == [
-        messages.joint_states(stamp, row) for stamp, row in zip(
-            recorded.stamps.tolist(), recorded.motion.rows.tolist(), strict=True)]
+    for stamp, row, data in zip(recorded.stamps.tolist(), recorded.motion.rows.tolist(),
+                                recorded.rows[JOINT_STATES], strict=True):
+        ours = read(JOINT_STATES, data)
+        of_node = STORE.deserialize_cdr(
+            messages.joint_states(stamp, row), MODEL_TYPES[JOINT_STATES])
+        assert (ours.header, ours.name) == (of_node.header, of_node.name)
+        np.testing.assert_allclose(ours.position, of_node.position, rtol=0.0, atol=2e-15)
 
 
 def test_two_links_of_one_name_are_rejected() -> None:

@@ -57,11 +57,11 @@ from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
 from stewart_dynamics.replay.options import LIMIT_MET, NODE
 from stewart_dynamics.replay.recorded_model import (
-    MODEL_TYPES, ROBOT_DESCRIPTION, TF_STATIC)
+    MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.runtime.input_topics import (
     ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
-from stewart_dynamics.runtime.model_messages import JOINT_STATES, ModelMessages, TF
+from stewart_dynamics.runtime.model_messages import JOINT_STATES, TF
 from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
 from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 
@@ -245,16 +245,17 @@ def test_every_setpoint_is_answered_as_the_library_does(
 
 @pytest.mark.parametrize('name', ['clear', 'singular'])
 def test_the_bag_shows_the_hexapod_as_a_model(name: str, replayed: dict[str, Outputs]) -> None:
-    given, messages = setpoints_of(name), ModelMessages(PARAMETERS)
-    stamps, rows = [*given], library_motion(name).rows.tolist()
+    given, model = setpoints_of(name), RecordedModel(PARAMETERS, 'stewart_dynamics')
+    written = dict(model.of_rows(np.array([*given]), library_motion(name).rows))
+    whens = [when for when, *_ in given.values()]
     of = recorded(replayed[name].folder / 'bag' / 'bag.mcap')
     joints = {when: data for topic, when, data in of if topic == JOINT_STATES}
     assert 240 < len(joints) < 305  # in 10 s, at most 30 in a second, of setpoints at 100 Hz
     assert np.diff([*joints]).min() >= SECOND // 30
-    expected = {when: messages.joint_states(stamp, row) for stamp, (when, *_), row in zip(
-        stamps, given.values(), rows, strict=True)}
-    assert joints == {when: expected[when] for when in joints}
-    assert [when for topic, when, _ in of if topic == TF] == [*joints]
+    for topic in (JOINT_STATES, TF):
+        expected = dict(zip(whens, map(bytes, written[topic]), strict=True))
+        found = {when: data for each, when, data in of if each == topic}
+        assert found == {when: expected[when] for when in joints}
     first = min(when for _, when, _ in of)
     for topic in (TF_STATIC, ROBOT_DESCRIPTION):
         assert [when for each, when, _ in of if each == topic] == [first]

@@ -58,9 +58,12 @@ class LinkTransforms:
         self.at_fixed = _origins(fixed)
         self._origins = _origins(moving)
         self._revolute = np.array([each.get('type') == 'revolute' for each in moving])
-        self._axes = np.array([_three(each, 'axis', 'xyz', '1 0 0') for each in moving])
+        axes = np.array([_three(each, 'axis', 'xyz', '1 0 0') for each in moving])
         angles = np.array([_three(each, 'origin', 'rpy') for each in moving])
-        self._directions = np.einsum('kab,kb->ka', from_euler(angles), self._axes)
+        self._directions = np.einsum('kab,kb->ka', from_euler(angles), axes)
+        # The quaternion after half a turn about the axis.
+        self._turned = quaternion_product(
+            self._origins[:, 3:], np.column_stack([axes, np.zeros(len(axes))]))
 
     def at(self, positions: Array) -> Array:
         """
@@ -72,13 +75,16 @@ class LinkTransforms:
             Of ``joints`` [m, rad].
 
         """
-        shifts = np.where(self._revolute, 0.0, positions)[..., None]
-        halves = np.where(self._revolute, 0.5 * positions, 0.0)[..., None]
-        turns = np.concatenate([self._axes * np.sin(halves), np.cos(halves)], axis=-1)
-        return np.concatenate([
-            self._origins[:, :3] + self._directions * shifts,
-            quaternion_product(np.broadcast_to(self._origins[:, 3:], turns.shape), turns)],
-            axis=-1)
+        shifts = np.where(self._revolute, 0.0, positions)
+        halves = np.where(self._revolute, 0.5 * positions, 0.0)
+        cosines, sines = np.cos(halves), np.sin(halves)
+        found = np.empty((*positions.shape, 7))
+        # One number after the other: numpy is slow where the last axis is short.
+        for n in range(3):
+            found[..., n] = self._origins[:, n] + self._directions[:, n] * shifts
+        for n in range(4):
+            found[..., 3 + n] = self._origins[:, 3 + n] * cosines + self._turned[:, n] * sines
+        return found
 
 
 def _links(joint: ET.Element) -> tuple[str, str]:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.messages.cdr import aligned8, header, LITTLE_ENDIAN, put_count, put_text
+from stewart_dynamics.messages.layout import Layout
 
 _SECOND = 1_000_000_000
 
@@ -75,6 +76,12 @@ class PositionsWriter(_Writer):
         put_count(body, len(names))
         # Neither velocity nor effort.
         super().__init__(LITTLE_ENDIAN + body, len(LITTLE_ENDIAN), len(names), bytes(8))
+
+
+def positions_layout(names: Sequence[str]) -> Layout:
+    """Return the layout of the same messages, to write many at once."""
+    message = PositionsWriter(names).write(0, [0.0] * len(names))
+    return Layout(message, [(len(message) - 8 - 8 * len(names), len(names))])
 
 
 class TransformWriter(_Writer):

@@ -16,7 +16,8 @@
 The messages of the output bag that show the hexapod as a model.
 
 The URDF, and the transforms of all its links, as robot_state_publisher publishes them: Foxglove
-and RViz need nothing else. The joint positions are those that the node publishes.
+and RViz need nothing else. The joint positions are those that the node publishes, but for
+rounding: many are computed at once.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.link_transforms import LinkTransforms
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.leg_joints import TreeJoints
-from stewart_dynamics.messages.model import PositionsWriter, TransformsWriter
+from stewart_dynamics.mechanics.rows import POSITION, ROTATION
+from stewart_dynamics.messages.model import positions_layout, TransformsWriter
 from stewart_dynamics.messages.standard import string
 from stewart_dynamics.parameters import Parameters
 from stewart_dynamics.runtime.model_messages import JOINT_STATES, TF
@@ -70,25 +72,21 @@ class RecordedModel:
         self._urdf = urdf(Hexapod(parameters), name)
         self._joints = TreeJoints(parameters)
         self._links = LinkTransforms(self._urdf)
-        self._positions = PositionsWriter(self._joints.names)
+        self._positions = positions_layout(self._joints.names)
         self._moving = TransformsWriter(self._links.moving)
         self._fixed = TransformsWriter(self._links.fixed)
 
     def of_beginning(self, stamp: int) -> Iterator[Written]:
         """Yield topics and messages (1,) of what does not change, at a stamp [ns]."""
         yield TF_STATIC, self._fixed.write(np.array([stamp]), self._links.at_fixed[None])
-        yield ROBOT_DESCRIPTION, _entries([string(self._urdf)])
+        text = string(self._urdf)
+        yield ROBOT_DESCRIPTION, np.frombuffer(text, dtype=f'V{len(text)}')
 
     def of_rows(self, stamps: Stamps, poses: Array) -> Iterator[Written]:
         """Yield topics and messages (N,) of stamps (N,) [ns] and rows of motion (N, MOTION)."""
         if not len(stamps):
             return
-        positions = [self._joints.of_sample(pose) for pose in poses.tolist()]
-        yield JOINT_STATES, _entries([
-            self._positions.write(stamp, each)
-            for stamp, each in zip(stamps.tolist(), positions, strict=True)])
-        yield TF, self._moving.write(stamps, self._links.at(np.array(positions)))
-
-
-def _entries(messages: list[bytes]) -> NDArray[np.void]:
-    return np.frombuffer(b''.join(messages), dtype=f'V{len(messages[0])}')
+        positions = self._joints.positions(
+            poses[:, POSITION], poses[:, ROTATION].reshape(-1, 3, 3))
+        yield JOINT_STATES, self._positions.write(stamps, positions)
+        yield TF, self._moving.write(stamps, self._links.at(positions))
