@@ -598,17 +598,23 @@ def test_lifecycles_under_load_leave_nothing_behind(
 
     for _ in range(20):
         cycle()
-    before, publishers = held()
-    for _ in range(40):
-        cycle()
-    after, publishers_after = held()
+    after, publishers = held()
+    cycles, grown = 20, list[int]()
+    # What is left behind is left in each round; memory that is taken once, in one of them.
+    while not grown or (grown[-1] >= 800 and len(grown) < 3):
+        before = after
+        for _ in range(40):
+            cycle()
+        cycles += 40
+        after, publishers_after = held()
+        assert publishers_after == publishers == dict.fromkeys(OUTPUTS, 1)
+        for what in ('descriptors', 'threads'):
+            assert after[what] == before[what]
+        grown.append(after['memory'] - before['memory'])
     feeder.end()
-    assert node.program.stderr.count('dynamics ready after') == 61
-    assert publishers_after == publishers == dict.fromkeys(OUTPUTS, 1)
-    for what in ('descriptors', 'threads'):
-        assert after[what] == before[what]
+    assert node.program.stderr.count('dynamics ready after') == 1 + cycles
     # A publisher that is left behind takes 30 kB; with none the middleware takes 3 to 7 a time.
-    assert after['memory'] - before['memory'] < 800
+    assert grown[-1] < 800, grown
     _expect_what_was_cut_off(node)
 
 
