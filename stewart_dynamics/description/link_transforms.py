@@ -21,12 +21,16 @@ and not by positions of joints.
 
 from __future__ import annotations
 
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.rotation import from_euler, quaternion_product, to_quaternion
+from stewart_dynamics.description.read_urdf import end_of, numbers_of, origin_of
+from stewart_dynamics.mechanics.rotation import quaternion_product, to_quaternion
+
+_SOURCE = Path('robot_description')  # of errors
 
 
 class LinkTransforms:
@@ -40,8 +44,6 @@ class LinkTransforms:
 
     Attributes
     ----------
-    joints : tuple of str
-        The joints that move (K,).
     moving, fixed : list of (parent, child)
         The links of the joints that move (K,), and of those that do not (M,).
     at_fixed : (M, 7)
@@ -53,14 +55,14 @@ class LinkTransforms:
         joints = ET.fromstring(urdf).findall('joint')
         fixed = [each for each in joints if each.get('type') == 'fixed']
         moving = [each for each in joints if each.get('type') != 'fixed']
-        self.joints = tuple(each.attrib['name'] for each in moving)
         self.moving, self.fixed = [*map(_links, moving)], [*map(_links, fixed)]
         self.at_fixed = _origins(fixed)
         self._origins = _origins(moving)
         self._revolute = np.array([each.get('type') == 'revolute' for each in moving])
-        axes = np.array([_three(each, 'axis', 'xyz', '1 0 0') for each in moving])
-        angles = np.array([_three(each, 'origin', 'rpy') for each in moving])
-        self._directions = np.einsum('kab,kb->ka', from_euler(angles), axes)
+        axes = np.array([_axis(each) for each in moving])
+        self._directions = np.array([
+            origin_of(each, _SOURCE).rotation @ axis
+            for each, axis in zip(moving, axes, strict=True)])
         # The quaternion after half a turn about the axis.
         self._turned = quaternion_product(
             self._origins[:, 3:], np.column_stack([axes, np.zeros(len(axes))]))
@@ -72,7 +74,7 @@ class LinkTransforms:
         Parameters
         ----------
         positions : (N, K)
-            Of ``joints`` [m, rad].
+            Of the joints that move, in the order of the file [m, rad].
 
         """
         shifts = np.where(self._revolute, 0.0, positions)
@@ -88,18 +90,15 @@ class LinkTransforms:
 
 
 def _links(joint: ET.Element) -> tuple[str, str]:
-    parent, child = joint.find('parent'), joint.find('child')
-    assert parent is not None and child is not None
-    return parent.attrib['link'], child.attrib['link']
+    return end_of(joint, 'parent', _SOURCE), end_of(joint, 'child', _SOURCE)
 
 
-def _three(joint: ET.Element, name: str, attribute: str, default: str = '0 0 0') -> list[float]:
-    found = joint.find(name)
-    text = default if found is None else found.get(attribute, default)
-    return [float(number) for number in text.split()]
+def _axis(joint: ET.Element) -> Array:
+    axis = joint.find('axis')
+    return numbers_of(None if axis is None else axis.get('xyz'), 3, _SOURCE, 'axis')
 
 
 def _origins(joints: list[ET.Element]) -> Array:
-    angles = np.array([_three(each, 'origin', 'rpy') for each in joints])
-    places = np.array([_three(each, 'origin', 'xyz') for each in joints])
-    return np.concatenate([places, to_quaternion(from_euler(angles))], axis=-1)
+    places = [origin_of(each, _SOURCE) for each in joints]
+    return np.concatenate([np.array([each.position for each in places]), to_quaternion(
+        np.array([each.rotation for each in places]))], axis=-1)

@@ -37,9 +37,9 @@ def read_urdf(root: ET.Element, source: Path) -> Mechanism:
     """Return the mechanism of a URDF; DescriptionError where it is not one."""
     links = {link.get('name', ''): link for link in root.findall('link')}
     found = [joint for joint in root.findall('joint') if joint.find('child') is not None]
-    of_child = {_end(joint, 'child', source): joint for joint in found}
+    of_child = {end_of(joint, 'child', source): joint for joint in found}
     for child, joint in of_child.items():
-        for end in (child, _end(joint, 'parent', source)):
+        for end in (child, end_of(joint, 'parent', source)):
             if end not in links:
                 raise DescriptionError(
                     f'{source}: joint {joint.get("name")!r}: no link {end!r}')
@@ -95,14 +95,15 @@ def _place(name: str, of_child: dict[str, ET.Element], placements: dict[str, Pla
         if name in chain:
             raise DescriptionError(f'{source}: link {name!r} carries itself')
         chain.append(name)
-        name = _end(of_child[name], 'parent', source)
+        name = end_of(of_child[name], 'parent', source)
     at = placements.setdefault(name, HERE)
     for each in reversed(chain):
-        at = at.of(_origin(of_child[each], source))
+        at = at.of(origin_of(of_child[each], source))
         placements[each] = at
 
 
-def _end(joint: ET.Element, side: str, source: Path) -> str:
+def end_of(joint: ET.Element, side: str, source: Path) -> str:
+    """Return the link at a side of a joint, parent or child."""
     end = joint.find(side)
     name = None if end is None else end.get('link') or (end.text or '').strip()
     if not name:
@@ -110,7 +111,8 @@ def _end(joint: ET.Element, side: str, source: Path) -> str:
     return name
 
 
-def _origin(element: ET.Element, source: Path) -> Placement:
+def origin_of(element: ET.Element, source: Path) -> Placement:
+    """Return where a joint is in its parent, or what is in a link in that link."""
     origin = element.find('origin')
     if origin is None:
         return HERE
@@ -124,7 +126,7 @@ def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Pa
     if inertial is None:
         return Part(name, placement)
     what = f'inertial of link {name!r}'
-    origin = _origin(inertial, source)
+    origin = origin_of(inertial, source)
     mass, given = inertial.find('mass'), inertial.find('inertia')
     tensor = np.zeros((3, 3))
     if given is not None:
@@ -139,10 +141,10 @@ def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Pa
 
 def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
     name = joint.get('name', '')
-    child = _end(joint, 'child', source)
+    child = end_of(joint, 'child', source)
     kind = _KINDS.get(joint.get('type', ''), OTHER)
     at = placements[child]
-    made = Joint(name, kind, _end(joint, 'parent', source), child, at.position)
+    made = Joint(name, kind, end_of(joint, 'parent', source), child, at.position)
     if kind in (HINGE, SLIDE):
         axis = joint.find('axis')
         along = numbers_of('1 0 0' if axis is None else axis.get('xyz'), 3, source,
@@ -167,8 +169,8 @@ def _optional(element: ET.Element, key: str, source: Path) -> float | None:
 
 def _closing(joint: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:
     """Return a joint in SDFormat within URDF: its pose is in the frame of its child."""
-    name, parent, child = (joint.get('name', ''), _end(joint, 'parent', source),
-                           _end(joint, 'child', source))
+    name, parent, child = (joint.get('name', ''), end_of(joint, 'parent', source),
+                           end_of(joint, 'child', source))
     for end in (parent, child):
         if end not in placements:
             raise DescriptionError(f'{source}: joint {name!r}: no link {end!r}')
