@@ -31,11 +31,16 @@ class Timed:
         self.pieces: list[str] = []
         self.done: list[tuple[str, float]] = []
         self.queue = PlannedTrajectoryQueue(
-            lambda: self._run(True), lambda: self._run(False), Preparation(),
+            self._start, Preparation(),
             lambda outcome, came: self.done.append((outcome.message, came)))
 
-    def _run(self, running: bool) -> None:
-        self.running = running
+    def _start(self) -> None:
+        self.running = True
+
+    def tick(self) -> None:
+        """Tick, as the timer does once after each start."""
+        self.running = False
+        self.queue.tick()
 
     def work(self, name: str, pieces: int = 2) -> Iterator[Outcome | None]:
         """Yield None after each piece, and the outcome at the end."""
@@ -54,10 +59,10 @@ def test_each_tick_is_one_piece_and_the_timer_runs_while_there_is_work() -> None
                          (['first'] * 2, [('first', 1.0)]),
                          (['first', 'first', 'second'], [('first', 1.0)])):
         assert timed.running
-        timed.queue.tick()
+        timed.tick()
         assert timed.pieces == pieces
         assert timed.done == done
-    timed.queue.tick()
+    timed.tick()
     assert timed.done == [('first', 1.0), ('second', 2.0)]
     assert not timed.running
 
@@ -68,7 +73,7 @@ def test_it_is_full_with_those_in_work_and_waiting() -> None:
         assert not timed.queue.full
         timed.queue.add(timed.work(str(n), pieces=0), 0.0)
     assert timed.queue.full
-    timed.queue.tick()
+    timed.tick()
     assert not timed.queue.full
 
 
@@ -77,9 +82,9 @@ def test_dropped_trajectories_are_counted_and_not_continued() -> None:
     assert timed.queue.drop() == 0
     for name in ('first', 'second'):
         timed.queue.add(timed.work(name), 0.0)
-    timed.queue.tick()
+    timed.tick()
     assert timed.queue.drop() == 2
-    timed.queue.tick()  # the timer may be due already
+    timed.tick()  # the timer may be due already
     assert timed.pieces == ['first']
     assert not timed.done
     assert not timed.running

@@ -41,7 +41,7 @@ from stewart_dynamics.nodes.model_publisher import ModelPublisher
 from stewart_dynamics.nodes.payload_service import inertia_message, PayloadService
 from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.nodes.rclpy_workarounds import (
-    answer_impossible_transitions, set_parameters_together, take_waiting_messages)
+    answer_impossible_transitions, OneShotTimer, set_parameters_together, take_waiting_messages)
 from stewart_dynamics.nodes.repeated_log import RepeatedLog
 from stewart_dynamics.nodes.run import run
 from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
@@ -100,19 +100,17 @@ class DynamicsNode(LifecycleNode):
         self._active = False
         self._configured = False
         self._topics = Topics(self)
-        # A steady clock: ROS time may stand still or jump.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        timer = self.create_timer(PAUSE, lambda: self._planned.tick(), clock=steady)
-        timer.cancel()
         self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
         self._base_wrench_read = False  # somebody subscribes to it
         self._planned: PlannedTrajectoryQueue = PlannedTrajectoryQueue(
-            timer.reset, timer.cancel, self._planned_code, self._on_outcome)
+            OneShotTimer(self, PAUSE, lambda: self._planned.tick()).start,
+            self._planned_code, self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
         self.add_on_set_parameters_callback(self._on_set_parameters)
-        self.create_timer(TICK, self._on_tick, clock=steady)
+        # A steady clock: ROS time may stand still or jump.
+        self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
         set_parameters_together(self)

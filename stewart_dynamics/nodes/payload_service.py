@@ -21,14 +21,13 @@ import time
 from typing import Any
 
 from geometry_msgs.msg import Inertia, InertiaStamped, Vector3
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.time import Time
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from stewart_dynamics.compilation.preparation import Preparation
-from stewart_dynamics.nodes.rclpy_workarounds import create_later_service
+from stewart_dynamics.nodes.rclpy_workarounds import create_later_service, OneShotTimer
 from stewart_dynamics.runtime.payload import FUNCTIONS, Outcome, Payload
 
 IDENTIFY_PAYLOAD = 'identify_payload'
@@ -56,9 +55,7 @@ class PayloadService:
                  done: Callable[[Outcome, float], None]) -> None:
         self.code = Preparation(*FUNCTIONS)
         self._node, self._begin, self._done = node, work, done
-        self._timer = node.create_timer(
-            _PAUSE, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._timer.cancel()
+        self._timer = OneShotTimer(node, _PAUSE, self._on_timer)
         self._work: Iterator[Outcome | None] | None = None
         self._begun = 0.0
         self._waiting: list[Callable[[Any], None]] = []
@@ -77,7 +74,7 @@ class PayloadService:
 
     def drop(self, reason: str) -> None:
         """End the work in progress without result, if there is any."""
-        self._timer.cancel()
+        self._timer.stop()
         self._answer(Outcome(reason))
 
     def _on_request(self, answer: Callable[[Any], None]) -> None:
@@ -91,16 +88,14 @@ class PayloadService:
             return
         self._work = work
         self.code.begin()
-        self._timer.reset()
+        self._timer.start()
 
     def _on_timer(self) -> None:
-        # Between two pieces there is a pause, however late this one is.
-        self._timer.cancel()
         outcome = next(self._work) if self._work and self.code.ready else None
         if outcome is not None:
             self._end(outcome)
         elif self._work:
-            self._timer.reset()
+            self._timer.start()
 
     def _end(self, outcome: Outcome) -> None:
         self._done(outcome, time.monotonic() - self._begun)

@@ -36,8 +36,8 @@ class PlannedTrajectoryQueue:
 
     Parameters
     ----------
-    start, stop : callable
-        Start and stop the timer; it ticks once after each start.
+    start : callable
+        Starts the timer; it ticks once after each start.
     code : Preparation
         Of what the work calls; it waits until that is ready.
     done : callable
@@ -45,10 +45,9 @@ class PlannedTrajectoryQueue:
 
     """
 
-    def __init__(self, start: Callable[[], None], stop: Callable[[], None],
-                 code: Preparation, done: Callable[[Outcome, float], None]) -> None:
+    def __init__(self, start: Callable[[], None], code: Preparation,
+                 done: Callable[[Outcome, float], None]) -> None:
         self._start = start
-        self._stop = stop
         self._code = code
         self._done = done
         self._waiting: deque[tuple[Iterator[Outcome | None], float]] = deque()
@@ -66,7 +65,6 @@ class PlannedTrajectoryQueue:
 
     def tick(self) -> None:
         """Do one piece of the work on the first one."""
-        self._stop()
         if not self._waiting:  # dropped
             return
         if not self._code.ready:

@@ -1,0 +1,96 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A timer that is started again at each call, in an executor that falls behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.clock import Clock, ClockType  # noqa: E402
+from rclpy.executors import Executor, SingleThreadedExecutor  # noqa: E402
+from rclpy.experimental.events_executor import EventsExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.task import Future  # noqa: E402
+from running import DEADLINE, Peer  # noqa: E402
+
+from stewart_dynamics.nodes.rclpy_workarounds import OneShotTimer  # noqa: E402
+
+PAUSE = 0.001
+
+
+@pytest.fixture
+def node(domain: int) -> Iterator[Node]:
+    with closing(Peer(domain)) as peer:
+        yield peer.node
+
+
+def spin(kind: Callable[..., Executor], node: Node, done: Future) -> None:
+    """Let an executor of this kind spin until a future is done."""
+    executor = kind(context=node.context)
+    executor.add_node(node)
+    executor.spin_until_future_complete(done, DEADLINE)
+    executor.shutdown()
+    assert done.done()
+
+
+@pytest.mark.parametrize('kind', [EventsExecutor, SingleThreadedExecutor])
+def test_a_timer_that_starts_itself_again_is_late_and_never_early(
+        kind: Callable[..., Executor], node: Node) -> None:
+    done = Future()
+    pauses: list[float] = []
+    started = time.monotonic()
+
+    def call() -> None:
+        nonlocal started
+        pauses.append(time.monotonic() - started)
+        if len(pauses) == 100:
+            done.set_result(None)
+            return
+        started = time.monotonic()
+        for _ in range(20):
+            timer.start()
+        while len(pauses) % 2 and time.monotonic() < started + 3 * PAUSE:
+            pass  # the executor falls behind
+
+    timer = OneShotTimer(node, PAUSE, call)
+    begun = time.monotonic()
+    ticks: list[float] = []
+    beside = node.create_timer(10 * PAUSE, lambda: ticks.append(time.monotonic() - begun),
+                               clock=Clock(clock_type=ClockType.STEADY_TIME))
+    timer.start()
+    spin(kind, node, done)
+    assert len(pauses) == 100
+    assert min(pauses) >= PAUSE
+    # The timer beside it has its own times.
+    assert beside.time_until_next_call() <= 10 * PAUSE * 1e9
+    assert 0 < len(ticks) <= max(ticks) / (10 * PAUSE) + 1
+
+
+def test_a_stopped_timer_does_not_call(node: Node) -> None:
+    done = Future()
+    calls: list[str] = []
+    stopped = OneShotTimer(node, PAUSE, lambda: calls.append('stopped'))
+    later = OneShotTimer(node, 20 * PAUSE, lambda: done.set_result(calls.append('later')))
+    stopped.start()
+    later.start()
+    stopped.stop()
+    spin(EventsExecutor, node, done)
+    assert calls == ['later']
