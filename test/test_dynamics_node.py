@@ -932,7 +932,7 @@ def test_a_signal_ends_it_with_exit_code_0(
 def test_a_signal_ends_it_while_it_starts(start: Start, number: signal.Signals) -> None:
     node = start(STEWART_DYNAMICS_CACHE_DIR='cache')  # an empty one: it compiles for seconds
     # The node is there, and is compiling: no setpoint topic yet.
-    node.until(lambda: ('stewart_dynamics', '/') in node.peer.node.get_node_names_and_namespaces(),
+    node.until(lambda: node.peer.node.count_services(f'{NODE}/get_parameters'),
                'the node is there')
     node.stop(number)
 
