@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator
+from contextlib import closing, ExitStack
 import functools
 from html.parser import HTMLParser
 import json
@@ -425,6 +426,14 @@ def browser() -> Iterator[Browser]:
         running.close()
 
 
+@pytest.fixture(scope='module')
+def page(browser: Browser) -> Page:
+    """Return the one page: the next report in it finds plotly compiled."""
+    page = browser.new_page()
+    page.set_default_timeout(1000.0 * PATIENCE)
+    return page
+
+
 class Opened:
     """A report in the browser, and its errors."""
 
@@ -432,13 +441,23 @@ class Opened:
         self.page = page
         self.faults: list[str] = []
         self.requests: list[str] = []
-        page.set_default_timeout(1000.0 * PATIENCE)
-        page.on('pageerror', lambda error: self.faults.append(str(error)))
-        page.on('console', lambda message: self.faults.append(message.text)
-                if message.type == 'error' else None)
-        page.on('request', lambda request: self.requests.append(request.url))
+        self._listeners: dict[Any, Callable[[Any], None]] = {
+            'pageerror': lambda error: self.faults.append(str(error)),
+            'console': lambda message: self.faults.append(message.text)
+            if message.type == 'error' else None,
+            'request': lambda request: self.requests.append(request.url)}
+        for event, listener in self._listeners.items():
+            page.on(event, listener)
+        page.set_viewport_size({'width': 1300, 'height': 900})
+        page.emulate_media(media='screen')
+        page.mouse.move(0, 0)
         self.url = path.as_uri()
         page.goto(self.url)
+
+    def close(self) -> None:
+        """Leave the page to the next report."""
+        for event, listener in self._listeners.items():
+            self.page.remove_listener(event, listener)
 
     def until(self, expression: str) -> None:
         """Wait until an expression is true; the page's policy forbids playwright's own way."""
@@ -465,19 +484,16 @@ class Opened:
 
 
 @pytest.fixture
-def opened(browser: Browser, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
+def opened(page: Page, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
     """Return a function that writes a report and opens it."""
-    pages: list[Page] = []
+    with ExitStack() as stack:
+        def begin(given: Given, write: Callable[[Path], Any] | None = None,
+                  **changes: Any) -> Opened:
+            path = tmp_path / 'report.html'
+            (write or (lambda path: given.write(path, **changes)))(path)
+            return stack.enter_context(closing(Opened(page, path)))
 
-    def begin(given: Given, write: Callable[[Path], Any] | None = None, **changes: Any) -> Opened:
-        path = tmp_path / f'report_{len(pages)}.html'
-        (write or (lambda path: given.write(path, **changes)))(path)
-        pages.append(browser.new_page(viewport={'width': 1300, 'height': 900}))
-        return Opened(pages[-1], path)
-
-    yield begin
-    for page in pages:
-        page.close()
+        yield begin
 
 
 def test_everything_is_drawn_without_an_error_or_the_network(
@@ -673,7 +689,7 @@ def test_reports_share_a_file_of_plotly(opened: Callable[..., Opened], tmp_path:
         given.report().write(path, given.summary(), shared)
 
     report = opened(given, write)
-    assert (tmp_path / 'report_0.html').stat().st_size < 2_000_000
+    assert (tmp_path / 'report.html').stat().st_size < 2_000_000
     report.see('plot_forces')
     assert report.faults == []
     assert report.requests == [report.url, shared.as_uri()]
