@@ -49,10 +49,11 @@ def base_motion(parameters: Parameters, seed: int, scale: float = 1.0) -> Motion
     return at
 
 
-def rows_at(base: MotionOf, begin: float, period: float, gravity: Any = GRAVITY) -> Array:
-    """Return what the plant takes for a period."""
-    times = begin + period * np.array([0.0, 0.5, 1.0])
-    return BaseMotion.from_motion(base(times), gravity).rows
+def rows_at(base: MotionOf, begin: Any, period: float, gravity: Any = GRAVITY) -> Array:
+    """Return what the plant takes for a period, or (..., 3, BASE) for those that begin so."""
+    times = np.asarray(begin)[..., None] + period * np.array([0.0, 0.5, 1.0])
+    rows = BaseMotion.from_motion(base(times.ravel()), gravity).rows
+    return rows.reshape(*times.shape, -1)
 
 
 def simpson(values: Array, step: float) -> float:
@@ -92,9 +93,9 @@ def balance(parameters: Any, base: MotionOf, blocks: int) -> tuple[float, float,
         force = (wanted.forces[block] + stiff * (wanted.lengths[block] - lengths)
                  + damped * (wanted.rates[block] - state.rates))
         states = [state]
-        for n in range(block * _HELD, (block + 1) * _HELD):
-            states.append(plant.advance(
-                tuple(force.tolist()), ZERO, rows_at(base, n * period, period)))
+        begins = (block * _HELD + np.arange(_HELD)) * period
+        for rows_of_base in rows_at(base, begins, period):
+            states.append(plant.advance(tuple(force.tolist()), ZERO, rows_of_base))
         works.append(force @ (np.array(states[-1].lengths) - lengths))
         moving = base((block * _HELD + np.arange(_HELD + 1)) * period)
         rows = BaseMotion.from_motion(moving, GRAVITY)
@@ -137,8 +138,8 @@ def test_the_error_falls_with_the_fourth_power_of_the_period() -> None:
         assert plant.steps == 1
         base = base_motion(plant.parameters, 9, scale=3.0)
         set_moving(plant, [2.0, -1.0, 3.0, 8.0, -5.0, 12.0])
-        for n in range(round(0.2 * rate)):
-            plant.advance(ZERO, ZERO, rows_at(base, n / rate, 1.0 / rate))
+        for rows in rows_at(base, np.arange(round(0.2 * rate)) / rate, 1.0 / rate):
+            plant.advance(ZERO, ZERO, rows)
         assert not plant.fault
         ends.append(np.array(plant.state.pose + plant.state.twist))
     assert_order(4.0, ends)
@@ -151,8 +152,8 @@ def test_steps_within_a_period_follow_the_base_as_well() -> None:
         plant = Plant(random_simulated(6, rate=rate, step=1e-3, gravity=GRAVITY.tolist(),
                                        **FRICTIONLESS))
         base = base_motion(plant.parameters, 9)
-        for n in range(round(0.5 * rate)):
-            plant.advance(ZERO, ZERO, rows_at(base, n / rate, 1.0 / rate))
+        for rows in rows_at(base, np.arange(round(0.5 * rate)) / rate, 1.0 / rate):
+            plant.advance(ZERO, ZERO, rows)
         ends.append(np.array(plant.state.pose + plant.state.twist))
     assert 0.0 < relative(ends[0], ends[1]) < 1e-6
 

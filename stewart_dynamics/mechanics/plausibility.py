@@ -23,6 +23,7 @@ telescope on cables of 300 m; a value outside is a warning, not an error.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import permutations
 import math
 
@@ -88,6 +89,7 @@ _FASTEST = 100.0  # [m/s]; a hundred times what hexapods reach
 _TILT = math.radians(15.0)
 
 
+@lru_cache(maxsize=4)
 def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
     Return likely mistakes, each in one line: parameter, value, what is suspected.

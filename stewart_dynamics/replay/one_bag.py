@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing, ExitStack
+from functools import lru_cache
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -67,6 +68,8 @@ Progress = Callable[[int, int], None]
 # The machine code that every replay needs.
 FUNCTIONS = (
     *step.FUNCTIONS, *base_wrench.FUNCTIONS, *message_blocks.FUNCTIONS, mcap_scan.scan)
+
+_model = lru_cache(maxsize=1)(RecordedModel)  # of many bags there is one
 
 
 class Replayed(NamedTuple):
@@ -182,7 +185,7 @@ class _Run:
             self._breakdown = ForceBreakdownRows(parameters)
         self._bag = OutputBag(
             folder / 'bag', options.node, OutputMessages(parameters),
-            RecordedModel(parameters, options.node.strip('/')), parameters['visualization_rate'])
+            _model(parameters, options.node.strip('/')), parameters['visualization_rate'])
         stack.callback(self._bag.abandon)
         self._table: Table = kind_of_table(options.parquet)(
             folder, parameters['joints'], self._quasi_static,
