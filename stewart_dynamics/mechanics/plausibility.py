@@ -89,7 +89,7 @@ _FASTEST = 100.0  # [m/s]; a hundred times what hexapods reach
 _TILT = math.radians(15.0)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=4)  # the replay of many bags asks for each
 def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
     Return likely mistakes, each in one line: parameter, value, what is suspected.

@@ -69,7 +69,7 @@ Progress = Callable[[int, int], None]
 FUNCTIONS = (
     *step.FUNCTIONS, *base_wrench.FUNCTIONS, *message_blocks.FUNCTIONS, mcap_scan.scan)
 
-_model = lru_cache(maxsize=1)(RecordedModel)  # of many bags there is one
+_model = lru_cache(maxsize=1)(RecordedModel)  # many bags have one hexapod
 
 
 class Replayed(NamedTuple):
