@@ -484,6 +484,8 @@ def test_a_later_subscriber_gets_no_earlier_markers(fresh: Start) -> None:
     node.until_active()
     before = node.stamp()
     node.answer(stamp=before)
+    # Behind the answer it looks for subscribers of its markers: it is done when this is answered.
+    assert node.state == 'active'
     seen = _seen(node)
     assert before not in _stamps(seen)
 
