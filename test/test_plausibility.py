@@ -355,7 +355,7 @@ def test_home_is_where_the_mean_leg_is_halfway_between_its_limits() -> None:
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))
 
 
-@settings(derandomize=True, max_examples=75, deadline=None)
+@settings(derandomize=True, max_examples=150, deadline=None)
 @given(st.lists(NUMBERS, min_size=18, max_size=18), st.lists(NUMBERS, min_size=18, max_size=18),
        st.dictionaries(st.sampled_from([
            'geometry.zero_length', 'limits.length_min', 'limits.length_max', 'platform.mass',

@@ -623,7 +623,8 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
     assert_only(receiver, 1)
     # The source communicates with the node only.
     assert not [name for name in source.said()['heard'] if name.startswith('setpoint')]
-    assert set(source.said()['nodes']) <= {'participant_1', 'stewart_dynamics'}
+    crowd.until(lambda: source.said()['nodes'] == ['participant_1', 'stewart_dynamics'],
+                'the source knows the node and no other')
     assert bound(node) == set()
     assert bound(source) == bound(receiver) == {'127.0.0.1'}
     assert not shares_memory(node)

@@ -27,7 +27,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.read_urdf import end_of, numbers_of, origin_of
+from stewart_dynamics.description.mechanism import Placement
+from stewart_dynamics.description.read_urdf import axis_of, end_of, origin_of
 from stewart_dynamics.mechanics.rotation import quaternion_product, to_quaternion
 
 _SOURCE = Path('robot_description')  # of errors
@@ -56,13 +57,13 @@ class LinkTransforms:
         fixed = [each for each in joints if each.get('type') == 'fixed']
         moving = [each for each in joints if each.get('type') != 'fixed']
         self.moving, self.fixed = [*map(_links, moving)], [*map(_links, fixed)]
-        self.at_fixed = _origins(fixed)
-        self._origins = _origins(moving)
+        self.at_fixed = _rows([origin_of(each, _SOURCE) for each in fixed])
+        places = [origin_of(each, _SOURCE) for each in moving]
+        self._origins = _rows(places)
         self._revolute = np.array([each.get('type') == 'revolute' for each in moving])
-        axes = np.array([_axis(each) for each in moving])
+        axes = np.array([axis_of(each, _SOURCE) for each in moving])
         self._directions = np.array([
-            origin_of(each, _SOURCE).rotation @ axis
-            for each, axis in zip(moving, axes, strict=True)])
+            place.rotation @ axis for place, axis in zip(places, axes, strict=True)])
         # The quaternion after half a turn about the axis.
         self._turned = quaternion_product(
             self._origins[:, 3:], np.column_stack([axes, np.zeros(len(axes))]))
@@ -93,12 +94,6 @@ def _links(joint: ET.Element) -> tuple[str, str]:
     return end_of(joint, 'parent', _SOURCE), end_of(joint, 'child', _SOURCE)
 
 
-def _axis(joint: ET.Element) -> Array:
-    axis = joint.find('axis')
-    return numbers_of(None if axis is None else axis.get('xyz'), 3, _SOURCE, 'axis')
-
-
-def _origins(joints: list[ET.Element]) -> Array:
-    places = [origin_of(each, _SOURCE) for each in joints]
+def _rows(places: list[Placement]) -> Array:
     return np.concatenate([np.array([each.position for each in places]), to_quaternion(
         np.array([each.rotation for each in places]))], axis=-1)

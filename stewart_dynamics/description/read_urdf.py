@@ -121,6 +121,13 @@ def origin_of(element: ET.Element, source: Path) -> Placement:
                      numbers_of(origin.get('xyz'), 3, source, what))
 
 
+def axis_of(joint: ET.Element, source: Path) -> Array:
+    """Return the axis (3,) of a joint in its own frame, as it is written."""
+    axis = joint.find('axis')
+    return numbers_of('1 0 0' if axis is None else axis.get('xyz'), 3, source,
+                      f'axis of joint {joint.get("name", "")!r}')
+
+
 def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Part:
     inertial = link.find('inertial')
     if inertial is None:
@@ -146,9 +153,7 @@ def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) ->
     at = placements[child]
     made = Joint(name, kind, end_of(joint, 'parent', source), child, at.position)
     if kind in (HINGE, SLIDE):
-        axis = joint.find('axis')
-        along = numbers_of('1 0 0' if axis is None else axis.get('xyz'), 3, source,
-                           f'axis of joint {name!r}')
+        along = axis_of(joint, source)
         made.axes = [at.rotation @ unit(along, source, f'axis of joint {name!r}')]
     limit, dynamics = joint.find('limit'), joint.find('dynamics')
     if limit is not None:
