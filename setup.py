@@ -104,7 +104,8 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
     package_data={package_name: ['py.typed'], f'{package_name}.identification': ['templates/*'],
-                  f'{package_name}.replay': ['templates/*']},
+                  f'{package_name}.replay': ['templates/*'],
+                  f'{package_name}.reporting': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),
@@ -125,11 +126,11 @@ setup(
     entry_points={
         'console_scripts': [
             'stewart_describe = stewart_dynamics.description:main',
-            'stewart_dynamics = stewart_dynamics.nodes.console_scripts:dynamics',
+            'stewart_dynamics = stewart_dynamics.ros.console_scripts:dynamics',
             'stewart_identify = stewart_dynamics.identification:main',
             'stewart_replay = stewart_dynamics.replay:main',
-            'stewart_simulator = stewart_dynamics.nodes.console_scripts:simulator',
-            'stewart_trajectory = stewart_dynamics.nodes.console_scripts:trajectory',
+            'stewart_simulator = stewart_dynamics.ros.console_scripts:simulator',
+            'stewart_trajectory = stewart_dynamics.ros.console_scripts:trajectory',
         ],
     },
 )

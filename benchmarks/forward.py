@@ -30,9 +30,10 @@ import pinocchio as pin
 from scipy.optimize import root
 
 from stewart_dynamics import Motion, Pose, StewartPlatform
-from stewart_dynamics.mechanics import forward_dynamics, forward_kinematics
-from stewart_dynamics.mechanics.forward_kinematics import FOUND
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.dynamics import forward_dynamics
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.mechanics.kinematics.forward_kinematics import FOUND
 from stewart_dynamics.mechanics.rows import DETERMINANT, FORCES
 
 BEGIN, END = '<!-- forward: begin -->', '<!-- forward: end -->'

@@ -46,8 +46,8 @@ from stewart_dynamics.identification.sums import sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 sys.path.append(str(HERE.parent / 'test'))
 from recorded import (  # noqa: E402, I100, I202

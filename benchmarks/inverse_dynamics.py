@@ -38,11 +38,11 @@ from numpy.typing import NDArray
 import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics import inverse_dynamics, lagrange
-from stewart_dynamics.mechanics.friction import COULOMB_RATE
-from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics, lagrange
+from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import FORCES, NO_BASE, RESULT, WRENCH
-from stewart_dynamics.parameters import inertia_matrix
+from stewart_dynamics.parameters.table import inertia_matrix
 
 Array = NDArray[np.float64]
 

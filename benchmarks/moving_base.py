@@ -30,12 +30,12 @@ from inverse_dynamics import (
 import numpy as np
 
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
-from stewart_dynamics.mechanics import forward_dynamics, inverse_dynamics
+from stewart_dynamics.mechanics.dynamics import forward_dynamics, inverse_dynamics
 from stewart_dynamics.mechanics.rows import FORCES, RESULT
 from stewart_dynamics.messages.setpoint import StampedWriter
-from stewart_dynamics.runtime.base_input import BaseInput
-from stewart_dynamics.runtime.input_topics import BASE_ACCEL, BASE_POSE, BASE_TWIST
-from stewart_dynamics.runtime.rejections import Rejections
+from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.rejections import Rejections
+from stewart_dynamics.setpoints.topics import BASE_ACCEL, BASE_POSE, BASE_TWIST
 
 BEGIN, END = '<!-- moving base: begin -->', '<!-- moving base: end -->'
 

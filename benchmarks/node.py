@@ -44,17 +44,17 @@ from latency import FIRST_STAMP, legs, MOTION, PARAMETERS, PERIOD
 import numpy as np
 
 from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.description.joint_states import ModelMessages
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.nodes.markers import Markers
-from stewart_dynamics.nodes.security import PROFILES
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.external_wrench import ExternalWrench
-from stewart_dynamics.runtime.measured_legs import MeasuredLegs
-from stewart_dynamics.runtime.model_messages import ModelMessages
-from stewart_dynamics.runtime.output_messages import OutputMessages
-from stewart_dynamics.runtime.step import Setpoint, Step
+from stewart_dynamics.external_wrench.estimate import ExternalWrench
+from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
+from stewart_dynamics.node.markers import Markers
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.ros.security import PROFILES
+from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.step import Setpoint, Step
 
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'
 BEGIN_MARKERS, END_MARKERS = '<!-- markers: begin -->', '<!-- markers: end -->'
@@ -429,7 +429,7 @@ def measurement_words() -> str:
             if estimate is None:
                 raise SystemExit('a measurement was rejected')
             if estimate.wrench is not None:
-                written.of_estimate(estimate)
+                written.of_wrench(estimate.stamp, estimate.wrench)
 
     times = repeat(follow, timer=time.process_time, repeat=21, number=1)
     return (f'A measurement takes {median(times) / len(messages) * 1e6:.1f} us of processor time, '

@@ -36,11 +36,11 @@ import numpy as np
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.runtime.external_wrench import Estimate
-from stewart_dynamics.runtime.leg_history import LegHistory
-from stewart_dynamics.runtime.payload import identify, NAMES, numbers_of, Outcome
+from stewart_dynamics.external_wrench.estimate import Estimate
+from stewart_dynamics.external_wrench.history import LegHistory
+from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, Outcome
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 BEGIN, END = '<!-- payload: begin -->', '<!-- payload: end -->'
 BEGIN_COVERAGE, END_COVERAGE = '<!-- payload coverage: begin -->', '<!-- payload coverage: end -->'

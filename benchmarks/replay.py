@@ -47,9 +47,9 @@ from playwright.sync_api import sync_playwright
 from rosbags.typesys import get_typestore, Stores
 
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 BEGIN, END = '<!-- replay: begin -->', '<!-- replay: end -->'
 PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
@@ -94,9 +94,9 @@ from contextlib import closing
 from pathlib import Path
 import sys
 from stewart_dynamics import Parameters
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.input_topics import SOURCES
-from stewart_dynamics.runtime.setpoint_joining import Setpoints
+from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.setpoints.topics import SOURCES
+from stewart_dynamics.setpoints.joining import Setpoints
 
 many = 0
 setpoints = Setpoints(Parameters.from_yaml({str(PARAMETERS)!r}), print, print)

@@ -48,13 +48,13 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.plant_dynamics import advance, STATE_TWIST
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.standard import float64_array
-from stewart_dynamics.nodes.simulator_messages import StateMessages
-from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.plant import Plant
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.simulator.messages import StateMessages
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
+from stewart_dynamics.simulator.plant_dynamics import advance, STATE_TWIST
 
 sys.path.append(str(HERE.parent / 'test'))
 from referees import energies, rng, smooth_motion  # noqa: E402, I100, I202

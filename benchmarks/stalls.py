@@ -28,8 +28,8 @@ import time
 
 import rclpy
 
-from stewart_dynamics.nodes.dynamics_node import DynamicsNode
-from stewart_dynamics.runtime.repeated_events import Series
+from stewart_dynamics.node.node import DynamicsNode
+from stewart_dynamics.ros.repeated_events import Series
 
 REPEATED = 21
 REJECTION = 'setpoint/pose rejected: not finite'

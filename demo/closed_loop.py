@@ -44,7 +44,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
 from tqdm import tqdm
 import yaml

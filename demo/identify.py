@@ -42,7 +42,7 @@ import rclpy
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.executables import executable
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202

@@ -41,9 +41,9 @@ from numpy.typing import NDArray
 import rclpy
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.motion import motion_at, sample_times
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202

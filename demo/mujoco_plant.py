@@ -30,12 +30,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
-from stewart_dynamics.mechanics.leg_joints import TreeJoints
-from stewart_dynamics.mechanics.rotation import from_euler, from_quaternion, to_quaternion
-from stewart_dynamics.nodes.run import run
-from stewart_dynamics.nodes.simulator_node import SimulatorNode
-from stewart_dynamics.runtime.plant import State
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.mechanics.frames.rotation import from_euler, from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
+from stewart_dynamics.ros.run import run
+from stewart_dynamics.simulator.node import SimulatorNode
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import State
 
 # Coordinates of the MJCF: three of each leg, then the platform's free joint.
 _LEGS, _POSITION, _QUATERNION = slice(2, 18, 3), slice(18, 21), slice(21, 25)
@@ -43,7 +43,7 @@ _TWIST = slice(18, 24)
 
 
 class MuJoCoPlant:
-    """The hexapod in MuJoCo, with the calls of ``stewart_dynamics.runtime.plant.Plant``."""
+    """The hexapod in MuJoCo, with the calls of ``stewart_dynamics.simulator.plant.Plant``."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
         self.parameters = parameters

@@ -40,9 +40,9 @@ from numpy.typing import NDArray
 import rclpy
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
 from stewart_dynamics.executables import executable
-from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.generated_base_motion import GeneratedBaseMotion
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.simulator.base_motion import GeneratedBaseMotion
+from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202

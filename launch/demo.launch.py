@@ -32,7 +32,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 FILES = {
     'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),

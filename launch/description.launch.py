@@ -33,7 +33,7 @@ from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import urdf
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 JOINT_STATES = '/stewart_dynamics/joint_states'
 

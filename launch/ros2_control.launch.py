@@ -37,7 +37,7 @@ from launch_ros.substitutions import FindPackageShare
 
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 CONTROLLER = 'leg_trajectory_controller'
 FILES = {

@@ -24,16 +24,16 @@ from typing import Any, TYPE_CHECKING
 if TYPE_CHECKING:
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
-    from stewart_dynamics.mechanics.base_motion import BaseMotion
-    from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown
-    from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
-    from stewart_dynamics.mechanics.motion import Motion
-    from stewart_dynamics.mechanics.pose import Pose
+    from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdown
+    from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
+    from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+    from stewart_dynamics.mechanics.frames.motion import Motion
+    from stewart_dynamics.mechanics.frames.pose import Pose
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.mechanics.stiffness import NaturalModes
-    from stewart_dynamics.parameters import Parameters
-    from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
-    from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
+    from stewart_dynamics.parameters.table import Parameters
+    from stewart_dynamics.planned.result import PlannedTrajectory
+    from stewart_dynamics.planned.trajectory import check_planned_trajectory
 
 __version__ = '0.1.0'
 
@@ -46,16 +46,16 @@ __all__ = [
 _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
-    'mechanics.base_motion': ('BaseMotion',),
-    'mechanics.force_breakdown': ('ForceBreakdown',),
-    'mechanics.inverse_dynamics_result': ('InverseDynamics',),
-    'mechanics.motion': ('Motion',),
-    'mechanics.pose': ('Pose',),
+    'mechanics.frames.base_motion': ('BaseMotion',),
+    'mechanics.dynamics.force_breakdown': ('ForceBreakdown',),
+    'mechanics.dynamics.result': ('InverseDynamics',),
+    'mechanics.frames.motion': ('Motion',),
+    'mechanics.frames.pose': ('Pose',),
     'mechanics.stewart_platform': ('StewartPlatform',),
     'mechanics.stiffness': ('NaturalModes',),
-    'parameters': ('Parameters',),
-    'runtime.planned_trajectory': ('check_planned_trajectory',),
-    'runtime.planned_trajectory_result': ('PlannedTrajectory',),
+    'parameters.table': ('Parameters',),
+    'planned.trajectory': ('check_planned_trajectory',),
+    'planned.result': ('PlannedTrajectory',),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

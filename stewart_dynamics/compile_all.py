@@ -27,10 +27,11 @@ from stewart_dynamics.compilation.entry_point import EntryPoint, prepare
 from stewart_dynamics.compilation.machine_code import folder_to_write, HINT
 
 MODULES = (
-    'mechanics.inverse_dynamics', 'mechanics.forward_dynamics', 'mechanics.forward_kinematics',
-    'mechanics.base_wrench', 'mechanics.friction', 'mechanics.joint_angles',
-    'mechanics.plant_dynamics', 'mechanics.regressor', 'runtime.step', 'runtime.external_wrench',
-    'replay.message_blocks', 'replay.mcap_scan')
+    'mechanics.dynamics.inverse_dynamics', 'mechanics.dynamics.forward_dynamics',
+    'mechanics.dynamics.base_wrench', 'mechanics.dynamics.friction',
+    'mechanics.dynamics.regressor', 'mechanics.kinematics.forward_kinematics',
+    'mechanics.kinematics.joint_angles', 'simulator.plant_dynamics', 'setpoints.step',
+    'external_wrench.estimate', 'bags.blocks', 'bags.mcap_scan')
 """Those with functions that Python calls."""
 
 

@@ -55,7 +55,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope='session')
 def ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep ROS on this machine and its logs out of the home folder; announce nodes often."""
-    from stewart_dynamics.nodes.security import PROFILES
+    from stewart_dynamics.ros.security import PROFILES
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         patch.setenv(PROFILES, str(Path(__file__).with_name('discovery.xml')))

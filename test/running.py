@@ -69,9 +69,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.executables import executable
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
-from stewart_dynamics.nodes.rclpy_workarounds import shut_down, spin
+from stewart_dynamics.ros.rclpy_workarounds import shut_down, spin
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 import yaml

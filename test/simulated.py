@@ -20,9 +20,9 @@ from typing import Any
 
 from referees import random_parameters, rng, ROOT, size_of
 
-from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 HEXAPOD = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]

@@ -22,7 +22,7 @@ from pathlib import Path
 import pytest
 
 from stewart_dynamics import BagError
-from stewart_dynamics.replay.bags import find_bags, folders_of_results
+from stewart_dynamics.bags.find import find_bags, folders_of_results
 
 
 def make(folder: Path, *names: str) -> Path:

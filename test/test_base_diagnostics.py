@@ -21,12 +21,12 @@ import numpy as np
 from referees import symmetric_parameters
 
 from stewart_dynamics.mechanics.rows import NO_BASE
-from stewart_dynamics.runtime.base_input import BaseInput
-from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, Status, WARN
-from stewart_dynamics.runtime.input_topics import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
-from stewart_dynamics.runtime.rejections import NOT_MEASURED, Rejection, Rejections
-from stewart_dynamics.runtime.step import Setpoint
+from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, Status, WARN
+from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
+from stewart_dynamics.setpoints.step import Setpoint
+from stewart_dynamics.setpoints.topics import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 
 PARAMETERS = symmetric_parameters().replaced({'base.source': 'imu', 'base.timeout': 0.1})
 BEGIN = 1000.0

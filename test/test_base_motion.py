@@ -26,8 +26,8 @@ from referees import (
     relative, rng, rotation_about, size_of, smooth_motion, STANDARD_GRAVITY, uncompiled)
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
-from stewart_dynamics.mechanics import base_wrench
-from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.dynamics import base_wrench
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.tile import LANES
 
 MACHINES = 8
@@ -370,7 +370,7 @@ def test_uncompiled_base_wrenches_are_the_compiled_ones_bit_for_bit() -> None:
     given = {'hexapod': platform.constants, 'rows': motion.rows, 'wrench': wrench,
              'base': base.rows, 'found': np.empty((STATES, 6))}
     plain = uncompiled(
-        'from stewart_dynamics.mechanics.base_wrench import base_wrenches\n'
+        'from stewart_dynamics.mechanics.dynamics.base_wrench import base_wrenches\n'
         "base_wrenches(*(given[name] for name in ('hexapod', 'rows', 'wrench', 'base', "
         "'found')))\n", given)
     base_wrench.base_wrenches(

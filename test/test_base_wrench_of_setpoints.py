@@ -23,8 +23,8 @@ from referees import (
 from stewart_dynamics import BaseMotion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.rows import NO_BASE
-from stewart_dynamics.runtime.base_wrench import BaseWrench
-from stewart_dynamics.runtime.step import Batch, Setpoint
+from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.step import Batch, Setpoint
 from test_step import FLAT, HOME, PARAMETERS, QUARTER, STAMP
 
 MANY = 50

@@ -140,8 +140,8 @@ def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
     rclpy = pytest.importorskip('rclpy.serialization')
     from visualization_msgs.msg import MarkerArray
 
-    from stewart_dynamics.nodes.markers import Markers
-    from stewart_dynamics.runtime.step import Setpoint, Step
+    from stewart_dynamics.node.markers import Markers
+    from stewart_dynamics.setpoints.step import Setpoint, Step
     parameters = Parameters.from_yaml(CONFIG / 'platform.yaml')
     motion = (0.0, 0.0, 1.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) + (0.0,) * 12
     output = Step(parameters)(Setpoint(1, motion), None)

@@ -24,11 +24,11 @@ import pytest
 from referees import ROOT
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.nodes.command_line import check_arguments
-from stewart_dynamics.nodes.console_scripts import usage
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.ros.arguments import check_arguments
+from stewart_dynamics.ros.console_scripts import usage
+from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
             'trajectory': ReferenceMotionParameters}
@@ -41,7 +41,7 @@ import sys
 if sys.argv.pop(1) == 'without ROS':
     for name in ('rclpy', 'rcl_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'std_msgs'):
         sys.modules[name] = None
-from stewart_dynamics.nodes import console_scripts
+from stewart_dynamics.ros import console_scripts
 code = getattr(console_scripts, sys.argv.pop(1))()
 print([name for name in {HEAVY} if sys.modules.get(name)])
 sys.exit(code)

@@ -39,12 +39,12 @@ from referees import ROOT
 from rosgraph_msgs.msg import Clock
 
 from stewart_dynamics import ParameterError, Parameters
-from stewart_dynamics.mechanics.reference_motion_parameters import (
+from stewart_dynamics.parameters.parameter_set import ParameterSet
+from stewart_dynamics.parameters.table import PARAMETERS
+from stewart_dynamics.reference_motion.parameters import (
     REFERENCE_MOTION_PARAMETERS, ReferenceMotionParameters)
-from stewart_dynamics.nodes.declared_parameters import declare_parameters
-from stewart_dynamics.nodes.rclpy_workarounds import reject_impossible_times
-from stewart_dynamics.parameter_set import ParameterSet
-from stewart_dynamics.parameters import PARAMETERS
+from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.rclpy_workarounds import reject_impossible_times
 
 SECONDS = 30.0
 

@@ -25,12 +25,12 @@ import numpy as np
 import pytest
 from running import PLATFORM, ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.identify import Identification
-from stewart_dynamics.identification.options import Options
 from stewart_dynamics.identification.results import document
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 
 @pytest.fixture(scope='module')

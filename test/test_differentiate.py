@@ -34,7 +34,7 @@ from stewart_dynamics import Motion
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.replay.differentiate import Differentiator, TOO_FAST, TOO_FEW
 from stewart_dynamics.replay.smoothing_spline import FEWEST, smoothing_spline
-from stewart_dynamics.runtime.step import Batch
+from stewart_dynamics.setpoints.step import Batch
 
 Array = NDArray[np.float64]
 

@@ -556,7 +556,7 @@ def test_a_writer_that_cannot_be_received_is_reported(fresh: Fresh) -> None:
 WITHOUT = """\
 import sys
 sys.modules['{}'] = None  # importing it fails, as if it were missing
-from stewart_dynamics.nodes.dynamics_node import main
+from stewart_dynamics.node.node import main
 sys.exit(main())
 """
 WITHOUT_EVENTS = [sys.executable, '-c', WITHOUT.format('rclpy.experimental.events_executor')]

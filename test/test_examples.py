@@ -28,10 +28,10 @@ from rclpy.serialization import deserialize_message
 from running import (
     assert_only_log_lines, DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT)
 from stewart_dynamics import Motion
-from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
+from stewart_dynamics.reference_motion.motion import motion_at, sample_times
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'

@@ -31,11 +31,11 @@ from referees import (
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
-from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.external_wrench import (
+from stewart_dynamics.external_wrench.estimate import (
     Estimate, external_wrenches, ExternalWrench, Measurement, Overload)
-from stewart_dynamics.runtime.plant import Plant
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
 
 Array = NDArray[np.float64]
 

@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 from referees import rotation_about
 from stewart_dynamics import Motion
+from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench
+from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.messages.joint_state import MISSING_JOINTS
-from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.external_wrench import ExternalWrenchDiagnostics
-from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
-from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench
-from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
-from stewart_dynamics.runtime.rejections import Rejection
+from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, STALE, Status, WARN
+from stewart_dynamics.setpoints.rejections import Rejection
 from test_external_wrench import (
     BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, UNFILTERED)
 

@@ -31,9 +31,9 @@ from running import DynamicsNode, executable, HOME, log_lines, nanoseconds, NODE
 from sensor_msgs.msg import JointState
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.runtime.external_wrench import ExternalWrench, Measurement
-from stewart_dynamics.runtime.measured_legs import MeasuredLegs
-from stewart_dynamics.runtime.output_messages import OutputMessages
+from stewart_dynamics.external_wrench.estimate import ExternalWrench, Measurement
+from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
+from stewart_dynamics.setpoints.outputs import OutputMessages
 from test_external_wrench import BEGIN
 from test_external_wrench import HEXAPOD, LOAD, measured, MILLISECOND, resting, six, swing, times
 from test_external_wrench import HOME as AT_HOME
@@ -150,7 +150,7 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
         estimate = legs.take(each, NO_WRENCH, None)
         assert estimate is not None
         if estimate.wrench is not None:
-            expected.append(messages.of_estimate(estimate))
+            expected.append(messages.of_wrench(estimate.stamp, estimate.wrench))
         felt.publish(each)
     assert not rejected
     felt.node.until(lambda: len(felt.raw) >= len(expected), 'all wrenches have come')

@@ -42,7 +42,7 @@ from running import (
     Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, says, SEPARATE, STEP,
     wrench_message)
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
-from stewart_dynamics.nodes.security import PROFILES
+from stewart_dynamics.ros.security import PROFILES
 import yaml
 
 Start = Callable[..., DynamicsNode]

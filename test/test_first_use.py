@@ -25,14 +25,14 @@ import pytest
 from running import DynamicsNode, Planner
 from stewart_dynamics.compilation.machine_code import COMPILED, folder_to_write
 from stewart_dynamics.compile_all import compile_all
-from stewart_dynamics.runtime.measured_legs import NOT_COMPILED
+from stewart_dynamics.external_wrench.measured_legs import NOT_COMPILED
 from test_dynamics_node import MOVING
 from test_external_wrench_node import Felt
 from test_planned_trajectory_node import check, MOTION
 
 # What the test lets the node compile: the first of a planned trajectory, and the external wrench.
-LATER = ('stewart_dynamics.mechanics.forward_kinematics.twists',
-         'stewart_dynamics.runtime.external_wrench._one')
+LATER = ('stewart_dynamics.mechanics.kinematics.forward_kinematics.twists',
+         'stewart_dynamics.external_wrench.estimate._one')
 
 
 @pytest.mark.slow

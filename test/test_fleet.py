@@ -55,13 +55,13 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from stewart_dynamics import BagError, Parameters, StewartError
+from stewart_dynamics.bags.find import folders_of_results
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import kept, Task
-from stewart_dynamics.replay.bags import folders_of_results
 from stewart_dynamics.replay.local_processes import _uninterrupted
 from stewart_dynamics.replay.many_bags import Fleet, replay_fleet
 from stewart_dynamics.replay.one_bag import replay
-from stewart_dynamics.replay.options import LIMIT_MET, NODE, Options
+from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -335,9 +335,9 @@ def test_processes_that_cannot_start_are_reported_at_once(bags: Path, tmp_path: 
     script.write_text(
         'from pathlib import Path\n'
         'from stewart_dynamics import Parameters, StewartError\n'
-        'from stewart_dynamics.replay.bags import folders_of_results\n'
+        'from stewart_dynamics.bags.find import folders_of_results\n'
         'from stewart_dynamics.replay.many_bags import replay_fleet\n'
-        'from stewart_dynamics.replay.options import Options\n'
+        'from stewart_dynamics.replay.replay_options import Options\n'
         f'output = Path({str(tmp_path / "out")!r})\n'
         f'pairs = folders_of_results([Path({str(bags)!r})], output)\n'
         f'parameters = Parameters.from_yaml({str(PARAMS)!r})\n'

@@ -27,9 +27,9 @@ from referees import (
     symmetric_parameters)
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics import lagrange
-from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
-from stewart_dynamics.parameters import inertia_matrix
+from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
+from stewart_dynamics.parameters.table import inertia_matrix
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from referees import (
     random_parameters, random_wrench, rng, uncompiled)
 
 from stewart_dynamics import Motion, MotionError, Parameters, StewartPlatform
-from stewart_dynamics.mechanics import forward_dynamics
+from stewart_dynamics.mechanics.dynamics import forward_dynamics
 from stewart_dynamics.mechanics.rows import NO_BASE
 
 STATES = 20
@@ -173,7 +173,7 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
     given = {'hexapod': hexapod, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench,
              'base': base, 'work': np.empty(forward_dynamics.WORK)}
     plain = uncompiled(
-        'from stewart_dynamics.mechanics.forward_dynamics import solve\n'
+        'from stewart_dynamics.mechanics.dynamics.forward_dynamics import solve\n'
         "solve(given['hexapod'], given['rows'], given['forces'], given['wrench'],\n"
         "      given['base'], given['work'])\n", given)
     forward_dynamics.solve(hexapod, rows, forces, wrench, base, np.empty(forward_dynamics.WORK))

@@ -27,9 +27,10 @@ from referees import (
 
 from stewart_dynamics import (
     Motion, MotionError, Parameters, Pose, PoseError, SingularityError, StewartPlatform)
-from stewart_dynamics.mechanics import forward_kinematics, lagrange
-from stewart_dynamics.mechanics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.mechanics.kinematics.forward_kinematics import FOUND, RESIDUAL, SINGULAR
 
 Array = NDArray[np.float64]
 
@@ -266,7 +267,7 @@ def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
              'rows': rows.copy(), 'codes': codes.copy(), 'steps': steps.copy(),
              'residuals': residuals.copy()}
     plain = uncompiled(
-        'from stewart_dynamics.mechanics.forward_kinematics import poses, twists\n'
+        'from stewart_dynamics.mechanics.kinematics.forward_kinematics import poses, twists\n'
         "poses(given['constants'], given['lengths'], given['rows'], given['codes'],\n"
         "      given['steps'], given['residuals'])\n"
         "twists(given['constants'], given['rates'], given['rows'])\n", given)

@@ -30,8 +30,8 @@ from referees import ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.reference_motion.motion import motion_at, sample_times
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
 HEXAPOD, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)

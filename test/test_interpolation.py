@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 import pytest
 from referees import derivative, rng, rotation_about
 
-from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.planned.interpolation import Interpolation
 
 Array = NDArray[np.float64]
 

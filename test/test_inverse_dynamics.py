@@ -43,10 +43,10 @@ import stewart_dynamics
 from stewart_dynamics import (
     Motion, MotionError, Parameters, Pose, SingularityError, StewartError, StewartPlatform)
 from stewart_dynamics.compilation.machine_code import COMPILED
-from stewart_dynamics.mechanics import batch, lagrange
-from stewart_dynamics.mechanics.inverse_dynamics import LANES
-from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, FORCES, LINEAR_VELOCITY, MOTION)
+from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.dynamics.inverse_dynamics import LANES
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LINEAR_VELOCITY, MOTION
 
 Array = NDArray[np.float64]
 
@@ -542,7 +542,7 @@ def test_a_platform_can_be_copied_and_sent_to_another_process() -> None:
 UNCOMPILED = """
 import numpy as np
 from stewart_dynamics.compilation.machine_code import COMPILED
-from stewart_dynamics.mechanics import inverse_dynamics
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.rows import RESULT
 assert not COMPILED
 given = np.load({source!r})
@@ -591,7 +591,7 @@ def test_kept_machine_code_is_not_used_after_a_change_of_a_module_it_was_made_of
     shutil.copytree(PACKAGE, tmp_path / 'stewart_dynamics')
     code = f"""
 import numpy as np
-from stewart_dynamics.mechanics import forward_kinematics
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
 constants, motions = np.load({str(tmp_path / "given.npy")!r}, allow_pickle=True)
 forward_kinematics.twists(constants, np.ones((1, 6)), motions)
 print(forward_kinematics.__file__, motions[0, {LINEAR_VELOCITY.stop - 1}], sep='|')
@@ -601,7 +601,7 @@ print(forward_kinematics.__file__, motions[0, {LINEAR_VELOCITY.stop - 1}], sep='
     given_arrays[:] = [platform.constants, turned(0.2).rows]
     np.save(tmp_path / 'given.npy', given_arrays)
     where, before = run(code, tmp_path).split('|')
-    assert Path(where).parents[2] == tmp_path
+    assert Path(where).parents[3] == tmp_path
     vectors = tmp_path / 'stewart_dynamics' / 'mechanics' / 'vectors.py'
     text = vectors.read_text()
     line = 'return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]\n'

@@ -27,12 +27,13 @@ from referees import (
 
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.joint_axes import AXES, BASE_AXES, JointAngles, PLATFORM_AXES
+from stewart_dynamics.mechanics.kinematics.joint_axes import (
+    AXES, BASE_AXES, JointAngles, PLATFORM_AXES)
 from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFORM_ANGLE_MAX
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
-from stewart_dynamics.runtime.planned_trajectory_checks import LIMIT
-from stewart_dynamics.runtime.step import Batch, Setpoint, Step
+from stewart_dynamics.planned.checks import LIMIT
+from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1})
 

@@ -28,7 +28,7 @@ from referees import (
     random_wrench, relative, rng, ROOT)
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics import lagrange
+from stewart_dynamics.mechanics.dynamics import lagrange
 
 Array = NDArray[np.float64]
 

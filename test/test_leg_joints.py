@@ -21,7 +21,7 @@ import pytest
 from referees import Array, random_motion, random_parameters, rng, rotation_about, smooth_motion
 
 from stewart_dynamics import ParameterError, Parameters, Pose, StewartPlatform
-from stewart_dynamics.mechanics.leg_joints import home_directions, JOINTS, TreeJoints
+from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, JOINTS, TreeJoints
 
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
 X, Y, Z = np.eye(3)

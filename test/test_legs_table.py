@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 import pyarrow.parquet
 import pytest
 from scipy.spatial.transform import Rotation
-from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
+from stewart_dynamics.mechanics.singularity import CAUSE, STATE
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable
-from stewart_dynamics.runtime.step import Outputs
+from stewart_dynamics.setpoints.step import Outputs
 from test_output import base_wrenches_of, LEGS, turning
 
 RESULTS = 27

@@ -32,11 +32,11 @@ from referees import (  # noqa: E402
     QUARTER_TURN, random_motion, random_parameters, rng, size_of, symmetric_parameters)
 from running import DynamicsNode, nanoseconds, NODE, PLATFORM, Sample  # noqa: E402
 from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
-from stewart_dynamics.mechanics.rotation import from_quaternion  # noqa: E402
-from stewart_dynamics.nodes import markers as module  # noqa: E402
-from stewart_dynamics.nodes.markers import Markers  # noqa: E402
-from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, OK, WARN  # noqa: E402
-from stewart_dynamics.runtime.step import Output, Setpoint, Step  # noqa: E402
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
+from stewart_dynamics.node import markers as module  # noqa: E402
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN  # noqa: E402
+from stewart_dynamics.node.markers import Markers  # noqa: E402
+from stewart_dynamics.setpoints.step import Output, Setpoint, Step  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 Array = NDArray[np.float64]

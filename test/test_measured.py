@@ -31,7 +31,7 @@ from referees import random_parameters, rng, size_of
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary_text import measured_headline
-from stewart_dynamics.runtime.step import Batch, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
 

@@ -27,14 +27,14 @@ import numpy as np
 import pytest
 from stewart_dynamics import Parameters, Pose, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
-from stewart_dynamics.runtime.base_input import BaseInput
-from stewart_dynamics.runtime.external_wrench import Estimate, ExternalWrench, Measurement
-from stewart_dynamics.runtime.input_topics import BASE_IMU
-from stewart_dynamics.runtime.measured_legs import (
+from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.external_wrench.measured_legs import (
     MEASURED_LEGS, MeasuredLegs, NOT_CONVERGED, SINGULAR, UNSTAMPED)
-from stewart_dynamics.runtime.rejections import (
+from stewart_dynamics.messages.joint_state import MISSING_JOINTS, UNEVEN
+from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, MALFORMED, NOT_FINITE, OUT_OF_RANGE, Rejection, Rejections, TOO_OLD, TWICE)
+from stewart_dynamics.setpoints.topics import BASE_IMU
 from test_external_wrench import (
     BEGIN, estimates, HEXAPOD, HOME, LOAD, MILLISECOND, resting, six, swing)
 

@@ -26,7 +26,7 @@ from referees import (
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
-from stewart_dynamics.mechanics.leg_joints import TreeJoints
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 
 mujoco = pytest.importorskip('mujoco')
 

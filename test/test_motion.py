@@ -29,8 +29,8 @@ from referees import (
     derivative, random_direction, random_parameters, relative, rng, rotation_about, smooth_motion)
 
 from stewart_dynamics import Motion, MotionError
-from stewart_dynamics.mechanics.lagrange import skew
-from stewart_dynamics.mechanics.rotation import (
+from stewart_dynamics.mechanics.dynamics.lagrange import skew
+from stewart_dynamics.mechanics.frames.rotation import (
     euler_rate_matrix, euler_rate_matrix_rate, from_euler, quaternion_of, to_quaternion)
 
 Array = NDArray[np.float64]

@@ -30,11 +30,11 @@ from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.rows import BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION
-from stewart_dynamics.parameter_files import flat
-from stewart_dynamics.parameters_yaml import read_document
-from stewart_dynamics.runtime.base_input import BaseInput
-from stewart_dynamics.runtime.input_topics import BASE_IMU, BASE_SOURCES
-from stewart_dynamics.runtime.rejections import Rejections
+from stewart_dynamics.parameters.files import flat
+from stewart_dynamics.parameters.yaml_file import read_document
+from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.rejections import Rejections
+from stewart_dynamics.setpoints.topics import BASE_IMU, BASE_SOURCES
 import yaml
 
 PAGE = (ROOT / 'docs' / 'moving_base.md').read_text(encoding='utf-8')

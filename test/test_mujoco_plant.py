@@ -22,8 +22,8 @@ import numpy as np
 import pytest
 
 from stewart_dynamics import Motion, StewartPlatform
-from stewart_dynamics.runtime.plant import Plant
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
 
 pytest.importorskip('mujoco')
 pytest.importorskip('rclpy')

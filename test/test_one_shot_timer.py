@@ -31,7 +31,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.task import Future  # noqa: E402
 from running import DEADLINE, Peer  # noqa: E402
 
-from stewart_dynamics.nodes.rclpy_workarounds import OneShotTimer  # noqa: E402
+from stewart_dynamics.ros.rclpy_workarounds import OneShotTimer  # noqa: E402
 
 PAUSE = 0.001
 

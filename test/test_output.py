@@ -36,12 +36,12 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 from stewart_dynamics import Parameters
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_model import RecordedModel
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
-from stewart_dynamics.runtime.step import Batch, Outputs, Step
+from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 import yaml  # type: ignore[import-untyped]
 
 PARAMETERS = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml').replaced(

@@ -25,13 +25,12 @@ from messages import STORE
 import numpy as np
 import pytest
 from stewart_dynamics.arrays import NO_WRENCH, Six
-from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.runtime.base_wrench import BASE_WRENCH
-from stewart_dynamics.runtime.external_wrench import Estimate
-from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages
-from stewart_dynamics.runtime.step import Batch, Setpoint, Step
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
 from test_step import (
-    answered, FLAT, HOME, PARAMETERS, QUARTER, REST, rotations, rows, sizes, STAMP, STEP, UPRIGHT)
+    answered, FLAT, PARAMETERS, QUARTER, REST, rotations, rows, sizes, STAMP, STEP, UPRIGHT)
 
 MESSAGES = OutputMessages(PARAMETERS)
 
@@ -139,8 +138,8 @@ def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
 def test_an_external_wrench_is_written_in_the_base_frame() -> None:
     parameters = PARAMETERS.replaced({'base_frame': 'sol'})
     wrench = (1.0, -2.0, 3.0, -4.0, 5.0, -6.0)
-    read = STORE.deserialize_cdr(OutputMessages(parameters).of_estimate(
-        Estimate(STAMP, HOME.motion, wrench, None)), 'geometry_msgs/msg/WrenchStamped')
+    read = STORE.deserialize_cdr(OutputMessages(parameters).of_wrench(
+        STAMP, wrench), 'geometry_msgs/msg/WrenchStamped')
     assert read.header.frame_id == 'sol'
     assert read.header.stamp.sec * 10 ** 9 + read.header.stamp.nanosec == STAMP
     force, torque = read.wrench.force, read.wrench.torque
@@ -156,7 +155,7 @@ def test_base_wrenches_are_written_alike_one_by_one_and_together(frame: str) -> 
     topic, which, many = written.of_base_wrenches(stamps, wrenches)
     assert OUTPUT_TYPES[topic] == 'geometry_msgs/msg/WrenchStamped'
     assert which.tolist() == [0, 1, 3]
-    one = [written.of_base_wrench(int(stamps[n]), tuple(wrenches[n].tolist())) for n in which]
+    one = [written.of_wrench(int(stamps[n]), tuple(wrenches[n].tolist())) for n in which]
     assert [each.tobytes() for each in many] == one
     read = STORE.deserialize_cdr(one[1], OUTPUT_TYPES[topic])
     assert read.header.frame_id == frame or not frame

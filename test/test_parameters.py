@@ -28,11 +28,11 @@ import pytest
 from referees import ROOT
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, Pose, PoseError, StewartError, StewartPlatform)
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.parameter_files import flat, other_nodes, read_yaml
-from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.parameters_yaml import read_document
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.files import flat, other_nodes, read_yaml
+from stewart_dynamics.parameters.table import PARAMETERS
+from stewart_dynamics.parameters.yaml_file import read_document
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
 
 GOOD = """\

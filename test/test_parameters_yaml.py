@@ -25,7 +25,7 @@ import sys
 
 import pytest
 from stewart_dynamics import ParameterError
-from stewart_dynamics.parameters_yaml import no_space, read_document, read_value
+from stewart_dynamics.parameters.yaml_file import no_space, read_document, read_value
 import yaml
 
 # Each as written in a file, and the value that both readers return.

@@ -26,14 +26,14 @@ from referees import PinocchioReferee, random_base_motion, relative, rng, ROOT
 
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.mechanics.body_fit import about
-from stewart_dynamics.mechanics.linear_parameters import about_origin
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
+from stewart_dynamics.external_wrench.body_fit import about
+from stewart_dynamics.external_wrench.estimate import Estimate
+from stewart_dynamics.external_wrench.history import HIGHEST_RATE, LegHistory
+from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, Outcome, Payload
+from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin
 from stewart_dynamics.mechanics.rows import NO_BASE
-from stewart_dynamics.runtime.external_wrench import Estimate
-from stewart_dynamics.runtime.leg_history import HIGHEST_RATE, LegHistory
-from stewart_dynamics.runtime.payload import identify, NAMES, numbers_of, Outcome, Payload
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 Array = NDArray[np.float64]
 

@@ -28,10 +28,10 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.runtime.external_wrench import ExternalWrench
-from stewart_dynamics.runtime.leg_history import LegHistory
-from stewart_dynamics.runtime.measured_legs import MeasuredLegs
-from stewart_dynamics.runtime.payload import identify, numbers_of, Outcome
+from stewart_dynamics.external_wrench.estimate import ExternalWrench
+from stewart_dynamics.external_wrench.history import LegHistory
+from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
+from stewart_dynamics.external_wrench.payload import identify, numbers_of, Outcome
 from test_external_wrench import BEGIN, measured, resting, six
 from test_external_wrench import HOME as AT_HOME
 from test_measured_legs import message_of

@@ -26,15 +26,15 @@ from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
-from stewart_dynamics.mechanics.interpolation import Interpolation
-from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
-from stewart_dynamics.runtime.planned_trajectory import check_planned_trajectory
-from stewart_dynamics.runtime.planned_trajectory_checks import LIMIT, SINGULAR
-from stewart_dynamics.runtime.planned_trajectory_result import PlannedTrajectory
-from stewart_dynamics.runtime.plant import Plant
-from stewart_dynamics.runtime.step import Setpoint, Step
+from stewart_dynamics.planned.checks import LIMIT, SINGULAR
+from stewart_dynamics.planned.interpolation import Interpolation
+from stewart_dynamics.planned.result import PlannedTrajectory
+from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.setpoints.step import Setpoint, Step
+from stewart_dynamics.simulator.plant import Plant
 from trajectories import (
     Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, UNBOUND)
 

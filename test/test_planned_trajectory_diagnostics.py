@@ -19,10 +19,10 @@ from __future__ import annotations
 from referees import ROOT
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.runtime.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.runtime.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
-from stewart_dynamics.runtime.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
-from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.node.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
+from stewart_dynamics.planned.messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 BEGIN = 100.0

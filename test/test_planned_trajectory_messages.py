@@ -30,11 +30,10 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, Motion, MotionError, Parameters, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH, Six
-from stewart_dynamics.runtime import planned_trajectory
-from stewart_dynamics.runtime import planned_trajectory_messages as planned
-from stewart_dynamics.runtime.planned_trajectory import NOT_INCREASING, PIECE, TOO_FAR
-from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
-from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN, NOT_FINITE, NOT_UNIT
+from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
+from stewart_dynamics.planned.messages import Outcome
+from stewart_dynamics.planned.trajectory import NOT_INCREASING, PIECE, TOO_FAR
+from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, NOT_FINITE, NOT_UNIT
 from trajectories import (
     Array, FREE, HOME, motion_of, PARAMETERS, REST, sampled, SECOND, some, STAMP, UNBOUND)
 

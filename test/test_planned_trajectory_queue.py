@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from stewart_dynamics.compilation.preparation import Preparation
-from stewart_dynamics.nodes.planned_trajectory_queue import LENGTH, PlannedTrajectoryQueue
-from stewart_dynamics.runtime.planned_trajectory_messages import Outcome
+from stewart_dynamics.node.planned_queue import LENGTH, PlannedTrajectoryQueue
+from stewart_dynamics.planned.messages import Outcome
 
 
 class Timed:

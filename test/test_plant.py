@@ -28,11 +28,11 @@ from referees import (
 from simulated import FRICTIONLESS, HEXAPOD, MASSLESS, random_simulated, simulated, UNLIMITED
 
 from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
-from stewart_dynamics.mechanics.plant_dynamics import STATE_TWIST
-from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.plant import Plant, State
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant, State
+from stewart_dynamics.simulator.plant_dynamics import STATE_TWIST
 
 Array = NDArray[np.float64]
 Six = tuple[float, float, float, float, float, float]

@@ -27,7 +27,7 @@ from referees import (
     relative, rng, rotation_about, size_of, smooth_motion)
 from simulated import FRICTIONLESS, MASSLESS, random_simulated, simulated, UNLIMITED
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.runtime.plant import Plant, State
+from stewart_dynamics.simulator.plant import Plant, State
 from test_plant import motion_of, set_moving, ZERO
 
 Array = NDArray[np.float64]

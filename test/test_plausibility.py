@@ -26,9 +26,9 @@ import pytest
 from referees import random_parameters, ROOT, symmetric_parameters
 
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
-from stewart_dynamics.mechanics.home_pose import homes
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.rotation import from_euler
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from stewart_dynamics.replay.plot_curves import BUCKETS, Curves, Frames
+from stewart_dynamics.reporting.curves import BUCKETS, Curves, Frames
 
 Array = NDArray[np.float64]
 

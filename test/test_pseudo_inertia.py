@@ -24,8 +24,8 @@ import pytest
 from referees import derivative, random_parameters, rng
 
 from stewart_dynamics import ParameterError
-from stewart_dynamics.mechanics.linear_parameters import linear_parameters, PLATFORM
-from stewart_dynamics.mechanics.pseudo_inertia import (
+from stewart_dynamics.mechanics.dynamics.linear_parameters import linear_parameters, PLATFORM
+from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, inertial_parameters, is_consistent, log_cholesky, log_cholesky_derivative,
     pseudo_inertia)
 

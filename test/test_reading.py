@@ -29,7 +29,7 @@ from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.reading import read_hexapod
 from stewart_dynamics.description.sdf import sdf
 from stewart_dynamics.description.urdf import urdf
-from stewart_dynamics.mechanics.rotation import to_euler
+from stewart_dynamics.mechanics.frames.rotation import to_euler
 
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
 WRITERS = {'urdf': urdf, 'sdf': sdf, 'xml': mjcf}

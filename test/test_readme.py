@@ -26,9 +26,10 @@ import numpy as np
 import pytest
 
 import stewart_dynamics
-from stewart_dynamics.nodes import simulator_messages
-from stewart_dynamics.parameters import PARAMETERS
-from stewart_dynamics.runtime import input_topics, output_messages, planned_trajectory_messages
+from stewart_dynamics.parameters.table import PARAMETERS
+from stewart_dynamics.planned import messages as planned_trajectory_messages
+from stewart_dynamics.setpoints import outputs as output_messages, topics as input_topics
+from stewart_dynamics.simulator import messages as simulator_messages
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('*/README.md'), *ROOT.glob('docs/*.md')])

@@ -26,10 +26,10 @@ from referees import Array, random_motion, random_parameters, rng
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import Parameters
+from stewart_dynamics.description.joint_states import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
-from stewart_dynamics.runtime.model_messages import JOINT_STATES, ModelMessages, TF
 
 STAMP = 1_700_000_000_123_456_789
 SAMPLES = 20

@@ -49,13 +49,13 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics import BagError, Parameters
+from stewart_dynamics.bags.mcap_layout import LARGEST_CHUNK
+from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
-from stewart_dynamics.replay.mcap_layout import LARGEST_CHUNK
 from stewart_dynamics.replay.one_bag import replay as replay_one
-from stewart_dynamics.replay.options import NODE, Options
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.input_topics import ACCEL, INPUT_TYPES, POSE, TWIST
+from stewart_dynamics.replay.replay_options import NODE, Options
+from stewart_dynamics.setpoints.topics import ACCEL, INPUT_TYPES, POSE, TWIST
 import zstandard
 
 PARAMS = ROOT / 'config' / 'platform.yaml'

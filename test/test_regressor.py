@@ -27,7 +27,7 @@ from referees import (
 
 from stewart_dynamics import (
     BaseMotion, Motion, MotionError, ParameterError, Parameters, SingularityError, StewartPlatform)
-from stewart_dynamics.mechanics.linear_parameters import (
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, LINEAR, linear_parameters,
     names_of, OFFSET, parameter_values, PISTON_MASS, PISTON_SECOND, PLATFORM, REFLECTED_MASS,
     UNITS, VISCOUS_FRICTION)

@@ -50,20 +50,19 @@ from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
-from stewart_dynamics.mechanics.force_breakdown import SOURCES
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.description.joint_states import JOINT_STATES, TF
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
-from stewart_dynamics.replay.options import LIMIT_MET, NODE
 from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
+from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
-from stewart_dynamics.runtime.input_topics import (
-    ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
-from stewart_dynamics.runtime.model_messages import JOINT_STATES, TF
-from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES
-from stewart_dynamics.runtime.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
+from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES
+from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
+from stewart_dynamics.setpoints.topics import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)
@@ -926,8 +925,8 @@ def test_it_needs_no_ros() -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import sys, stewart_dynamics.replay; '
          'print([n for n in sys.modules if n.startswith(("rclpy", "rcl_interfaces", "rosidl", '
-         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.nodes.dynamics_node")) '
-         'or n == "stewart_dynamics.nodes.run"])'],
+         '"geometry_msgs", "sensor_msgs", "std_msgs", "stewart_dynamics.node.node")) '
+         'or n == "stewart_dynamics.ros.run"])'],
         capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == '[]'
 
@@ -1259,7 +1258,7 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
 # A signal when the module that reads the arguments is looked for, and when the process ends.
 @pytest.mark.parametrize('when, code, text', [
     ("sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda name, *_: "
-     "end() if name.endswith('command_line') else None)}))", 130, 'interrupted'),
+     "end() if name.endswith('stewart_replay') else None)}))", 130, 'interrupted'),
     ('atexit.register(end)', BAD_INPUT,
      'nowhere: not a bag that can be read: no such file or folder')])
 @pytest.mark.parametrize('sent', ['SIGINT', 'SIGTERM'])

@@ -29,16 +29,16 @@ from referees import rotation_about
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
-from stewart_dynamics.replay.command_line import main
-from stewart_dynamics.replay.options import LIMIT_MET, NODE
-from stewart_dynamics.runtime.base_wrench import BaseWrench
-from stewart_dynamics.runtime.input_topics import (
+from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
+from stewart_dynamics.replay.stewart_replay import main
+from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+from stewart_dynamics.setpoints.topics import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)
-from stewart_dynamics.runtime.output_messages import OutputMessages
-from stewart_dynamics.runtime.setpoint_joining import Setpoints
-from stewart_dynamics.runtime.step import Output, Setpoint, Step
 from test_replay import (
     joint_state, motion, MS, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
     six_of, write_bag)
@@ -173,7 +173,7 @@ def test_a_replay_gives_the_bits_of_the_step_message_by_message(
     for setpoint, _ in expected[5:20]:
         base_wrench = load(setpoint)
         assert base_wrench is not None
-        assert written.of_base_wrench(setpoint.stamp, base_wrench) in content
+        assert written.of_wrench(setpoint.stamp, base_wrench) in content
 
 
 @pytest.mark.parametrize('source', MOVING)

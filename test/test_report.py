@@ -35,18 +35,18 @@ from numpy.typing import NDArray
 import pytest
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
-from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.rows import BASE, NO_BASE
-from stewart_dynamics.replay.html_pages import digits, number, thousands
-from stewart_dynamics.replay.report import Report, share_plotly
+from stewart_dynamics.reference_motion.motion import motion_at, sample_times
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.replay.bag_report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline
-from stewart_dynamics.runtime.base_wrench import BaseWrench
-from stewart_dynamics.runtime.step import Batch, Outputs, Step
+from stewart_dynamics.reporting.pages import digits, number, thousands
+from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -395,7 +395,7 @@ def test_missing_plotly_is_reported_in_one_line(tmp_path: Path) -> None:
               'from pathlib import Path\n'
               'from stewart_dynamics import Parameters\n'
               'from stewart_dynamics.errors import StewartError\n'
-              'from stewart_dynamics.replay.report import Report\n'
+              'from stewart_dynamics.replay.bag_report import Report\n'
               f'report = Report(Parameters.from_yaml({str(CONFIG / "platform.yaml")!r}))\n'
               'try:\n'
               '    report.write(Path(sys.argv[1]), {})\n'

@@ -22,14 +22,14 @@ import sys
 
 from referees import ROOT
 
-from stewart_dynamics.replay.options import Options
-from stewart_dynamics.replay.results_folder import remove_abandoned, whole_folder
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.reporting.results_folder import remove_abandoned, whole_folder
 
 # Killed before the folder is complete, or between the two renames.
 KILLED = """\
 import os, pathlib, signal, sys
-from stewart_dynamics.replay.options import Options
-from stewart_dynamics.replay.results_folder import whole_folder
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.reporting.results_folder import whole_folder
 def rename(self, to):
     os.rename(self, to)
     os.kill(os.getpid(), signal.SIGKILL)

@@ -48,8 +48,8 @@ from running import (  # noqa: E402
     Peer, PLATFORM, Program)
 
 from stewart_dynamics.errors import StewartError  # noqa: E402
-from stewart_dynamics.nodes import simulator_messages  # noqa: E402
-from stewart_dynamics.nodes.security import check_environment, PROFILES  # noqa: E402
+from stewart_dynamics.ros.security import check_environment, PROFILES  # noqa: E402
+from stewart_dynamics.simulator import messages as simulator_messages  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'

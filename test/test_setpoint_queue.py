@@ -17,9 +17,9 @@
 from __future__ import annotations
 
 from referees import symmetric_parameters
-from stewart_dynamics.nodes.setpoint_queue import SetpointQueue
-from stewart_dynamics.runtime.rejections import DROPPED, OUT_OF_RANGE
-from stewart_dynamics.runtime.step import Output, Setpoint, Step
+from stewart_dynamics.node.setpoint_queue import SetpointQueue
+from stewart_dynamics.setpoints.rejections import DROPPED, OUT_OF_RANGE
+from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from test_step import HOME
 
 STEP = Step(symmetric_parameters())

@@ -28,7 +28,7 @@ import numpy as np
 import pytest
 import rclpy
 from running import own_domain, PLATFORM, ROOT
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 SECONDS = 0.6
 # Much faster than a ship, so that little time is enough.

@@ -28,12 +28,12 @@ from sensor_msgs.msg import Imu
 from simulated import simulated
 
 from stewart_dynamics import BaseMotion, Motion, ParameterError
-from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.messages.imu import ImuWriter
-from stewart_dynamics.runtime.generated_base_motion import GeneratedBaseMotion
-from stewart_dynamics.runtime.simulated_base import GeneratedBase
-from stewart_dynamics.runtime.simulated_imu import SimulatedImu
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.simulator.base import GeneratedBase
+from stewart_dynamics.simulator.base_motion import GeneratedBaseMotion
+from stewart_dynamics.simulator.imu import SimulatedImu
+from stewart_dynamics.simulator.imu_message import ImuWriter
+from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 from messages import STORE
 from simulated import simulated
 
-from stewart_dynamics.nodes.simulator_messages import OUTPUT_TYPES, StateMessages
-from stewart_dynamics.runtime.plant import Plant
+from stewart_dynamics.simulator.messages import OUTPUT_TYPES, StateMessages
+from stewart_dynamics.simulator.plant import Plant
 
 
 def test_messages_have_the_state() -> None:

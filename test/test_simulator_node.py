@@ -44,14 +44,14 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartError, StewartPlatform
 from stewart_dynamics.messages.setpoint import StampedWriter
-from stewart_dynamics.nodes.simulator_messages import (
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.simulator.base import GeneratedBase
+from stewart_dynamics.simulator.base_motion import GeneratedBaseMotion
+from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, OUTPUT_TYPES, StateMessages)
-from stewart_dynamics.nodes.simulator_node import SimulatorNode
-from stewart_dynamics.parameter_files import read_yaml
-from stewart_dynamics.runtime.generated_base_motion import GeneratedBaseMotion
-from stewart_dynamics.runtime.plant import Plant
-from stewart_dynamics.runtime.simulated_base import GeneratedBase
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.simulator.node import SimulatorNode
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
 
 SIMULATOR = '/stewart_simulator'
 FILE = ROOT / 'config' / 'simulator.yaml'

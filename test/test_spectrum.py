@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 from referees import rng
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.replay.spectrum import (
+from stewart_dynamics.reporting.spectrum import (
     Density, drawn, ENOUGH, INTERVALS, LONGEST, SHORTEST, Spectrum)
 
 signal = pytest.importorskip('scipy.signal')

@@ -26,10 +26,10 @@ from referees import (
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import Exceedance
-from stewart_dynamics.mechanics.rotation import from_quaternion
-from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
-from stewart_dynamics.runtime.step import Batch, Output, Setpoint, Step
+from stewart_dynamics.mechanics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
+from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, Step
 
 PARAMETERS = symmetric_parameters()
 STEP = Step(PARAMETERS)

@@ -34,7 +34,7 @@ from referees import (
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, ForceBreakdown, Motion, MotionError, ParameterError,
     Parameters, Pose, SingularityError, StewartError, StewartPlatform)
-from stewart_dynamics.mechanics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 
 Array = NDArray[np.float64]

@@ -34,16 +34,15 @@ from referees import (
     random_motion, random_parameters, random_wrench, rng, ROOT, symmetric_parameters)
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows, SOURCES
+from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
-from stewart_dynamics.mechanics.singularity_warning import (
-    CAUSE, STATE, TIME, UNSOLVABLE_CONDITION)
-from stewart_dynamics.replay.block_statistics import LISTED
+from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines
-from stewart_dynamics.runtime.base_wrench import BaseWrench
-from stewart_dynamics.runtime.step import Batch, Outputs, Step
+from stewart_dynamics.reporting.block_statistics import LISTED
+from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
 

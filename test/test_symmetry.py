@@ -22,7 +22,7 @@ import pytest
 from referees import random_parameters, rng
 
 from stewart_dynamics import Parameters, StewartPlatform
-from stewart_dynamics.mechanics.symmetry import odd_joint
+from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 
 PLATFORM = Path(__file__).parents[1] / 'config' / 'platform.yaml'
 TABLES = ('geometry.base_joints', 'geometry.platform_joints')

@@ -36,10 +36,10 @@ from running import (
     SEPARATE)
 
 from stewart_dynamics import ParameterError
-from stewart_dynamics.mechanics.reference_motion import motion_at, sample_times
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.mechanics.rotation import to_quaternion
-from stewart_dynamics.nodes.trajectory_node import TrajectoryNode
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.reference_motion.motion import motion_at, sample_times
+from stewart_dynamics.reference_motion.node import TrajectoryNode
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 MOTION = """\
 stewart_trajectory:

@@ -32,7 +32,7 @@ from referees import (
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import Ros2Control, urdf
-from stewart_dynamics.mechanics.leg_joints import TreeJoints
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 
 pin = pytest.importorskip('pinocchio')
 

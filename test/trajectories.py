@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from referees import rng, ROOT
 
 from stewart_dynamics import Motion, Parameters
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.mechanics.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion, to_quaternion
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 Array = NDArray[np.float64]
 

@@ -35,12 +35,12 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.one_bag import replay
-from stewart_dynamics.replay.options import NODE
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.setpoint_joining import Setpoints
-from stewart_dynamics.runtime.step import Batch, Outputs, Step
+from stewart_dynamics.replay.replay_options import NODE
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202

@@ -33,7 +33,7 @@ import numpy as np  # noqa: E402
 from stewart_dynamics import Pose, StewartPlatform  # noqa: E402
 from stewart_dynamics.description.hexapod import Hexapod  # noqa: E402
 from stewart_dynamics.description.mjcf import mjcf  # noqa: E402
-from stewart_dynamics.mechanics.leg_joints import TreeJoints  # noqa: E402
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 SIZE = 470, 560  # height, width

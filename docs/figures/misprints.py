@@ -34,10 +34,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.mechanics.lagrange import skew
-from stewart_dynamics.mechanics.rotation import (
+from stewart_dynamics.mechanics.dynamics.lagrange import skew
+from stewart_dynamics.mechanics.frames.rotation import (
     euler_rate_matrix, euler_rate_matrix_rate, from_euler)
-from stewart_dynamics.parameters import inertia_matrix
+from stewart_dynamics.parameters.table import inertia_matrix
 
 Array = NDArray[np.float64]
 

@@ -29,11 +29,11 @@ import math
 from pathlib import Path
 from typing import Any
 
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
-from stewart_dynamics.parameter_rules import Parameter
-from stewart_dynamics.parameter_set import ParameterSet
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.simulator_parameters import SimulatorParameters
+from stewart_dynamics.parameters.parameter_set import ParameterSet
+from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent

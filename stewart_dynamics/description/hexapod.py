@@ -28,9 +28,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.mechanics.home_pose import homes
-from stewart_dynamics.mechanics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
-from stewart_dynamics.parameters import inertia_matrix, Parameters
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
+from stewart_dynamics.mechanics.kinematics.leg_joints import joint_names, mounts, PLATFORM_JOINTS
+from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 _WORLD = 'world'  # in SDFormat and MJCF
 

@@ -29,7 +29,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import Placement
 from stewart_dynamics.description.read_urdf import axis_of, end_of, origin_of
-from stewart_dynamics.mechanics.rotation import quaternion_product, to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import quaternion_product, to_quaternion
 
 _SOURCE = Path('robot_description')  # of errors
 

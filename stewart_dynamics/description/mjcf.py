@@ -36,7 +36,7 @@ from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
 from stewart_dynamics.description.shapes import COLORS, Shape, shapes
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, numbers, text_of, without_limit)
-from stewart_dynamics.mechanics.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 
 _TIMESTEP = 0.0005  # [s]
 # Of constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and

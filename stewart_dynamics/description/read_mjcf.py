@@ -26,7 +26,7 @@ from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE, WORLD)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.errors import one_line
-from stewart_dynamics.mechanics.rotation import from_quaternion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 
 _PREFIX = f'{CARRIED}.'
 

@@ -28,7 +28,7 @@ from stewart_dynamics.description.mechanism import (
     UNIVERSAL, WORLD)
 from stewart_dynamics.description.read_urdf import numbers_of, unit
 from stewart_dynamics.description.xml_text import CARRIED
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}

@@ -27,7 +27,7 @@ from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE,
     UNIVERSAL)
 from stewart_dynamics.description.xml_text import CARRIED
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'ball': BALL, 'spherical': BALL, 'revolute2': UNIVERSAL}

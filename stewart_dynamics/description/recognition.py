@@ -35,7 +35,7 @@ from stewart_dynamics.description.mechanism import (
 from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
 from stewart_dynamics.description.xml_text import NOT_CHECKED
 from stewart_dynamics.errors import shown
-from stewart_dynamics.parameters import PARAMETERS, Parameters, STANDARD_GRAVITY
+from stewart_dynamics.parameters.table import PARAMETERS, Parameters, STANDARD_GRAVITY
 
 # In terms of the length of a leg, or [rad]; what is smaller is rounding.
 _SMALL = 1e-6

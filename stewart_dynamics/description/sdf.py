@@ -42,7 +42,7 @@ from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
 from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, numbers, text_of, without_limit)
-from stewart_dynamics.mechanics.rotation import to_euler
+from stewart_dynamics.mechanics.frames.rotation import to_euler
 
 _VERSION = '1.9'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'

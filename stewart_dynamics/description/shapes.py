@@ -29,8 +29,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import Hexapod, Leg
-from stewart_dynamics.mechanics.home_pose import level_axes
-from stewart_dynamics.mechanics.rotation import from_euler
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 
 Color = tuple[float, float, float, float]
 

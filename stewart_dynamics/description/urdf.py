@@ -16,9 +16,10 @@
 """
 A hexapod as URDF: a tree whose loops are open at the platform joints.
 
-Its joints, their order and their positions at a pose are those of ``mechanics.leg_joints``. The
-frame ``<leg>_platform_joint`` on the platform is where the origin of ``<leg>_piston`` is while the
-loops are closed. What URDF has no place for stands in a block ``stewart_dynamics``, which other
+Its joints, their order and their positions at a pose are those of
+``mechanics.kinematics.leg_joints``. The frame ``<leg>_platform_joint`` on the platform is where
+the origin of ``<leg>_piston`` is while the loops are closed. Parameters that URDF has no element
+for stand in a block ``stewart_dynamics``, which other
 readers ignore.
 """
 
@@ -36,8 +37,8 @@ from stewart_dynamics.description.hexapod import Body, Hexapod, Leg, PASSIVE_RAT
 from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, numbers, text_of, without_limit)
-from stewart_dynamics.mechanics.leg_joints import PLATFORM_JOINTS
-from stewart_dynamics.mechanics.rotation import to_euler
+from stewart_dynamics.mechanics.frames.rotation import to_euler
+from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
 
 _LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 _NOT_IN_URDF = ('gravity', 'actuator.reflected_mass')

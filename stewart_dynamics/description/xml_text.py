@@ -24,7 +24,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics import __version__
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters that a format has no place for."""

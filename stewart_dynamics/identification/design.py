@@ -15,7 +15,7 @@
 """
 A motion that makes the intervals of an identification small, within the limits of the hexapod.
 
-A Fourier series of all six coordinates about home (``mechanics.reference_motion``), whose
+A Fourier series of all six coordinates about home (``reference_motion.motion``), whose
 coefficients minimize the sum of the squared standard errors of what is asked for, each by the
 change that would matter (A-optimal; J. Swevers et al., "Optimal robot excitation and
 identification", IEEE Trans. Robotics and Automation 13, 1997, doi:10.1109/70.631234). Every set of
@@ -39,12 +39,12 @@ from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.design_limits import DesignLimits
 from stewart_dynamics.identification.design_options import DesignOptions
 from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
-from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.mechanics.reference_motion import motion_at
-from stewart_dynamics.mechanics.reference_motion_parameters import ReferenceMotionParameters
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reference_motion.motion import motion_at
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
 # Samples in a period of the highest harmonic, and in each of the final check.
 _SAMPLES, _FINE_SAMPLES = 20, 100

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.identification.design_options import DesignOptions
-from stewart_dynamics.identification.options import Options
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.parameters.table import Parameters
 
 if TYPE_CHECKING:
     from stewart_dynamics.identification.design import Design
@@ -69,8 +69,8 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
     """Design a motion, write it and print its predicted intervals."""
     # Imported here, so that --help is fast.
     from stewart_dynamics.identification.design import design
-    from stewart_dynamics.parameter_files import write_yaml
-    from stewart_dynamics.replay.results_folder import (
+    from stewart_dynamics.parameters.files import write_yaml
+    from stewart_dynamics.reporting.results_folder import (
         check_free, remove_abandoned, whole_folder)
     from tqdm import tqdm
 

@@ -22,11 +22,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
 from stewart_dynamics.mechanics.limits import (
     ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS, OF_RESULTS, VELOCITY_MAX)
-from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.mechanics.rotation import from_euler
 from stewart_dynamics.mechanics.rows import (
     CONDITION, FORCES, LENGTHS, MOTION, POSE, POSITION, RATES, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

@@ -32,12 +32,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.identification.columns import regression
-from stewart_dynamics.identification.filters import (
-    convolved, decimated, LowPass, white_deviation)
+from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
 from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # The wide band, by the narrow one; and samples for each period of the narrow cut-off.

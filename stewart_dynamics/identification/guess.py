@@ -20,7 +20,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
-from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Turns about z that are tried, the platform's axes parallel to the base's first [rad].

@@ -30,24 +30,24 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
 from stewart_dynamics.identification.extracts import Block, Extracts
 from stewart_dynamics.identification.filters import LowPass
 from stewart_dynamics.identification.fit import Fit, fit
 from stewart_dynamics.identification.guess import pose_near
+from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.likely_mistakes import (
     Likely, of_efforts, of_kinematics, of_no_pose)
-from stewart_dynamics.identification.options import Options
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.recording import Recording
+from stewart_dynamics.parameters.table import Parameters
 
 # Of bags that are sampled so slowly the cut-off is lower: samples for each of its periods.
 _FEWEST_SAMPLES = 10.0

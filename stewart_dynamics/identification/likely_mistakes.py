@@ -36,9 +36,9 @@ from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.least_squares import Information, information, nothing, solve
-from stewart_dynamics.mechanics.pose import Pose
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 # A scale of the efforts that is as near to a known factor as this is that factor.
 _NEAR = 1.35

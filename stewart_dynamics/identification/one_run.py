@@ -23,16 +23,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_report import Report
 from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.options import Options
-from stewart_dynamics.identification.report import Report
 from stewart_dynamics.identification.results import comments, document
-from stewart_dynamics.mechanics import forward_kinematics, inverse_dynamics, regressor
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay import mcap_scan, message_blocks
-from stewart_dynamics.replay.bags import bytes_of
-from stewart_dynamics.replay.results_folder import (
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.results_folder import (
     check_free, IDENTIFICATION, remove_abandoned, whole_folder, write_json)
 from tqdm import tqdm
 
@@ -40,7 +41,7 @@ PARAMETERS, RESULT, REPORT = 'identified.yaml', IDENTIFICATION, 'report.html'
 
 # The machine code that every identification needs.
 FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
-             *message_blocks.FUNCTIONS, mcap_scan.scan)
+             *blocks.FUNCTIONS, mcap_scan.scan)
 
 
 def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Options,

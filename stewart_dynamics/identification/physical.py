@@ -16,7 +16,7 @@
 The nearest values that a machine can have, by what the samples tell.
 
 Mass and friction are not negative, and the platform's pseudo-inertia is positive definite
-(``mechanics.pseudo_inertia``). Where least squares break a bound, the platform's ten parameters
+(``mechanics.dynamics.pseudo_inertia``). Where least squares break a bound, its ten parameters
 are found again in log-Cholesky parameters, which are a body whatever they are.
 """
 
@@ -26,9 +26,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.identification.unknowns import Unknowns
-from stewart_dynamics.mechanics.least_squares import Identifiability, Information
-from stewart_dynamics.mechanics.pseudo_inertia import (
+from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
+from stewart_dynamics.mechanics.least_squares import Identifiability, Information
 
 # Nearer to the bound than this, by its size, a body is a point or a rod within rounding.
 SMALLEST = 1e-6

@@ -23,12 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError
+from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.identification.windows import period_of, segments, Signal, uniform, Window
 from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, MISSING_JOINTS
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime.measured_legs import MEASURED_LEGS
-from stewart_dynamics.runtime.recorded_messages import Messages
+from stewart_dynamics.messages.recorded import Messages
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 # Samples of a window at most: it and what is made of it fit into memory.

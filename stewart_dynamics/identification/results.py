@@ -25,8 +25,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.fit import LEAST_TOLD
+from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.identify import Identified
-from stewart_dynamics.identification.options import Options
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import combinations, TWO_SIDED
 from stewart_dynamics.replay.fingerprint import plain_parameters, software

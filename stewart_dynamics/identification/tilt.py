@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.home_pose import turns_about
+from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 
 
 class Tilt:

@@ -31,11 +31,11 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.identification.tilt import Tilt
-from stewart_dynamics.mechanics.linear_parameters import (
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT,
     LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 # Of the platform, in the terms of the parameter file.
 _PLATFORM = ('platform.mass', *(f'platform.center_of_mass.{axis}' for axis in 'xyz'),

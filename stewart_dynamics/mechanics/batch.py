@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.machine_code import COMPILED
-from stewart_dynamics.mechanics import inverse_dynamics
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.rows import NO_BASE, RESULT, WRENCH
 
 # Samples for one thread at least: a millisecond of work, far more than the start of a thread.

@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array, Flags, Six
 from stewart_dynamics.compilation.functions import inlined
 from stewart_dynamics.mechanics.rows import (
     BASE_JOINT_ANGLES, consecutive, FORCES, LENGTHS, PLATFORM_JOINT_ANGLES, RATES)
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
     'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')

@@ -30,12 +30,13 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics import joint_axes, lagrange
-from stewart_dynamics.mechanics.home_pose import (
+from stewart_dynamics.mechanics.dynamics import lagrange
+from stewart_dynamics.mechanics.kinematics import joint_axes
+from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.mechanics.symmetry import odd_joint
-from stewart_dynamics.parameters import inertia_matrix, Parameters
+from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
+from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 # Of the place of a joint in a message.
 _DIGITS = 5

@@ -32,11 +32,11 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.entry_point import EntryPoint
-from stewart_dynamics.mechanics import (
-    base_wrench, forward_dynamics, forward_kinematics, inverse_dynamics)
-from stewart_dynamics.mechanics.base_motion import BaseMotion
-from stewart_dynamics.mechanics.motion import Motion
-from stewart_dynamics.mechanics.pose import Pose
+from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, inverse_dynamics
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, BASE, LENGTHS, MOTION, NO_BASE, POSE, RESULT, WRENCH)
 

@@ -24,29 +24,31 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.mechanics import (
-    base_wrench, batch, forward_dynamics, forward_kinematics, home_pose, lagrange, plausibility,
-    regressor, stiffness)
+from stewart_dynamics.mechanics import batch, plausibility, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
-from stewart_dynamics.mechanics.base_motion import BaseMotion
-from stewart_dynamics.mechanics.force_breakdown import ForceBreakdown, ForceBreakdownRows, SOURCES
-from stewart_dynamics.mechanics.hexapod_constants import hexapod_constants
-from stewart_dynamics.mechanics.inverse_dynamics_result import InverseDynamics
-from stewart_dynamics.mechanics.joint_axes import JointAngles
-from stewart_dynamics.mechanics.linear_parameters import LINEAR, linear_parameters, names_of
-from stewart_dynamics.mechanics.motion import Motion
+from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
+from stewart_dynamics.mechanics.dynamics.force_breakdown import (
+    ForceBreakdown, ForceBreakdownRows, SOURCES)
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    LINEAR, linear_parameters, names_of)
+from stewart_dynamics.mechanics.dynamics.regressor import Regressor
+from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
+from stewart_dynamics.mechanics.kinematics.joint_axes import JointAngles
 from stewart_dynamics.mechanics.platform_arguments import (
     base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
-from stewart_dynamics.mechanics.pose import Pose
-from stewart_dynamics.mechanics.regressor import Regressor
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
     FORCES, GRAVITY, JOINT_ANGLES, LENGTHS, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
     RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 
 
 class StewartPlatform:
@@ -67,7 +69,7 @@ class StewartPlatform:
     parameters : Parameters
         As given.
     constants : (CONSTANTS,)
-        The hexapod as the compiled functions take it, see ``mechanics.hexapod_constants``.
+        The hexapod as the compiled functions take it, see ``hexapod_constants``.
 
     Raises
     ------
@@ -370,7 +372,7 @@ class StewartPlatform:
 
         Between each leg and the axis of its joint: ``geometry.base_joint_axes`` and
         ``geometry.platform_joint_axes``, by default the leg's direction at the home pose. See
-        ``mechanics.joint_angles``.
+        ``mechanics.kinematics.joint_angles``.
 
         Raises
         ------
@@ -491,7 +493,7 @@ class StewartPlatform:
         """
         Return the home pose: parallel axes, the mean leg halfway between its limits.
 
-        See ``mechanics.home_pose``.
+        See ``mechanics.kinematics.home_pose``.
 
         Raises
         ------

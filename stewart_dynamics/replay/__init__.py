@@ -27,7 +27,7 @@ _INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_replay; report a missing library in one line."""
     def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.replay.command_line import main as run
+        from stewart_dynamics.replay.stewart_replay import main as run
 
         return run(given)
 

@@ -24,13 +24,13 @@ import time
 from typing import Any, NamedTuple
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, unexpected
 from stewart_dynamics.replay.fingerprint import fingerprint, VERSION
 from stewart_dynamics.replay.index import Cell, row_of
 from stewart_dynamics.replay.legs_table import kind_of_table
 from stewart_dynamics.replay.one_bag import replay
-from stewart_dynamics.replay.options import code_of, Options
+from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.summary_text import summary_text
 
 # Interval of progress reports, within one computer and on a cluster [s].

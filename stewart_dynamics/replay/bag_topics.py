@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 
+from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, StewartError
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.options import Options
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.runtime import input_topics as inputs
-from stewart_dynamics.runtime.base_wrench import BASE_WRENCH
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.setpoints import topics as inputs
+from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 
 MEASURED = 'measured'
 _MEASURED_TYPE = 'sensor_msgs/msg/JointState'

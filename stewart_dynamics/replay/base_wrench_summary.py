@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.replay.block_statistics import Extreme, Integral
+from stewart_dynamics.reporting.block_statistics import Extreme, Integral
 
 # Of the columns: force and moment, then their components.
 _NAMES = ('force', 'moment', 'force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')

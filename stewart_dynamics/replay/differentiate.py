@@ -24,10 +24,10 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics import rotation as rotations
+from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import MOTION, WRENCH
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
-from stewart_dynamics.runtime.step import Batch
+from stewart_dynamics.setpoints.step import Batch
 
 # Poses in a window.
 WINDOW = 4096

@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay.options import Options
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.replay_options import Options
 
 # Of summary.json; increased when the meaning of a key changes.
 VERSION = 1

@@ -27,13 +27,15 @@ import tempfile
 from typing import Any, NamedTuple, TextIO
 from urllib.parse import quote
 
+from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
-from stewart_dynamics.replay.bags import FLEET_PAGE, FLEET_TABLE
-from stewart_dynamics.replay.html_pages import page
-from stewart_dynamics.replay.options import LIMIT_MET
-from stewart_dynamics.replay.spreadsheet import harmless
+from stewart_dynamics.replay.replay_options import LIMIT_MET
 from stewart_dynamics.replay.summary_text import plural
-from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN
+from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.spreadsheet import harmless
+from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
+
+FOLDER = Path(__file__).with_name('templates')
 
 Cell = str | int | float | bool | None
 Row = Mapping[str, Cell]
@@ -256,7 +258,7 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],
     }
-    return page('index', fleet=fleet)
+    return page(FOLDER, 'index', fleet=fleet)
 
 
 def _shown(cell: Cell) -> Cell:

@@ -26,9 +26,9 @@ import orjson
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.rotation import to_quaternion
-from stewart_dynamics.replay.spreadsheet import harmless
-from stewart_dynamics.runtime.step import Outputs
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.reporting.spreadsheet import harmless
+from stewart_dynamics.setpoints.step import Outputs
 
 # End of a row in legs.csv: no warning, warning.
 _ENDS = (b',0\n', b',1\n')

@@ -32,16 +32,16 @@ import shutil
 from typing import NamedTuple
 import uuid
 
+from stewart_dynamics.bags.find import bytes_of, FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.errors import BagError
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import (
     counted, Ended, kept, LOCAL_INTERVAL, replay_task, Results, Task)
-from stewart_dynamics.replay.bags import bytes_of, FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.replay.index import Cell, listed_results, SEVERITY, write_fleet
-from stewart_dynamics.replay.options import LIMIT_MET, Options
 from stewart_dynamics.replay.progress_bar import ProgressBar
-from stewart_dynamics.replay.results_folder import partial_name, remove_abandoned
+from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
+from stewart_dynamics.reporting.results_folder import partial_name, remove_abandoned
 
 _SEVERITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
 

@@ -32,33 +32,33 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Stamps
-from stewart_dynamics.mechanics.force_breakdown import ForceBreakdownRows
+from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.singularity_warning import Singularity
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.replay import mcap_scan, message_blocks
+from stewart_dynamics.mechanics.singularity import Singularity
+from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.bag_report import Report
 from stewart_dynamics.replay.bag_topics import find_topics, LISTED, listed, MEASURED, notices_of
 from stewart_dynamics.replay.differentiate import Differentiator
 from stewart_dynamics.replay.fingerprint import fingerprint, plain_parameters, software, VERSION
 from stewart_dynamics.replay.legs_table import kind_of_table, Table
-from stewart_dynamics.replay.options import code_of, Options
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_efforts import Efforts
 from stewart_dynamics.replay.recorded_model import RecordedModel
-from stewart_dynamics.replay.recording import Recording
-from stewart_dynamics.replay.report import Report
+from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison
-from stewart_dynamics.replay.results_folder import check_free, whole_folder, write_json
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.runtime import base_wrench, input_topics as inputs, step
-from stewart_dynamics.runtime.base_wrench import BaseWrench
-from stewart_dynamics.runtime.output_messages import OutputMessages
-from stewart_dynamics.runtime.recorded_messages import Messages
-from stewart_dynamics.runtime.rejections import OUT_OF_RANGE, Rejection
-from stewart_dynamics.runtime.setpoint_joining import Setpoints
-from stewart_dynamics.runtime.step import Batch, Step
+from stewart_dynamics.reporting.results_folder import check_free, whole_folder, write_json
+from stewart_dynamics.setpoints import base_wrench, step, topics as inputs
+from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
+from stewart_dynamics.setpoints.step import Batch, Step
 
 _SECOND = 1_000_000_000
 _STAMP = re.compile(r'stamp (\d+) ns')
@@ -67,7 +67,7 @@ Progress = Callable[[int, int], None]
 
 # The machine code that every replay needs.
 FUNCTIONS = (
-    *step.FUNCTIONS, *base_wrench.FUNCTIONS, *message_blocks.FUNCTIONS, mcap_scan.scan)
+    *step.FUNCTIONS, *base_wrench.FUNCTIONS, *blocks.FUNCTIONS, mcap_scan.scan)
 
 _model = lru_cache(maxsize=1)(RecordedModel)  # many bags have one hexapod
 

@@ -31,12 +31,12 @@ from mcap.records import (
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, Stamps
+from stewart_dynamics.bags.mcap_layout import MAGIC
 from stewart_dynamics.messages.layout import at_any_byte
-from stewart_dynamics.replay.mcap_layout import MAGIC
 from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
-from stewart_dynamics.runtime.output_messages import OUTPUT_TYPES, OutputMessages, Written
-from stewart_dynamics.runtime.step import Outputs
+from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES, OutputMessages, Written
+from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
 
 _LIBRARY = 'stewart_dynamics'

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from stewart_dynamics.arrays import Array, Bytes, Stamps
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.messages.joint_state import JointStateReader, MISSING_JOINTS
-from stewart_dynamics.runtime.rejections import OUT_OF_RANGE
+from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 
 # Larger than any force [N]: the square would overflow.
 _FORCE_END = 1e100

@@ -29,14 +29,14 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.description.hexapod import Hexapod
+from stewart_dynamics.description.joint_states import JOINT_STATES, TF
 from stewart_dynamics.description.link_transforms import LinkTransforms
 from stewart_dynamics.description.urdf import urdf
-from stewart_dynamics.mechanics.leg_joints import TreeJoints
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.messages.model import positions_layout, TransformsWriter
 from stewart_dynamics.messages.standard import string
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.model_messages import JOINT_STATES, TF
+from stewart_dynamics.parameters.table import Parameters
 
 TF_STATIC = '/tf_static'
 ROBOT_DESCRIPTION = '/robot_description'

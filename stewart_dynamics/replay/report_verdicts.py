@@ -22,7 +22,7 @@ from datetime import datetime, timezone
 import re
 from typing import Any
 
-from stewart_dynamics.parameters import PARAMETERS
+from stewart_dynamics.parameters.table import PARAMETERS
 
 Summary = Mapping[str, Any]
 """The content of summary.json."""

@@ -22,7 +22,7 @@ computed. The external wrench that accounts for it is
     w_ext = J_inv^T (f_computed - f_measured)
 
 with the sign of ``~/wrench``: the external load on the platform at its origin, base axes (see
-``runtime.external_wrench``). A platform heavier than in its parameters gives a force downward.
+``external_wrench.estimate``). A platform heavier than in its parameters gives a force downward.
 
 ``Comparison.values()`` is the part ``measured`` of summary.json, see docs/summary.md.
 """
@@ -34,13 +34,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.external_wrench.estimate import external_wrenches
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.contacts import WrenchBins
 from stewart_dynamics.replay.time_matching import interpolated, Waiting
-from stewart_dynamics.runtime.external_wrench import external_wrenches
-from stewart_dynamics.runtime.step import Batch, Outputs
+from stewart_dynamics.setpoints.step import Batch, Outputs
 
 # The most setpoints and measured samples that wait to be matched.
 _SETPOINTS_WAITING = 2 ** 15

@@ -31,13 +31,13 @@ from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.limits import (
     ANGLES, BASE_ANGLE_MAX, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, PLATFORM_ANGLE_MAX,
     VELOCITY_MAX)
-from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.parameters import Parameters
+from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.base_wrench_summary import BaseWrenchSummary
-from stewart_dynamics.replay.block_statistics import (
+from stewart_dynamics.reporting.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
-from stewart_dynamics.replay.force_sources import sources_of
-from stewart_dynamics.runtime.step import Batch, Outputs
+from stewart_dynamics.reporting.force_sources import sources_of
+from stewart_dynamics.setpoints.step import Batch, Outputs
 
 # Values of a leg that are not known from poses alone.
 _OF_VELOCITY = (

@@ -24,8 +24,8 @@ from typing import Any
 
 from stewart_dynamics.mechanics.limits import FORCE_MAX
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.parameters import Parameters
-from stewart_dynamics.runtime.rejections import BASE_NOT_KNOWN, Rejection
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
 
 _LISTED = 5
 _WIDTH = 100

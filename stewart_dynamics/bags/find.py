@@ -1,0 +1,159 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Finding bags in folders, and the folders of their results."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+import os
+from pathlib import Path
+import re
+
+from stewart_dynamics.bags.files import METADATA, STORAGES
+from stewart_dynamics.errors import BagError
+
+FLEET_TABLE, FLEET_PAGE = 'fleet.csv', 'index.html'
+
+# rosbag2 numbers the files of a recording: <name of the bag>_0.mcap, ...
+_NUMBERED = re.compile(r'(.*)_\d+(\.\w+(?:\.zstd)?)')
+
+
+def find_bags(path: Path, leave_out: Path | None = None) -> list[Path]:
+    """
+    Return the bags at a path: itself, or all below it.
+
+    A file is a bag, and so is a folder with a metadata.yaml. A folder without one, left by a
+    killed recorder, is a bag if it contains the files of one recording, no other bag and no
+    bags below it; otherwise each of its files is a bag. Symbolic links, hidden names and
+    results of replays are skipped.
+
+    Parameters
+    ----------
+    path : Path
+        A path that is not a folder is returned as it is, even if it does not exist.
+    leave_out : Path, optional
+        A folder that is not searched: the folder of the results.
+
+    Raises BagError if there is no bag.
+
+    """
+    if not path.is_dir():
+        return [path]
+    bags = sorted(_below(path, leave_out.resolve() if leave_out else None))
+    if not bags:
+        raise BagError(f'{path}: contains no bag: no {METADATA} and no files '
+                       f'{" or ".join("*" + suffix for suffix in STORAGES)}, nor do the folders '
+                       'below it (links and hidden folders are not followed)')
+    return bags
+
+
+def _below(folder: Path, leave_out: Path | None) -> Iterator[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            seen = [entry for entry in entries
+                    if not entry.name.startswith('.') and not entry.is_symlink()]
+    except PermissionError:
+        yield folder  # the reader reports why it cannot be read
+        return
+    folders = [folder / entry.name for entry in seen if entry.is_dir()]
+    files = [folder / entry.name for entry in seen if entry.is_file()]
+    if folder / METADATA in files:
+        yield folder
+        return
+    storages = [file for file in files if file.name.endswith(STORAGES)]
+    below = [bag for each in folders if each.resolve() != leave_out and not _holds_results(each)
+             for bag in _below(each, leave_out)]
+    yield from [folder] if storages and not below and _one_recording(storages) else storages
+    yield from below
+
+
+def _one_recording(files: Sequence[Path]) -> bool:
+    names = {(found[1], found[2]) if (found := _NUMBERED.fullmatch(file.name)) else file.name
+             for file in files}
+    return len(names) == 1
+
+
+def _holds_results(folder: Path) -> bool:
+    try:
+        return (folder / 'summary.json').is_file() and (folder / 'bag' / METADATA).is_file()
+    except PermissionError:
+        return False
+
+
+def folders_of_results(paths: Sequence[Path], output: Path) -> list[tuple[Path, Path]]:
+    """
+    Return the bags at some paths, each with the folder of its results.
+
+    The results of a bag given by its path are in ``output`` under its name; those of bags found
+    in a folder are at the same relative path in ``output``. Suffixes of files are removed,
+    unless two files in one folder would then have the same name.
+
+    Raises BagError if a folder contains no bags, or if results would share a folder or be nested.
+
+    """
+    pairs: list[tuple[Path, Path]] = []
+    for path in paths:
+        try:
+            bags = find_bags(path, output)
+        except BagError:
+            if len(paths) == 1:
+                raise
+            bags = [path]  # reported together with the others
+        if bags == [path]:
+            whole = Path(os.path.abspath(path))  # '.' has no name
+            pairs.append((path, output / (whole.name if path.is_dir() else whole.stem)))
+        else:
+            pairs += zip(bags, (output / name for name in _names(path, bags)), strict=True)
+    _check_apart(pairs, output)
+    return pairs
+
+
+def _names(folder: Path, bags: Sequence[Path]) -> list[Path]:
+    whole = [bag.relative_to(folder) for bag in bags]
+    short = [name if bag.is_dir() else name.with_suffix('')
+             for name, bag in zip(whole, bags, strict=True)]
+    number = Counter(short)
+    parents = {parent for brief in short for parent in brief.parents}
+    return [name if number[brief] > 1 or brief in parents else brief
+            for name, brief in zip(whole, short, strict=True)]
+
+
+def _check_apart(pairs: Sequence[tuple[Path, Path]], output: Path) -> None:
+    taken: dict[Path, Path] = {}
+    for bag, folder in pairs:
+        if folder in taken:
+            raise BagError(f'{taken[folder]}, {bag}: the results of both would be {folder}: '
+                           'replay one of them into another --output')
+        if folder in (output / FLEET_TABLE, output / FLEET_PAGE):
+            raise BagError(f'{bag}: its results would be {folder}, where the table of all bags '
+                           'is written: replay it into another --output')
+        taken[folder] = bag
+    for bag, folder in pairs:
+        for parent in folder.parents:
+            if parent in taken:
+                raise BagError(f'{taken[parent]}, {bag}: the results of one, {folder}, would be '
+                               f'inside those of the other, {parent}: replay one of them into '
+                               'another --output')
+
+
+def bytes_of(bag: Path) -> int:
+    """Return the size of a bag [bytes], at least 1, so that each bag counts."""
+    try:
+        files = [file for file in bag.iterdir() if file.is_file()] if bag.is_dir() else [bag]
+        return sum(file.stat().st_size for file in files) or 1
+    except OSError:  # reported when the bag is replayed
+        return 1

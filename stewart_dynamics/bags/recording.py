@@ -1,0 +1,159 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A recorded bag: its topics, and the messages of some of them in blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+import tempfile
+
+from stewart_dynamics.bags.blocks import of_good_length, Source
+from stewart_dynamics.bags.files import files_of, unpack
+from stewart_dynamics.bags.mcap_layout import MAGIC
+from stewart_dynamics.bags.mcap_recording import McapRecording
+from stewart_dynamics.errors import BagError, one_line
+from stewart_dynamics.messages.recorded import Messages
+
+_SQLITE = b'SQLite format 3\0'
+_ROS_1 = b'#ROSBAG V'
+
+
+class Recording:
+    """
+    A bag of ROS 2, a folder or one of its files, or a bag of ROS 1, a file or a folder of files.
+
+    Raises BagError if nothing of it can be read, with the reason in one line.
+
+    Attributes
+    ----------
+    topics : dict
+        The type of each topic in it.
+    missing : list of str
+        What could not be read so far.
+    notices : list of str
+        Notices to the user on how it was read.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.missing: list[str] = []
+        self.notices: list[str] = []
+        self._sources: list[tuple[Path, Source]] = []
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        faults = []
+        try:
+            for file in files_of(path, self.missing, self.notices):
+                try:
+                    self._sources.append((file, self._opened(file)))
+                except BagError as exc:
+                    faults.append(f'{exc}')
+            if not self._sources:
+                raise BagError('; '.join(faults))
+        except BaseException as exc:
+            self.close()
+            # An invalid file name, a loop of links, a folder that cannot be listed.
+            if isinstance(exc, (OSError, RuntimeError, ValueError)):
+                raise BagError(f'{path}: not a bag that can be read: {one_line(exc)}') from exc
+            raise
+        self.missing += faults
+        kinds: dict[str, set[str]] = {}
+        for _, source in self._sources:
+            for topic, kind in source.topics.items():
+                kinds.setdefault(topic, set()).add(kind)
+        self.topics = {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+
+    def messages(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
+        """
+        Yield the messages of some topics, and the number of bytes read for them.
+
+        Parameters
+        ----------
+        keys : mapping
+            From topics in the bag to the names under which their messages are given.
+
+        """
+        names = tuple(dict.fromkeys(keys.values()))
+        number = {topic: names.index(key) for topic, key in keys.items()}
+        for file, source in self._sources:
+            for block, size in of_good_length(source.blocks(number)):
+                yield Messages(names, block.channels, block.times, block.data, block.starts,
+                               block.sizes), size
+            self.missing += [f'{file.name}: {what}' for what in source.missing]
+            source.missing.clear()
+            if source.unchecked:
+                self.notices.append(f'{file.name}: has no checksums: damaged bytes '
+                                    'cannot be detected')
+
+    @property
+    def damage(self) -> list[str]:
+        """Return what could not be read so far, of all files."""
+        return self.missing + [f'{file.name}: {what}' for file, source in self._sources
+                               for what in source.missing]
+
+    def close(self) -> None:
+        """Close the files."""
+        for _, source in self._sources:
+            source.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def _opened(self, file: Path) -> Source:
+        try:
+            unpacked = file
+            if file.suffix == '.zstd':
+                unpacked = self._new_file()
+                if fault := unpack(file, unpacked):
+                    self.missing.append(f'{file.name}: {fault}')
+            with unpacked.open('rb') as stream:
+                head = stream.read(len(_SQLITE))
+            if head.startswith(MAGIC):
+                return McapRecording(unpacked)
+            if not head.startswith((_SQLITE, _ROS_1)):
+                raise BagError(f'{file}: not a bag that can be read: not MCAP, not sqlite3, not '
+                               'a bag of ROS 1')
+            return self._opened_by_rosbags(
+                file, unpacked, '.db3' if head == _SQLITE else '.bag')
+        except BagError:
+            raise
+        except OSError as exc:
+            raise BagError(f'{file}: not a bag that can be read: {one_line(exc)}') from exc
+
+    def _opened_by_rosbags(self, file: Path, unpacked: Path, suffix: str) -> Source:
+        from stewart_dynamics.bags.rosbags_recording import RosbagsRecording
+
+        # rosbags detects formats by suffix, and cannot open names with ?, # or %.
+        link = self._new_file().with_suffix(suffix)
+        link.symlink_to(unpacked.absolute())
+        try:
+            source = RosbagsRecording(link)
+        except Exception as exc:  # damaged bytes: rosbags raises any exception
+            raise BagError(f'{file}: not a bag that can be read: {one_line(exc)}') from exc
+        # After a crash of the recorder it contains messages that are not in the file.
+        for ending in ('-wal', '-journal'):
+            journal = file.with_name(f'{file.name}{ending}')
+            if journal.is_file() and journal.stat().st_size:
+                self.missing.append(f'{journal.name}: the recording was not closed; messages '
+                                    'that are only in this file are not read')
+        return source
+
+    def _new_file(self) -> Path:
+        """Return a path in a temporary folder, removed by ``close``."""
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory()
+        folder = Path(self._folder.name)
+        return folder / f'{len(list(folder.iterdir()))}'

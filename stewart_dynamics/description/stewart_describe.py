@@ -1,0 +1,147 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The command line of stewart_describe."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.program import DONE, Program
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
+
+LIKELY_MISTAKE = 1
+_PROGRAM = Program('stewart_describe')
+_INTERFACES = ('position', 'velocity', 'effort')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    given = _arguments().parse_args(arguments)
+    return _PROGRAM.exit_code(lambda: _read(given) if given.source else _write(given))
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Write a hexapod as URDF, SDFormat and MJCF, or read one from these formats '
+                    'into a parameter file.',
+        epilog='DIR gets NAME.urdf, NAME.sdf and NAME.xml (MJCF), or with --from NAME.yaml.\n\n'
+               'exit codes: 0 done; 1 with --strict, where a likely mistake was found; 2 bad '
+               'arguments, parameters or\nfiles, or no hexapod found; 130 interrupted')
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument('--params', type=Path, metavar='FILE',
+                        help='parameters of the hexapod, the file that the node takes')
+    source.add_argument('--from', dest='source', type=Path, metavar='FILE',
+                        help='URDF, SDFormat or MJCF (needs mujoco) of a hexapod')
+    parser.add_argument('--output', type=Path, default=Path('.'), metavar='DIR',
+                        help='folder of the results (default: the current one)')
+    parser.add_argument('--name', type=_name, metavar='NAME',
+                        help='name of the model and of the files (default: that of FILE)')
+    parser.add_argument('--node', default='', metavar='NAME',
+                        help='name of the node whose parameters are read (default: '
+                             'stewart_dynamics)')
+    parser.add_argument('--force', action='store_true', help='replace files that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 where a likely mistake was found')
+    control = parser.add_argument_group('ros2_control', 'a block in the URDF')
+    control.add_argument('--ros2-control', type=_interfaces, metavar='INTERFACES',
+                         help='command interfaces of the legs: effort, velocity or position, or '
+                              'several with commas')
+    control.add_argument('--hardware', default='mock', metavar='PLUGIN',
+                         help='mock (mock_components), topic (joint_state_topic_hardware_'
+                              'interface) or the name of a plugin (default: mock)')
+    return parser
+
+
+def _name(text: str) -> str:
+    if not text or not text.isprintable() or '/' in text or text in ('.', '..'):
+        raise argparse.ArgumentTypeError(f'{text!r}: not a name for files')
+    return text
+
+
+def _interfaces(text: str) -> list[str]:
+    found = text.split(',')
+    for each in found:
+        if each not in _INTERFACES:
+            raise argparse.ArgumentTypeError(
+                f'{each!r}: must be one of {", ".join(_INTERFACES)}')
+    return found
+
+
+def _write(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.description.hexapod import Hexapod
+    from stewart_dynamics.description.mjcf import mjcf
+    from stewart_dynamics.description.sdf import sdf
+    from stewart_dynamics.description.urdf import Ros2Control, urdf
+    from stewart_dynamics.parameters.table import Parameters
+
+    parameters = Parameters.from_yaml(given.params, given.node)
+    hexapod, name = Hexapod(parameters), given.name or given.params.stem
+    control = None
+    if given.ros2_control is not None:
+        control = Ros2Control(given.ros2_control, given.hardware)
+    _put(given, {f'{name}.urdf': urdf(hexapod, name, control), f'{name}.sdf': sdf(hexapod, name),
+                 f'{name}.xml': mjcf(hexapod, name)})
+    return _judge(parameters, given)
+
+
+def _read(given: argparse.Namespace) -> int:
+    from stewart_dynamics.description.reading import read_hexapod
+
+    if given.ros2_control is not None:
+        raise StewartError('--ros2-control: not with --from')
+    found = read_hexapod(given.source)
+    path = given.output / f'{given.name or given.source.stem}.yaml'
+    _check_new([path], given)
+    found.parameters.to_yaml(path)
+    print(path)
+    for remark in found.remarks:
+        _PROGRAM.complain(remark)
+    return _judge(found.parameters, given)
+
+
+def _judge(parameters: Parameters, given: argparse.Namespace) -> int:
+    """Print likely mistakes and return the exit code."""
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+
+    mistakes = likely_mistakes(parameters)
+    for mistake in mistakes:
+        _PROGRAM.complain(f'warning: {mistake}')
+    return LIKELY_MISTAKE if mistakes and given.strict else DONE
+
+
+def _check_new(paths: Iterable[Path], given: argparse.Namespace) -> None:
+    """Make the folder; StewartError where a file exists that may not be replaced."""
+    for path in paths:
+        if path.exists() and not given.force:
+            raise StewartError(f'{path}: exists; --force replaces it')
+    given.output.mkdir(parents=True, exist_ok=True)
+
+
+def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
+    """Write all files, or none where one exists."""
+    paths = {given.output / name: text for name, text in files.items()}
+    _check_new(paths, given)
+    for path, text in paths.items():
+        path.write_text(text, encoding='utf-8')
+        print(path)

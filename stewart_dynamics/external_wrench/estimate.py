@@ -1,0 +1,343 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The external wrench: the load on the platform that measured lengths, rates and forces show.
+
+The hexapod obeys ``M X'' + C X' + G = J_inv^T f + w + w_ext`` with the measured leg forces f, the
+known load w on ``~/wrench`` and the external wrench w_ext. The inverse dynamics
+give the forces f_model of the same motion without it, so
+
+    w_ext = J_inv^T (f_model - f)
+
+with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
+base axes. Whatever the model does not have is in it: a wrong payload or friction, a brake, an end
+stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.
+
+Online, pose and twist come from lengths and rates (``forward_kinematics``); the acceleration is
+the difference of two twists by the time between them, its mean over that time. The forces are
+those that acted in that time, as a controller holds them, and all else is the mean of what it is
+at both ends (the trapezoidal rule, an error of second order). The difference quotient is rough,
+and passes through a low-pass filter of the first order, ``r' = 2 pi cutoff (w_ext - r)``, solved
+exactly for any time dt between two samples, over which w_ext is constant; it begins at zero. That
+is the generalized momentum observer of De Luca et al. (Collision detection and safe reaction with
+the DLR-III lightweight manipulator arm, IROS 2006, doi:10.1109/IROS.2006.282053) with the gain K =
+2 pi cutoff: of r' = K (p' - u - r), p the momentum, it takes the integral, r = K (p -
+integral(u + r)), and here the same equation is solved step by step. So noise is no worse than
+there: white noise of deviation s in a twist comes out as M K s at most, however short dt is, while
+the difference quotient alone has sqrt(2) M s / dt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+import math
+from struct import Struct
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.errors import MotionError, PoseError, SingularityError
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics
+from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.kinematics import forward_kinematics
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
+from stewart_dynamics.mechanics.rows import (
+    BASE, consecutive, FORCES, MOTION, NO_BASE, RESULT, WRENCH)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.mechanics.vectors import cross
+from stewart_dynamics.parameters.table import Parameters
+
+# Under the node's name.
+EXTERNAL_WRENCH = 'external_wrench'
+
+# The outcome of a measurement, besides the codes of forward_kinematics.
+_OUT_OF_RANGE = 3
+
+# One measurement as numbers, since an array costs time to pass: what is given, what is written.
+_MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
+    MOTION, WRENCH, 6, 1, 1, 1)
+# The motion given is the one before, or the guess where there is none.
+(_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _BASE_BEFORE,
+ _BASE, _WRITTEN, _RESULT, _TILE) = consecutive(
+    CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, _CODE.stop, RESULT,
+    inverse_dynamics.TILE)
+_GIVEN = Struct(f'{_WRITTEN.start - _LENGTHS.start}d')
+_GIVES = Struct(f'{_CODE.stop}d')
+
+
+class Measurement(NamedTuple):
+    """What was measured of the six legs at one time."""
+
+    stamp: int
+    """[ns]"""
+    lengths: Six
+    """[m]"""
+    rates: Six
+    """[m/s]"""
+    forces: Six
+    """Of the actuators since the last measurement [N], + pushes."""
+
+
+class Overload(NamedTuple):
+    """A threshold that the external wrench exceeds."""
+
+    limit: str
+    value: float
+    bound: float
+
+
+class Estimate(NamedTuple):
+    """The platform's motion and the external wrench at a measurement."""
+
+    stamp: int
+    motion: tuple[float, ...]
+    """A row of motion: pose, twist, and the acceleration since the last measurement."""
+    wrench: Six | None
+    """The external wrench, filtered; none of the first measurement [N, N m]."""
+    differences: Six | None
+    """Measured - model, not filtered (6) [N]; none of the first measurement."""
+    base: tuple[float, ...] = NO_BASE
+    """A row of the base's motion; of nan: it is still."""
+    overloads: tuple[Overload, ...] = ()
+
+    @property
+    def force(self) -> float:
+        """Of the wrench [N]."""
+        return math.hypot(*self.wrench[:3]) if self.wrench else 0.0
+
+    @property
+    def moment(self) -> float:
+        """Of the wrench [N m]."""
+        return math.hypot(*self.wrench[3:]) if self.wrench else 0.0
+
+
+@inlined
+def _add_external_wrench(constants: Array, motion: Array, model_forces: Array,
+                         measured_forces: Array, weight: float, wrench: Array) -> None:
+    """Add w_ext = J_inv^T (f_model - f_measured), times a weight, without making J_inv."""
+    position = motion[0], motion[1], motion[2]
+    rotation = (motion[3], motion[4], motion[5], motion[6], motion[7], motion[8], motion[9],
+                motion[10], motion[11])
+    for leg in range(6):
+        a, _length, _inverse_length, s = leg_line(constants, leg, position, rotation)
+        m = cross(a, s)
+        force = weight * (model_forces[leg] - measured_forces[leg])
+        for n in range(3):
+            wrench[n] += force * s[n]
+            wrench[3 + n] += force * m[n]
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
+def _many(constants: Array, motions: Array, model_forces: Array, measured_forces: Array,
+          wrenches: Array) -> None:
+    for n in range(len(motions)):
+        wrenches[n] = 0.0
+        _add_external_wrench(
+            constants, motions[n], model_forces[n], measured_forces[n], 1.0, wrenches[n])
+
+
+def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: Array,
+                      measured_forces: Array) -> Array:
+    """
+    Return the external wrench of many samples, each alone: nothing is filtered.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        Its geometry is used.
+    motions : (N, 12) or (N, MOTION)
+        Rows of motion, of which only the poses are used.
+    model_forces, measured_forces : (N, 6)
+        Of the inverse dynamics, and of the actuators [N], + pushes.
+
+    Returns
+    -------
+    (N, 6)
+        Force [N] and moment [N m] at the platform's origin, base axes, the sign of ``~/wrench``.
+
+    """
+    wrenches = np.empty((len(motions), WRENCH))
+    motions, model_forces, measured_forces = map(
+        np.ascontiguousarray, (motions, model_forces, measured_forces))
+    _many(platform.constants, motions, model_forces, measured_forces, wrenches)
+    return wrenches
+
+
+@entry_point('f8[::1]')
+def _one(numbers: Array) -> None:
+    """Write what one measurement gives."""
+    constants, written = numbers[_PLATFORM], numbers[_WRITTEN]
+    before, motion, wrench, differences = (
+        numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
+    for n in range(MOTION):
+        motion[n] = before[n]
+    code, written[_STEPS.start], written[_RESIDUAL.start] = forward_kinematics.pose(
+        constants, numbers[_LENGTHS], motion)
+    written[_CODE.start] = code
+    if code != forward_kinematics.FOUND:
+        return
+    forward_kinematics.twist(constants, numbers[_RATES], motion)
+    dt = numbers[_INTERVAL.start]
+    for n in range(6):
+        motion[18 + n] = (motion[12 + n] - before[12 + n]) / dt if dt > 0.0 else 0.0
+        before[18 + n] = motion[18 + n]
+        wrench[n] = 0.0
+        differences[n] = 0.0
+    if dt > 0.0:
+        forces, result = numbers[_FORCES], numbers[_RESULT]
+        for end in range(2):  # the mean of both ends
+            at = motion if end else before
+            base = numbers[_BASE] if end else numbers[_BASE_BEFORE]
+            inverse_dynamics.solve_one(
+                constants, at, numbers[_KNOWN], base, result, numbers[_TILE])
+            model_forces = result[FORCES]
+            _add_external_wrench(constants, at, model_forces, forces, 0.5, wrench)
+            for n in range(6):
+                differences[n] += 0.5 * (forces[n] - model_forces[n])
+        for n in range(6):
+            filtered = numbers[_BEFORE.start + n]
+            wrench[n] = filtered + numbers[_GAIN.start] * (wrench[n] - filtered)
+    for n in range(_STEPS.start):
+        if not math.isfinite(written[n]):
+            written[_CODE.start] = _OUT_OF_RANGE
+
+
+# The machine code that a measurement needs.
+FUNCTIONS = (_one,)
+
+
+class ExternalWrench:
+    """
+    The step from a measurement to the external wrench, for a hexapod with given parameters.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        They hold for every call. One thread at a time may call it: a call works in memory that is
+        its own.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._numbers = np.zeros(_TILE.stop)
+        self._memory = self._numbers.data  # the same as bytes
+        self._numbers[_PLATFORM] = StewartPlatform(parameters).constants
+        self._longest_gap = round(parameters['setpoint.timeout'] * 1e9)
+        self._rate = 2.0 * math.pi * parameters['external_wrench.cutoff']
+        self._most_force, self._most_moment = (
+            parameters[f'{EXTERNAL_WRENCH}.{limit}'] for limit in ('force_max', 'moment_max'))
+
+    def __call__(self, measurement: Measurement, before: Estimate | None, known: Six,
+                 target: Sequence[float] | None, base: tuple[float, ...] = NO_BASE) -> Estimate:
+        """
+        Return the estimate.
+
+        Parameters
+        ----------
+        measurement : Measurement
+            A finite one.
+        before : Estimate, optional
+            The last one. Where it is of a later stamp, or further back than
+            ``setpoint.timeout``, only its pose is used, and the filter restarts.
+        known : six numbers
+            The load on ``~/wrench`` [N, N m].
+        target : sequence of float, optional
+            The last setpoint, as a row of motion.
+        base : 12 numbers, optional
+            A row of the base's motion; by default it is still.
+
+        Raises
+        ------
+        PoseError, SingularityError
+            The forward kinematics did not converge from the last pose. Where there is none so
+            far, or none since ``setpoint.timeout``, from the target and from home neither.
+        MotionError
+            Numbers overflow.
+
+        """
+        given = (*measurement.lengths, *measurement.rates, *measurement.forces, *known)
+        interval = 0 if before is None else measurement.stamp - before.stamp
+        if before is not None and 0 < interval <= self._longest_gap:
+            seconds = interval * 1e-9
+            result = self._solve(
+                given, before.wrench or NO_WRENCH, seconds, before.motion, before.base, base)
+        else:
+            for guess in self._guesses(before, target):
+                result = self._solve(given, NO_WRENCH, 0.0, guess, base, base)
+                if result[_CODE.start] == forward_kinematics.FOUND:
+                    break
+        if result[_CODE.start] != forward_kinematics.FOUND:
+            raise _error(measurement, result)
+        motion = result[_MOTION_AFTER]
+        if not 0 < interval <= self._longest_gap:
+            return Estimate(measurement.stamp, motion, None, None, base)
+        fx, fy, fz, tx, ty, tz = result[_AFTER]
+        d0, d1, d2, d3, d4, d5 = result[_DIFFERENCES]
+        estimate = Estimate(measurement.stamp, motion, (fx, fy, fz, tx, ty, tz),
+                            (d0, d1, d2, d3, d4, d5), base)
+        overloads = tuple(self._overloads(estimate))
+        return estimate._replace(overloads=overloads) if overloads else estimate
+
+    def _solve(self, given: tuple[float, ...], before: Six, interval: float,
+               motion: Sequence[float], base_before: tuple[float, ...],
+               base: tuple[float, ...]) -> tuple[float, ...]:
+        # Computed here: compiled code has an expm1 of its own.
+        gain = -math.expm1(-self._rate * interval)
+        _GIVEN.pack_into(
+            self._memory, 8 * _LENGTHS.start, *given, *before, gain, interval, *motion,
+            *base_before, *base)
+        self._bound()
+        return _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
+
+    def _guesses(self, before: Estimate | None, target: Sequence[float] | None,
+                 ) -> Iterator[Sequence[float]]:
+        if before is not None:
+            yield before.motion
+        if target is not None:
+            yield target
+        yield from self._homes
+
+    @cached_property
+    def _bound(self) -> Callable[[], object]:
+        return _one.bound(self._numbers)
+
+    @cached_property
+    def _homes(self) -> list[list[float]]:
+        # It takes milliseconds and is seldom needed.
+        return [[*position.tolist(), *rotation.ravel().tolist(), *NO_WRENCH, *NO_WRENCH]
+                for position, rotation in zip(*homes(self._parameters), strict=True)]
+
+    def _overloads(self, estimate: Estimate) -> Iterator[Overload]:
+        for limit, value, bound in (('force_max', estimate.force, self._most_force),
+                                    ('moment_max', estimate.moment, self._most_moment)):
+            if bound is not None and value > bound:
+                yield Overload(f'{EXTERNAL_WRENCH}.{limit}', value, bound)
+
+
+def _error(measurement: Measurement, result: tuple[float, ...],
+           ) -> PoseError | SingularityError | MotionError:
+    code, lengths = result[_CODE.start], ', '.join(f'{x:.6g}' for x in measurement.lengths)
+    if code == _OUT_OF_RANGE:
+        return MotionError(f'stamp {measurement.stamp} ns')
+    if code == forward_kinematics.SINGULAR:
+        return SingularityError(f'lengths [{lengths}] m')
+    residual, steps = result[_RESIDUAL.start], result[_STEPS.start]
+    return PoseError(f'lengths [{lengths}] m: did not converge: residual {residual:.3g} m after '
+                     f'{steps:.0f} iterations')

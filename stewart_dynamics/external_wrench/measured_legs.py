@@ -1,0 +1,144 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From messages on ``~/measured_legs`` to the external wrench; what is rejected is reported.
+
+A message that is rejected is as one that never came: the estimate goes on with the next one, over
+the time between the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from stewart_dynamics.arrays import Six
+from stewart_dynamics.errors import MotionError, PoseError, SingularityError, StewartError
+from stewart_dynamics.external_wrench.estimate import Estimate, ExternalWrench, Measurement
+from stewart_dynamics.external_wrench.history import LegHistory
+from stewart_dynamics.mechanics.rows import NO_BASE
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.joint_state import JointStateError, JointStateReader
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.rejections import (
+    BASE_NOT_KNOWN, MALFORMED, OUT_OF_RANGE, Rejection, TOO_OLD, TWICE)
+
+# Under the node's name.
+MEASURED_LEGS = 'measured_legs'
+
+# Why a message is rejected, beside the reasons of ``joint_state`` and ``rejections``.
+UNSTAMPED = 'without a stamp'
+NOT_COMPILED = 'not compiled yet'
+NOT_CONVERGED = 'forward kinematics did not converge'
+SINGULAR = 'singular pose'
+
+_OF_ERROR = {PoseError: NOT_CONVERGED, SingularityError: SINGULAR, MotionError: OUT_OF_RANGE}
+
+
+class MeasuredLegs:
+    """
+    Follows the measured legs.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names, zero lengths and timeout.
+    step : ExternalWrench
+        It may be replaced at any time: ``step``.
+    rejected : callable
+        Called with each rejection and its details.
+    noticed : callable
+        Called with texts for the log: a restart.
+    history : LegHistory, optional
+        Gets the measurements that are used.
+
+    """
+
+    def __init__(
+            self, parameters: Parameters, step: ExternalWrench,
+            rejected: Callable[[Rejection, str], None],
+            noticed: Callable[[str], object], history: LegHistory | None = None) -> None:
+        self.step = step
+        self._reader = JointStateReader(parameters['joints'])
+        self._zero_lengths = tuple(parameters['geometry.zero_length'].tolist())
+        self._timeout = round(parameters['setpoint.timeout'] * 1e9)
+        self._rejected = rejected
+        self._noticed = noticed
+        self._history = history
+        self._last: Estimate | None = None
+
+    def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
+             base: BaseInput | None = None) -> Estimate | None:
+        """
+        Return the estimate from a message, or None where it is rejected.
+
+        Parameters
+        ----------
+        data : bytes
+            A sensor_msgs/JointState as it came, CDR.
+        known, target
+            See ``ExternalWrench``.
+        base : BaseInput, optional
+            The motion of the base; none: it is still.
+
+        """
+        measurement = self._sound(data)
+        if measurement is None or not self._in_time(measurement.stamp):
+            return None
+        row = (base.at(measurement.stamp) if base else None) or NO_BASE
+        if base and base.topics and row[0] != row[0]:
+            self._reject(BASE_NOT_KNOWN, f'stamp {measurement.stamp} ns')
+            return None
+        try:
+            self._last = self.step(measurement, self._last, known, target, row)
+        except StewartError as exc:
+            self._reject(_OF_ERROR[type(exc)], str(exc))
+            return None
+        if self._history is not None:
+            self._history.add(measurement.forces, self._last, known)
+        return self._last
+
+    def _reject(self, reason: str, details: str) -> None:
+        self._rejected(Rejection(MEASURED_LEGS, reason), details)
+
+    def _sound(self, data: bytes) -> Measurement | None:
+        """Return what a message has measured, or reject it."""
+        try:
+            stamp, values = self._reader.read_one(data)
+        except MalformedError as exc:
+            self._reject(MALFORMED, str(exc))
+            return None
+        except JointStateError as exc:
+            self._reject(exc.reason, exc.details)
+            return None
+        if stamp == 0:
+            self._reject(UNSTAMPED, 'accelerations need the time between two messages')
+            return None
+        p, z = values, self._zero_lengths
+        return Measurement(
+            stamp, (p[0] + z[0], p[1] + z[1], p[2] + z[2], p[3] + z[3], p[4] + z[4], p[5] + z[5]),
+            values[6:12], values[12:18])
+
+    def _in_time(self, stamp: int) -> bool:
+        """Return whether a measurement may still be used, or reject it."""
+        back = self._last.stamp - stamp if self._last else -1
+        if back > self._timeout:
+            self._noticed(f'{MEASURED_LEGS}: stamps jumped back by {back / 1e9:g} s: followed as '
+                          'a restart')
+        elif back == 0:
+            self._reject(TWICE, f'stamp {stamp} ns')
+        elif back > 0:
+            self._reject(TOO_OLD, f'stamp {stamp} ns is {back / 1e9:g} s older than the last used')
+        return back < 0 or back > self._timeout

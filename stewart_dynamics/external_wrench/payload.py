@@ -1,0 +1,327 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The mass, center of mass and inertia of platform and payload, from the last seconds of motion.
+
+Measured forces less those of the model, with the parameters as they are, are what a change of the
+platform's ten inertial parameters has to explain: ``body_fit``. Both sides, the forces and the
+regressor, pass through the same filter, so that motion above its band costs information but makes
+no error: means over windows cos^2(pi t / 2 h), -h < t < h, at every h. With them the
+noise of the accelerations, differences of measured twists, is that of their slow part (summation
+by parts moves the difference to the window).
+
+The work is done in pieces, because setpoints are answered in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
+from stewart_dynamics.compilation.machine_code import COMPILED
+from stewart_dynamics.external_wrench.body_fit import (
+    about, Body, BodyFit, FittedBody, FRICTION, LAGS, ROUNDS, Samples, TEN)
+from stewart_dynamics.external_wrench.history import (
+    ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
+from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
+from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+FUNCTIONS = inverse_dynamics.solve, regressor.regressors
+
+# Measurements between two yields.
+PIECE = 64 if COMPILED else 1
+
+# Half the width of a window [s], and at least so many measurements.
+_HALF_WIDTH = 0.05
+_MEASUREMENTS = 5
+# Fewer windows tell too little about the correlation of their noise.
+LEAST_WINDOWS = 40
+# A window counts if measurements cover this part of it.
+_COVERED = 0.9
+
+# The fourth difference of white noise has this times its variance. Motion adds next to nothing.
+_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_FOURTH_VARIANCE = float(_FOURTH @ _FOURTH)
+
+# Friction is uncertain by its own size; what holds a leg at rest is anything up to Coulomb's.
+_STATIC = 1.0 / math.sqrt(3.0)
+
+# What overflows is found by its result.
+_QUIET = np.errstate(over='ignore', invalid='ignore')
+
+_LEGS = np.arange(6)
+_COLUMNS = TEN + FRICTION  # of a leg; then its force less that of the model, and that
+
+# Forces by those of the model: outside, they are of another unit.
+_LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
+
+NAMES = ('mass', *(f'center of mass {axis}' for axis in 'xyz'),
+         *(f'inertia {axes}' for axes in ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')))
+UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
+
+
+class Payload(NamedTuple):
+    """Platform and payload as one body, as ``platform.*`` means it."""
+
+    stamp: int
+    """Of the last measurement [ns]."""
+    seconds: float
+    """Time of the measurements."""
+    fitted: FittedBody
+    given: Body
+    """The parameters, of which what is not known has the values."""
+
+
+class Outcome(NamedTuple):
+    """What became of a request."""
+
+    message: str
+    payload: Payload | None = None
+
+
+def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome | None]:
+    """
+    Yield None after each piece of the work, and the outcome at the end.
+
+    Parameters
+    ----------
+    history : LegHistory
+        Measurements may be added meanwhile; those from now on are not used.
+    platform : StewartPlatform
+        Its parameters hold for all of the work.
+
+    """
+    p = platform.parameters
+    begin, end = _range(history, p['payload.window'])
+    if end == begin:
+        yield Outcome('no measured legs')
+        return
+    stamps = history.stamps(begin, end)
+    yield None
+    work = _Windows(platform, stamps)
+    for first in range(begin, end, PIECE):
+        work.add(history, begin, first, min(first + PIECE, end))
+        yield None
+    seconds = float(stamps[-1] - stamps[0]) * 1e-9
+    samples = work.samples()
+    if samples is None:
+        needed = LEAST_WINDOWS * work.half_width
+        more = '' if needed < p['payload.window'] else ', more than payload.window'
+        yield Outcome(f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps '
+                      f'are needed{more}')
+        return
+    yield None
+    if not math.isfinite(work.scale):
+        yield Outcome('numbers overflow')
+        return
+    if not _LEAST_SCALE < work.scale < _MOST_SCALE:
+        what = 'sign' if work.scale < 0.0 else 'unit'
+        yield Outcome(f'the measured forces are {work.scale:.3g} times those of the model: likely '
+                      f'they have another {what}')
+        return
+    given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
+    fit = BodyFit(samples, given, p['singularity.characteristic_length'])
+    try:
+        for _ in range(ROUNDS):
+            fit.improve()
+            yield None
+        for lag in range(LAGS + 1):
+            fit.correlate(lag)
+            yield None
+        fitted = fit.result()
+    except np.linalg.LinAlgError as exc:
+        yield Outcome(f'the fit failed: {exc}')
+        return
+    yield _outcome(Payload(int(stamps[-1]), seconds, fitted, given))
+
+
+def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
+    """Return the first measurement that counts, and the end: stamps increase between them."""
+    end = history.count
+    stamps = history.stamps(history.first, end)
+    if not len(stamps):
+        return end, end
+    stopped = np.flatnonzero(np.diff(stamps) <= 0)
+    restart = int(stopped[-1]) + 1 if len(stopped) else 0
+    late = np.searchsorted(stamps[restart:], stamps[-1] - round(seconds * 1e9))
+    return history.first + restart + int(late), end
+
+
+class _Windows:
+    """Means of what the fit needs, over windows."""
+
+    scale: float
+    """Of the forces, by those of the model."""
+
+    def __init__(self, platform: StewartPlatform, stamps: Stamps) -> None:
+        p = platform.parameters
+        self._platform, self._stamps = platform, stamps
+        self._longest_gap = p['setpoint.timeout']
+        intervals = np.diff(stamps) * 1e-9
+        interval = float(np.median(intervals)) if len(intervals) else 0.0
+        self.half_width = max(_HALF_WIDTH, _MEASUREMENTS * interval)
+        many = int((stamps[-1] - stamps[0]) * 1e-9 / self.half_width) + 2
+        self._sums = np.zeros((many, 6, _COLUMNS + 2))
+        self._covered = np.zeros(many)
+        self._about = about(p['platform.center_of_mass'])
+        self._friction = np.column_stack([
+            p['actuator.coulomb_friction'], p['actuator.viscous_friction'],
+            _STATIC * p['actuator.coulomb_friction']])
+        self._noise, self._noises = np.zeros((6, 6)), 0
+        self._middle: tuple[Array, Array] | None = None
+        # Of the noise of an acceleration, by that of a twist: the window's slope.
+        self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
+
+    @_QUIET
+    def add(self, history: LegHistory, begin: int, first: int, end: int) -> None:
+        """Add measurements from one to another; the first of all is ``begin``."""
+        low, high = max(begin, first - 2), min(begin + len(self._stamps), end + 2)
+        if low < history.first:  # overwritten meanwhile
+            return
+        rows = history.rows(low, high)
+        seconds = (self._stamps[low - begin:high - begin] - self._stamps[0]) * 1e-9
+        steps = np.diff(seconds)
+        sound = steps <= self._longest_gap
+        twists = rows[:, TURNED]
+        self._add_noise(twists, sound, first - low, end - low)
+        # Those between two measurements.
+        every = np.arange(max(first - low, 1), min(end - low, len(rows) - 1))
+        inner: Integers = every[sound[every - 1] & sound[every]]
+        if not len(inner):
+            return
+        before, after = steps[inner - 1, None], steps[inner, None]
+        both = before + after
+        motions = motions_of(rows[inner])
+        motions[:, ACCELERATION] = (twists[inner + 1] - twists[inner - 1]) / both
+        forces = (rows[inner][:, ACTED] * before + rows[inner + 1][:, ACTED] * after) / both
+        values = self._values(motions, rows[inner], forces)
+        self._add_windows(seconds[inner], 0.5 * both[:, 0], values)
+
+    def _add_noise(self, twists: Array, sound: Flags, first: int, end: int) -> None:
+        every = np.arange(max(first, 2), min(end, len(twists) - 2))
+        centers: Integers = every[np.all([sound[every + n] for n in (-2, -1, 0, 1)], axis=0)]
+        rough: Array = np.tensordot(_FOURTH, twists[centers + np.arange(-2, 3)[:, None]], 1)
+        self._noise += rough.T @ rough
+        self._noises += len(centers)
+
+    def _values(self, motions: Array, rows: Array, forces: Array) -> Array:
+        """Return the columns of each sample and leg, and its force less that of the model."""
+        wrenches, bases = rows[:, LOADED], rows[:, OF_BASE]
+        model = self._platform.solve(motions, wrenches, bases)[:, FORCES]
+        matrix = self._platform.regressors(motions, bases)
+        if self._middle is None:
+            self._middle = motions[:1].copy(), bases[:1].copy()
+        values = np.empty((len(motions), 6, _COLUMNS + 2))
+        values[..., :TEN] = matrix[..., PLATFORM] @ self._about
+        for n, kind in enumerate((COULOMB_FRICTION, VISCOUS_FRICTION)):
+            values[..., TEN + n] = matrix[:, _LEGS, kind.start + _LEGS]
+        values[..., TEN + 2] = 0.0
+        values[..., _COLUMNS], values[..., _COLUMNS + 1] = forces - model, model
+        return values
+
+    def _add_windows(self, seconds: Array, weights: Array, values: Array) -> None:
+        finite = np.isfinite(values).all(axis=(1, 2))  # not where J_inv cannot be solved
+        seconds, weights, values = seconds[finite], weights[finite], values[finite]
+        if not len(seconds):
+            return
+        turns = seconds / self.half_width
+        whole = turns.astype(np.int64)
+        low, high = int(whole[0]), int(whole[-1]) + 2
+        part = np.sin(0.5 * np.pi * (turns - whole)) ** 2
+        many = np.arange(len(seconds))
+        share = np.zeros((high - low, len(seconds)))
+        share[whole - low, many] = (1.0 - part) * weights
+        share[whole - low + 1, many] = part * weights
+        self._sums[low:high] += np.tensordot(share, values, 1)
+        self._covered[low:high] += share.sum(axis=1)
+
+    @_QUIET
+    def samples(self) -> Samples | None:
+        """Return the means over the windows, None where they are too few."""
+        sound = self._covered > _COVERED * self.half_width
+        if np.count_nonzero(sound) < LEAST_WINDOWS or self._middle is None or not self._noises:
+            return None
+        means = self._sums[sound] / self._covered[sound, None, None]
+        differences, modelled = means[..., _COLUMNS], means[..., _COLUMNS + 1]
+        self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
+        friction = means[..., TEN:_COLUMNS]
+        # Not a part of it: noise in the rates would vary the column, and seem to tell its size.
+        friction[..., 2] = np.abs(friction[..., 1]) < COULOMB_RATE
+        columns, model = self._by_acceleration(*self._middle)
+        noise = self._noise_gain / (self._noises * _FOURTH_VARIANCE) * self._noise
+        return Samples(means[..., :TEN], friction * self._friction, differences, noise, columns,
+                       model)
+
+    def _by_acceleration(self, motion: Array, base: Array) -> tuple[Array, Array]:
+        """Return the derivatives of columns and model by the accelerations, in one motion."""
+        motions = np.tile(motion, (7, 1))
+        motions[1:, ACCELERATION] += np.eye(6)
+        columns = self._platform.regressors(motions, base)[..., PLATFORM] @ self._about
+        model = self._platform.solve(motions, None, base)[:, FORCES]
+        return columns[1:] - columns[0], model[1:] - model[0]
+
+
+def _outcome(payload: Payload) -> Outcome:
+    fitted = payload.fitted
+    mass = fitted.body.mass
+    if not mass > 0.0:
+        return Outcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
+    if not fitted.known[0]:
+        return Outcome('the measured forces do not tell the mass: what no body explains is '
+                       f'{fitted.residual:.3g} N (RMS)')
+    return Outcome(_words(payload), payload)
+
+
+def _words(payload: Payload) -> str:
+    """Return what is known and what is not, in one line, with the parameters to be set."""
+    fitted, more = payload.fitted, payload.fitted.body.mass - payload.given.mass
+    known = [f'{name} {with_interval(value, half)} {unit}' for name, unit, value, half, is_known
+             in zip(NAMES, UNITS, numbers_of(fitted.body), fitted.half_widths, fitted.known,
+                    strict=True) if is_known]
+    unknown = [name for name, is_known in zip(NAMES, fitted.known, strict=True) if not is_known]
+    text = (f'{", ".join(known)}; platform.mass {more:+.6g} kg; from '
+            f'{payload.seconds:.1f} s')
+    if not fitted.consistent:
+        text += '; no real body has the inertia that fits best'
+    if unknown:
+        text += f'; not identified, as in the parameters: {", ".join(unknown)}'
+    return f'{text}; platform: {_parameters(fitted.body)}'
+
+
+def with_interval(value: float, half_width: float) -> str:
+    """Return a value and half of its 95 % interval, of which two digits are given."""
+    digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else 6
+    digits = min(max(digits, 0), 9)
+    return f'{value:.{digits}f} +- {half_width:.{digits}f}'
+
+
+def _parameters(body: Body) -> str:
+    center, inertia = (', '.join(f'{float(f"{value:.6g}")}' for value in values)
+                       for values in (body.center, body.inertia))
+    return (f'{{mass: {float(f"{body.mass:.6g}")}, center_of_mass: [{center}], '
+            f'inertia: [{inertia}]}}')
+
+
+def numbers_of(body: Body) -> list[float]:
+    """Return mass, center of mass and inertia, as NAMES names them."""
+    return [body.mass, *body.center.tolist(), *body.inertia.tolist()]

@@ -1,0 +1,55 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Options of an identification."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from stewart_dynamics.identification.unknowns import DEFAULT
+from stewart_dynamics.replay.replay_options import NODE
+
+CUTOFF = 10.0
+HOLD_OUT = 0.2
+
+
+class Options(NamedTuple):
+    """Options of an identification."""
+
+    node: str = NODE
+    """Node name: the prefix of the usual topic."""
+    measured: str | None = None
+    """Topic of the measured legs; None: the usual one."""
+    efforts: str | None = None
+    """Topic of the efforts; None: that of the measured legs."""
+    kinds: tuple[str, ...] = DEFAULT
+    """What is identified, of ``unknowns.KINDS``."""
+    motor_torque: bool = False
+    """Efforts are torques of the motors [N m]."""
+    cutoff: float = CUTOFF
+    """Of the filter on regressor and efforts [Hz]."""
+    prior: float | None = None
+    """Standard error of the file's values, as a part of the scales; None: they do not count."""
+    hold_out: float = HOLD_OUT
+    """Part of each bag, its end, that validates what is fitted to the rest."""
+    delay: bool = True
+    """Estimate the delay of the efforts."""
+    accept_mistakes: bool = False
+    """Write results although a mistake is likely."""
+    report: bool = True
+    """Write report.html."""
+    force: bool = False
+    """Replace results."""
+    run: str = ''

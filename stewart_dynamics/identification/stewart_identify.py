@@ -1,0 +1,162 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of stewart_identify."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from stewart_dynamics.identification import design_command
+from stewart_dynamics.identification.identification_options import CUTOFF, HOLD_OUT, Options
+from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
+from stewart_dynamics.program import DONE, interrupt_on_signals, node_name, PARTLY_READ, Program
+from stewart_dynamics.replay.replay_options import NODE
+
+NOT_ALL_TOLD = 1
+_PROGRAM = Program('stewart_identify')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    parser = _arguments()
+    given = parser.parse_args(arguments)
+    if bool(given.bags) == given.design:
+        parser.error('--design takes no BAG' if given.design else
+                     'the following arguments are required: BAG')
+    return _PROGRAM.exit_code(lambda: _run(given))
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Identify mass, center of mass, inertia and friction of a hexapod from the '
+                    'measured legs of recorded motions.',
+        epilog='DIR/ gets identified.yaml (the whole parameter file, for the node), '
+               'identification.json and report.html.\n\nexit codes: 0 done; 1 with --strict, '
+               'when the motion does not tell everything that was asked for;\n2 bad arguments, '
+               'parameters or bags, or a likely mistake; 3 part of a bag could not be read, the '
+               'rest is done; 130 interrupted')
+    parser.add_argument('bags', nargs='*', type=Path, metavar='BAG',
+                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
+                             'with bags in it; several are of one and the same hexapod')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the hexapod as far as they are known, the file that '
+                             'the node takes')
+    parser.add_argument('--output', type=Path, metavar='DIR',
+                        help='folder of the results (default: identified)')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when the motion does not tell everything that was '
+                             'asked for')
+    parser.add_argument('--no-report', action='store_true', help='write no report.html')
+    topics = parser.add_argument_group('topics')
+    topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
+                        help=f'name before the usual topic, NAME/measured_legs (default: {NODE})')
+    topics.add_argument('--measured', metavar='TOPIC',
+                        help='JointState with positions and efforts, and rates where they are')
+    topics.add_argument('--efforts', metavar='TOPIC',
+                        help='another JointState with the efforts, at stamps of its own')
+    what = parser.add_argument_group('what is identified, and how')
+    what.add_argument('--identify', type=_kinds, default=DEFAULT, metavar='LIST',
+                      help=f'of {", ".join(KINDS)}, with commas (default: {",".join(DEFAULT)}); '
+                           'tilt is the direction of gravity, for a base that is not level')
+    what.add_argument('--motor-torque', action='store_true',
+                      help='efforts are torques of the motors [N m]; needs actuator.screw_lead')
+    what.add_argument('--cutoff', type=_frequency, default=CUTOFF, metavar='HZ',
+                      help='cut-off frequency of the filter on both sides of the regression '
+                           f'(default: {CUTOFF:g}): above the frequencies of the motion')
+    what.add_argument('--prior', type=_part, metavar='PART',
+                      help="the file's values count, as if known to this part of their size")
+    what.add_argument('--hold-out', type=_held, default=HOLD_OUT, metavar='PART',
+                      help='end of each bag that validates a fit to the rest; 0: none '
+                           f'(default: {HOLD_OUT:g})')
+    what.add_argument('--no-delay', action='store_true',
+                      help='efforts are not delayed; by default the delay is estimated')
+    what.add_argument('--accept-mistakes', action='store_true',
+                      help='write results although a mistake is likely')
+    design_command.add_options(parser)
+    return parser
+
+
+def _run(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.bags.find import find_bags
+    from stewart_dynamics.compilation.entry_point import prepare
+    from stewart_dynamics.compilation.machine_code import HINT
+    from stewart_dynamics.identification.one_run import FUNCTIONS, run
+    from stewart_dynamics.identification.text import result_text
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters.table import Parameters
+
+    interrupt_on_signals()
+    options = Options(
+        given.node, given.measured, given.efforts, given.identify, given.motor_torque,
+        given.cutoff, given.prior, given.hold_out, not given.no_delay, given.accept_mistakes,
+        not given.no_report, given.force)
+    parameters = Parameters.from_yaml(given.params, given.node)
+    if given.design:
+        design_command.run(given, parameters)
+        return DONE
+    output = given.output or Path('identified')
+    bags = [bag for path in given.bags for bag in find_bags(path, output)]
+    if HINT:
+        _PROGRAM.complain(HINT)
+    prepare(FUNCTIONS)
+    for mistake in likely_mistakes(parameters):
+        _PROGRAM.complain(f'warning: {mistake}')
+    result = run(bags, parameters, output, options, _PROGRAM.complain)
+    _PROGRAM.say(result_text(result))
+    _PROGRAM.say(f'results: {output}')
+    missing = [f'{bag["bag"]}: part of it could not be read: {"; ".join(bag["missing"])}'
+               for bag in result['bags'] if bag['missing']]
+    for text in missing:
+        _PROGRAM.complain(text)
+    if missing:
+        return PARTLY_READ
+    everything = all(each['state'] == 'identified' and not each['at_bound']
+                     for each in result['parameters'])
+    return NOT_ALL_TOLD if given.strict and not everything else DONE
+
+
+def _kinds(text: str) -> tuple[str, ...]:
+    kinds = tuple(dict.fromkeys(each.strip() for each in text.split(',') if each.strip()))
+    for kind in kinds:
+        if kind not in KINDS:
+            raise argparse.ArgumentTypeError(
+                f'{kind!r}: cannot be identified; known are {", ".join(KINDS)}')
+    if not kinds:
+        raise argparse.ArgumentTypeError('names nothing')
+    return kinds
+
+
+def _frequency(text: str) -> float:
+    return _between(text, 0.1, 1000.0)
+
+
+def _part(text: str) -> float:
+    return _between(text, 1e-6, 1e3)
+
+
+def _held(text: str) -> float:
+    return _between(text, 0.0, 0.9)
+
+
+def _between(text: str, least: float, most: float) -> float:
+    value = float(text)
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least {least:g}, at most {most:g}')
+    return value

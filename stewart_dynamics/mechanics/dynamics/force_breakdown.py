@@ -1,0 +1,175 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Force breakdown by source: gravity, inertia, velocity, friction, external wrench, base motion.
+
+The leg forces are linear in them: ``J_inv^T f = M X'' + C X' + G - wrench``, and friction adds
+to f along the leg. So each part is the inverse dynamics of a motion and a
+hexapod reduced to its source.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.dynamics.friction import friction
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
+from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.table import Parameters
+
+
+class ForceBreakdown(NamedTuple):
+    """
+    Leg forces by source, (..., 6) [N] each; they sum to the forces of the inverse dynamics.
+
+    Attributes
+    ----------
+    gravity : (..., 6)
+        Holds platform and legs at rest.
+    platform_inertia : (..., 6)
+        Accelerates the platform.
+    leg_inertia : (..., 6)
+        Accelerates the legs and their actuators.
+    velocity : (..., 6)
+        Centrifugal and Coriolis terms.
+    friction : (..., 6)
+        Overcomes the friction of the actuators.
+    wrench : (..., 6)
+        Balances the external wrench.
+    base_motion : (..., 6)
+        Accelerates platform and legs along with a moving base; zero on a still one.
+
+    """
+
+    gravity: Array
+    platform_inertia: Array
+    leg_inertia: Array
+    velocity: Array
+    friction: Array
+    wrench: Array
+    base_motion: Array
+
+    @property
+    def total(self) -> Array:
+        """Return the sum of all (..., 6) [N]."""
+        total: Array = sum(self[1:], self[0])
+        return total
+
+    def __repr__(self) -> str:
+        """Return the shape, not the arrays."""
+        return f'<ForceBreakdown of shape {self.gravity.shape[:-1]}: {", ".join(self._fields)}>'
+
+
+# Their names in texts, in the order of ForceBreakdown.
+SOURCES = ('gravity', 'platform inertia', 'leg inertia', 'velocity terms', 'friction', 'wrench',
+           'base motion')
+
+_NO_GRAVITY = {'gravity': [0.0, 0.0, 0.0]}
+_NO_FRICTION = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
+# The reflected mass of the actuators is part of the inertia of the legs.
+_NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
+            'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0}
+
+# Samples computed at once: they fit into the processor's cache.
+_TOGETHER = 1024
+
+
+class ForceBreakdownRows:
+    """
+    The force breakdown of rows of motion, as one array.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._viscous = parameters['actuator.viscous_friction'].copy()
+        self._coulomb = parameters['actuator.coulomb_friction'].copy()
+        self._whole = hexapod_constants(parameters)
+        self._weightless = hexapod_constants(
+            parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
+        self._platform_only = hexapod_constants(
+            parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION, **_NO_LEGS}))
+
+    def __call__(self, motions: Array, wrenches: Array, bases: Array | None = None) -> Array:
+        """
+        Return the forces (N, 7, 6) [N]: sample, source in the order of SOURCES, leg.
+
+        They sum to the demanded forces. nan where J_inv cannot be solved, or the base's motion is
+        not known.
+
+        Parameters
+        ----------
+        motions : (N, MOTION)
+            Rows of motion, laid out as ``rows`` says.
+        wrenches : (N, WRENCH) or (1, WRENCH)
+            External wrenches at the platform's origin, base axes [N, N m]; one row for all.
+        bases : (N, BASE) or (1, BASE), optional
+            Rows of the base's motion; one row for all; one of nan: it is not known. By default
+            the base is still.
+
+        """
+        forces = np.empty((len(motions), len(SOURCES), 6))
+        loads = wrenches if wrenches.any() else None
+        for first in range(0, len(motions), _TOGETHER):
+            part = slice(first, first + _TOGETHER)
+            load, base = (each if each is None or len(each) == 1 else each[part]
+                          for each in (loads, bases))
+            self._split(motions[part], load, base, forces[part])
+        return forces
+
+    def _split(self, motions: Array, wrenches: Array | None, bases: Array | None, forces: Array,
+               ) -> None:
+        by = ForceBreakdown(*(forces[:, n] for n in range(len(SOURCES))))
+        rows = motions.copy()
+        rows[:, TWIST.start:MOTION] = 0.0  # at rest
+        gravity = bases
+        if bases is not None:
+            gravity, bases = bases.copy(), bases.copy()
+            gravity[:, GRAVITY.stop:] *= 0.0  # nan stays nan
+            bases[:, GRAVITY] *= 0.0
+        results = batch.solve(self._whole, rows, None, gravity)
+        by.gravity[:] = results[:, FORCES]
+        unknown = ~(results[:, CONDITION] < UNSOLVABLE_CONDITION)
+        if bases is not None:
+            unknown = unknown | np.isnan(bases[:, -1])
+        by.wrench[:] = 0.0 if wrenches is None else batch.solve(
+            self._weightless, rows, wrenches)[:, FORCES]
+
+        rows[:, ACCELERATION] = motions[:, ACCELERATION]
+        by.platform_inertia[:] = batch.solve(self._platform_only, rows)[:, FORCES]
+        by.leg_inertia[:] = (batch.solve(self._weightless, rows)[:, FORCES]
+                             - by.platform_inertia)
+
+        rows[:, ACCELERATION] = 0.0
+        rows[:, TWIST] = motions[:, TWIST]
+        results = batch.solve(self._weightless, rows)
+        by.velocity[:] = results[:, FORCES]
+        # By the friction law: as a difference it would lose its digits near a singularity.
+        own = np.empty((len(rows), 6))
+        friction(results[:, RATES].copy(), self._viscous, self._coulomb, own)
+        by.friction[:] = own
+        by.base_motion[:] = 0.0 if bases is None else (
+            batch.solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)
+        forces[unknown] = np.nan

@@ -1,0 +1,119 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The constants of a hexapod as one array, for all compiled functions.
+
+First those of the platform, then 14 for each leg. Products of masses and distances of a leg that
+do not change with its length are computed here.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import inlined
+from stewart_dynamics.mechanics.vectors import read3, Symmetric3, Vector3
+from stewart_dynamics.parameters.table import Parameters
+
+_GRAVITY, _CHARACTERISTIC_LENGTH = 0, 3
+_PLATFORM_MASS, _PLATFORM_CENTER, _PLATFORM_INERTIA = 4, 5, 8
+_FIRST_LEG = 14
+# Of a leg, from its first number on.
+_BASE_JOINT, _PLATFORM_JOINT = 0, 3
+_PISTON_MASS, _PISTON_CENTER, _CYLINDER_MOMENT, _JOINT_INERTIA = 6, 7, 8, 9
+_REFLECTED_MASS, _VISCOUS_FRICTION, _COULOMB_FRICTION, _CYLINDER_MASS = 10, 11, 12, 13
+_LEG = 14
+
+CONSTANTS = _FIRST_LEG + 6 * _LEG
+
+
+class Leg(NamedTuple):
+    """The constants of one leg but for its joints."""
+
+    piston_mass: float
+    """[kg]"""
+    piston_center: float
+    """Distance of its center of mass from the platform joint [m]."""
+    cylinder_moment: float
+    """Mass times distance of the center of mass from the base joint [kg m]."""
+    joint_inertia: float
+    """About the base joint: cylinder mass * CoM^2 + the inertias of both parts [kg m^2]."""
+    reflected_mass: float
+    """Of the actuator [kg]."""
+    viscous_friction: float
+    """[N s/m]"""
+    coulomb_friction: float
+    """[N]"""
+    cylinder_mass: float
+    """[kg]"""
+
+
+def hexapod_constants(p: Parameters) -> Array:
+    """Return the constants (CONSTANTS,) of a hexapod, SI units."""
+    cylinder_mass, cylinder_center = p['legs.cylinder.mass'], p['legs.cylinder.center_of_mass']
+    legs = np.column_stack([
+        p['geometry.base_joints'], p['geometry.platform_joints'],
+        p['legs.piston.mass'], p['legs.piston.center_of_mass'],
+        cylinder_mass * cylinder_center,
+        cylinder_mass * cylinder_center ** 2 + p['legs.cylinder.inertia']
+        + p['legs.piston.inertia'],
+        p['actuator.reflected_mass'], p['actuator.viscous_friction'],
+        p['actuator.coulomb_friction'], cylinder_mass])
+    return np.concatenate([
+        p['gravity'], [p['singularity.characteristic_length'], p['platform.mass']],
+        p['platform.center_of_mass'], p['platform.inertia'], legs.ravel()])
+
+
+@inlined
+def gravity_of(constants: Array) -> Vector3:
+    """Return the acceleration of free fall, base axes [m/s^2]."""
+    return read3(constants, _GRAVITY)
+
+
+@inlined
+def characteristic_length_of(constants: Array) -> float:
+    """Return the length by which moments are divided [m]."""
+    length: float = constants[_CHARACTERISTIC_LENGTH]
+    return length
+
+
+@inlined
+def platform_of(constants: Array) -> tuple[float, Vector3, Symmetric3]:
+    """Return mass, center of mass and inertia about it (xx xy xz yy yz zz), platform axes."""
+    o = _PLATFORM_INERTIA
+    return (constants[_PLATFORM_MASS], read3(constants, _PLATFORM_CENTER),
+            (constants[o], constants[o + 1], constants[o + 2], constants[o + 3],
+             constants[o + 4], constants[o + 5]))
+
+
+@inlined
+def joints_of(constants: Array, leg: int) -> tuple[Vector3, Vector3]:
+    """Return a leg's base joint, base frame, and platform joint, platform frame [m]."""
+    o = _FIRST_LEG + leg * _LEG
+    return read3(constants, o + _BASE_JOINT), read3(constants, o + _PLATFORM_JOINT)
+
+
+@inlined
+def leg_of(constants: Array, leg: int) -> Leg:
+    """Return a leg's other constants."""
+    o = _FIRST_LEG + leg * _LEG
+    return Leg(
+        constants[o + _PISTON_MASS], constants[o + _PISTON_CENTER],
+        constants[o + _CYLINDER_MOMENT], constants[o + _JOINT_INERTIA],
+        constants[o + _REFLECTED_MASS], constants[o + _VISCOUS_FRICTION],
+        constants[o + _COULOMB_FRICTION], constants[o + _CYLINDER_MASS])

@@ -1,0 +1,144 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The parameters in which leg forces are linear, theta (70,): their order, their names, both ways.
+
+Of the platform ten: mass, first moment m c, inertia about the platform's origin (not about its
+center of mass). Of each part of a leg three: mass m, first moment m S, second moment I + m S^2
+about its joint (cylinder: base joint, piston: platform joint). Of each actuator reflected mass,
+viscous and Coulomb friction; of each measured effort a constant offset, which is zero in every
+parameter file.
+
+Leg by leg within a kind: ``theta[VISCOUS_FRICTION]`` are six numbers. The mass of a cylinder
+alone does nothing to the leg forces, and the second moments of both parts of a leg do the same.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.rows import consecutive
+from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+
+(PLATFORM, CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND, PISTON_MASS, PISTON_FIRST,
+ PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION, COULOMB_FRICTION, OFFSET) = consecutive(
+     10, *10 * [6])
+LINEAR = OFFSET.stop
+"""The number of parameters."""
+
+# Within the ten of the platform.
+MASS, FIRST_MOMENT, INERTIA = 0, slice(1, 4), slice(4, 10)
+
+_PLATFORM_NAMES = (
+    'platform.mass', *(f'platform.first_moment.{axis}' for axis in 'xyz'),
+    *(f'platform.inertia_about_origin.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')))
+_LEG_KINDS = (
+    'legs.cylinder.mass', 'legs.cylinder.first_moment', 'legs.cylinder.second_moment',
+    'legs.piston.mass', 'legs.piston.first_moment', 'legs.piston.second_moment',
+    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+    'effort_offset')
+_PLATFORM_UNITS = ('kg', *3 * ['kg m'], *6 * ['kg m^2'])
+_LEG_UNITS = ('kg', 'kg m', 'kg m^2', 'kg', 'kg m', 'kg m^2', 'kg', 'N s/m', 'N', 'N')
+
+UNITS = (*_PLATFORM_UNITS, *(unit for unit in _LEG_UNITS for _ in range(6)))
+"""Of each parameter."""
+
+# A moment of inertia that rounding made negative is taken as zero, by the second moment.
+_ROUNDING = 1e-9
+
+
+def names_of(p: Parameters) -> tuple[str, ...]:
+    """Return the names of the parameters: those of a leg end with the leg's."""
+    return (*_PLATFORM_NAMES, *(f'{kind}.{leg}' for kind in _LEG_KINDS for leg in p['joints']))
+
+
+def linear_parameters(p: Parameters) -> Array:
+    """Return theta (LINEAR,) of a hexapod, SI units."""
+    theta = np.zeros(LINEAR)
+    mass, center = p['platform.mass'], p['platform.center_of_mass']
+    theta[:10] = mass, *(mass * center), *about_origin(mass, center, p['platform.inertia'])
+    for part, of_mass, first, second in (
+            ('cylinder', CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND),
+            ('piston', PISTON_MASS, PISTON_FIRST, PISTON_SECOND)):
+        masses, distances, inertias = (
+            p[f'legs.{part}.{name}'] for name in ('mass', 'center_of_mass', 'inertia'))
+        theta[of_mass], theta[first] = masses, masses * distances
+        theta[second] = inertias + masses * distances ** 2
+    theta[REFLECTED_MASS] = p['actuator.reflected_mass']
+    theta[VISCOUS_FRICTION] = p['actuator.viscous_friction']
+    theta[COULOMB_FRICTION] = p['actuator.coulomb_friction']
+    return theta
+
+
+def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
+    """
+    Return the values of theta under the names of a parameter file, offsets left out.
+
+    Parameters
+    ----------
+    theta : (LINEAR,)
+        Of a hexapod, SI units.
+    p : Parameters
+        Where a part of a leg has no mass, its center of mass is as here.
+
+    Raises
+    ------
+    ParameterError
+        No body has these: a mass that is not positive, a part of a leg with moments but without
+        mass, or one with a negative inertia about its center of mass.
+
+    """
+    mass = float(theta[MASS])
+    if not mass > 0.0:
+        raise ParameterError(f'platform.mass: {mass:g} kg: must be more than 0')
+    center = theta[FIRST_MOMENT] / mass
+    values: dict[str, Any] = {
+        'platform.mass': mass, 'platform.center_of_mass': center,
+        'platform.inertia': theta[INERTIA] - about_origin(mass, center, np.zeros(6))}
+    for part, of_mass, first, second in (
+            ('cylinder', CYLINDER_MASS, CYLINDER_FIRST, CYLINDER_SECOND),
+            ('piston', PISTON_MASS, PISTON_FIRST, PISTON_SECOND)):
+        masses, firsts, seconds = theta[of_mass], theta[first], theta[second]
+        massless = masses == 0.0
+        wrong = (masses < 0.0) | (massless & (firsts != 0.0))
+        distances = np.divide(firsts, masses, out=p[f'legs.{part}.center_of_mass'].copy(),
+                              where=~massless)
+        inertias = seconds - firsts * distances * ~massless
+        inertias[np.abs(inertias) < _ROUNDING * np.abs(seconds)] = 0.0
+        wrong |= inertias < 0.0
+        if wrong.any():
+            leg = int(np.argmax(wrong))
+            raise ParameterError(
+                f'legs.{part} of {p["joints"][leg]}: mass {masses[leg]:g} kg, first moment '
+                f'{firsts[leg]:g} kg m, second moment {seconds[leg]:g} kg m^2: no body has these')
+        values[f'legs.{part}.mass'] = masses.copy()
+        values[f'legs.{part}.center_of_mass'] = distances
+        values[f'legs.{part}.inertia'] = inertias
+    values['actuator.reflected_mass'] = theta[REFLECTED_MASS].copy()
+    values['actuator.viscous_friction'] = theta[VISCOUS_FRICTION].copy()
+    values['actuator.coulomb_friction'] = theta[COULOMB_FRICTION].copy()
+    return values
+
+
+def about_origin(mass: float, center: Array, inertia: Array) -> Array:
+    """Return ixx ixy ixz iyy iyz izz about the origin of those about a center of mass (6,)."""
+    whole = inertia_matrix(inertia) + mass * (
+        np.dot(center, center) * np.eye(3) - np.outer(center, center))
+    six: Array = whole[np.triu_indices(3)]
+    return six

@@ -1,0 +1,114 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The result of the inverse dynamics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
+from stewart_dynamics.mechanics.singularity import time_to_crossing
+
+
+class InverseDynamics:
+    """
+    Lengths, rates and forces of the legs in a motion; (...) is the motion's leading shape.
+
+    Attributes
+    ----------
+    lengths : (..., 6)
+        [m]
+    rates : (..., 6)
+        Time derivatives of the lengths [m/s], + extends.
+    forces : (..., 6)
+        Of the actuators [N], + pushes.
+    unit_load_forces : (..., 6)
+        Largest force of each leg under a unit load on the platform: any force F and moment M
+        with F^2 + (M / l)^2 = 1, l the characteristic length.
+    determinant : (...)
+        det(J) := det(J_inv) [m^3].
+    determinant_rate : (...)
+        d(det(J))/dt [m^3/s].
+    condition_number : (...)
+        Ratio of the largest to the smallest singular value of J_inv, at least 1; the right
+        three columns of J_inv are divided by the characteristic length first.
+    time_to_crossing : (...)
+        Time after which det(J) is zero at its present rate [s]; inf: never.
+    rows : (..., RESULT)
+        All numbers of each sample in a row, laid out as ``mechanics.rows`` says; the other
+        attributes are views of them.
+
+    """
+
+    def __init__(self, rows: Array) -> None:
+        self.rows = rows
+
+    @property
+    def lengths(self) -> Array:
+        """Return the lengths [m], (..., 6)."""
+        return self.rows[..., LENGTHS]
+
+    @property
+    def rates(self) -> Array:
+        """Return the rates [m/s], (..., 6)."""
+        return self.rows[..., RATES]
+
+    @property
+    def forces(self) -> Array:
+        """Return the forces [N], (..., 6)."""
+        return self.rows[..., FORCES]
+
+    @property
+    def unit_load_forces(self) -> Array:
+        """Return the largest forces under a unit load (..., 6)."""
+        return self.rows[..., UNIT_LOAD_FORCES]
+
+    # [()] makes a number of an array without a shape.
+
+    @property
+    def determinant(self) -> Array:
+        """Return det(J) (...) [m^3]."""
+        return self.rows[..., DETERMINANT][()]
+
+    @property
+    def determinant_rate(self) -> Array:
+        """Return d(det(J))/dt (...) [m^3/s]."""
+        return self.rows[..., DETERMINANT_RATE][()]
+
+    @property
+    def condition_number(self) -> Array:
+        """Return the condition number of J_inv (...)."""
+        return self.rows[..., CONDITION][()]
+
+    @property
+    def time_to_crossing(self) -> Array:
+        """Return the time after which det(J) is zero (...) [s]."""
+        time: Array = time_to_crossing(self.determinant, self.determinant_rate)[()]
+        return time
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether shape and all numbers are equal."""
+        return type(other) is type(self) and np.array_equal(self.rows, other.rows)
+
+    # The arrays are mutable.
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return the shape, not the arrays."""
+        return (f'<InverseDynamics of shape {self.rows.shape[:-1]}: lengths, rates, forces, '
+                'unit_load_forces, determinant, determinant_rate, condition_number, '
+                'time_to_crossing>')

@@ -1,0 +1,228 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The motion of the base: gravity, acceleration and turning in base axes, one sample or many."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.arguments import (
+    as_array, check_finite, common_shape, optional_array, wrong_type)
+from stewart_dynamics.mechanics.dynamics.base_load import carried
+from stewart_dynamics.mechanics.frames.fields import listed, rows_of, Samples
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.pose import as_rotation, Pose, row_by_row
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
+    BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, ROTATION)
+from stewart_dynamics.mechanics.vectors import Matrix3, rotate, rotate_back, subtract, Vector3
+from stewart_dynamics.parameters.table import STANDARD_GRAVITY
+
+
+class BaseMotion(Samples):
+    """
+    How the base moves, in one sample or any leading shape of samples; all in base axes.
+
+    A constant velocity changes no force, so there is none. Leading shapes broadcast against each
+    other. The arrays are copied; ``base[3]``, ``base[::10]`` and ``len(base)`` work as for an
+    array of samples.
+
+    Parameters
+    ----------
+    gravity : (..., 3)
+        Acceleration of free fall [m/s^2]; it turns in base axes as the base turns.
+    linear_acceleration : (..., 3), optional
+        Of the base's origin [m/s^2]; zero by default.
+    angular_velocity, angular_acceleration : (..., 3), optional
+        Of the base [rad/s, rad/s^2]; zero by default.
+
+    Attributes
+    ----------
+    gravity, linear_acceleration, angular_velocity, angular_acceleration : (..., 3)
+        Read-only.
+    rows : (..., 12)
+        All numbers as the compiled functions take them, see ``mechanics.rows``.
+    shape : tuple of int
+        The leading shape; () for one sample.
+
+    Raises
+    ------
+    MotionError
+        The shapes do not fit, or a number is not finite.
+
+    """
+
+    def __init__(
+            self, gravity: ArrayLike, linear_acceleration: ArrayLike | None = None,
+            angular_velocity: ArrayLike | None = None,
+            angular_acceleration: ArrayLike | None = None) -> None:
+        parts = {'gravity': (GRAVITY, as_array('gravity', gravity, (3,)))}
+        for name, where, part in (
+                ('linear_acceleration', BASE_ACCELERATION, linear_acceleration),
+                ('angular_velocity', BASE_ANGULAR_VELOCITY, angular_velocity),
+                ('angular_acceleration', BASE_ANGULAR_ACCELERATION, angular_acceleration)):
+            if part is not None:
+                parts[name] = where, as_array(name, part, (3,))
+        self.rows = rows_of(BASE, parts)
+        self.shape = self.rows.shape[:-1]
+
+    @classmethod
+    def from_pose(cls, pose: Pose | Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
+        """
+        Return a base at rest that is tilted: gravity from its orientation.
+
+        Parameters
+        ----------
+        pose : Pose or Motion
+            Of the base frame in the world; only its rotation is used.
+        gravity : (..., 3)
+            World axes [m/s^2].
+
+        """
+        if not isinstance(pose, Pose | Motion):
+            raise wrong_type('pose', pose, 'a Pose or a Motion')
+        free_fall = as_array('gravity', gravity, (3,))
+        common_shape(pose=pose.shape, gravity=free_fall.shape[:-1])
+        with np.errstate(all='ignore'):
+            return cls.of_rows(_stacked(row_of_pose(
+                _columns(pose.rows[..., ROTATION]), _columns(free_fall))))
+
+    @classmethod
+    def from_motion(cls, motion: Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
+        """
+        Return the base motion of a motion of the base frame in the world.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of the base frame, as a Motion has that of a platform: all in world axes.
+        gravity : (..., 3)
+            World axes [m/s^2].
+
+        """
+        if not isinstance(motion, Motion):
+            raise wrong_type('motion', motion, 'a Motion')
+        free_fall = as_array('gravity', gravity, (3,))
+        common_shape(motion=motion.shape, gravity=free_fall.shape[:-1])
+        rotation, acceleration, spin, spin_rate = (
+            _columns(motion.rows[..., part]) for part in (
+                ROTATION, LINEAR_ACCELERATION, ANGULAR_VELOCITY, ANGULAR_ACCELERATION))
+        with np.errstate(all='ignore'):
+            return cls.of_rows(_stacked(
+                row_of_motion(rotation, acceleration, spin, spin_rate, _columns(free_fall))))
+
+    @classmethod
+    def from_imu(
+            cls, specific_force: ArrayLike, angular_velocity: ArrayLike,
+            angular_acceleration: ArrayLike | None = None, position: ArrayLike = (0.0, 0.0, 0.0),
+            rotation: ArrayLike | None = None) -> BaseMotion:
+        """
+        Return the base motion that an IMU fixed to the base measures.
+
+        No orientation is needed: gravity is in the specific force. It cannot be told from
+        acceleration, so ``gravity`` of the result is gravity less the acceleration of the base's
+        origin, and ``linear_acceleration`` is zero: the forces are the same.
+
+        Parameters
+        ----------
+        specific_force : (..., 3)
+            Reading of the accelerometer, IMU axes [m/s^2]: at rest 9.8 upward.
+        angular_velocity : (..., 3)
+            Reading of the gyroscope, IMU axes [rad/s].
+        angular_acceleration : (..., 3), optional
+            Its time derivative, IMU axes [rad/s^2]; zero by default.
+        position : (..., 3)
+            Of the IMU in the base frame [m].
+        rotation : (..., 3, 3), optional
+            IMU axes to base axes; the same axes by default.
+
+        """
+        force = as_array('specific_force', specific_force, (3,))
+        spin = as_array('angular_velocity', angular_velocity, (3,))
+        spin_rate = optional_array('angular_acceleration', angular_acceleration, (3,))
+        arm = as_array('position', position, (3,))
+        turn = np.eye(3) if rotation is None else as_rotation(rotation)
+        common_shape(specific_force=force.shape[:-1], angular_velocity=spin.shape[:-1],
+                     angular_acceleration=spin_rate.shape[:-1], position=arm.shape[:-1],
+                     rotation=turn.shape[:-2])
+        with np.errstate(all='ignore'):
+            return cls.of_rows(_stacked(row_of_imu(
+                _columns(force), _columns(spin), _columns(spin_rate), _columns(arm),
+                _columns(row_by_row(turn)))))
+
+    @property
+    def gravity(self) -> Array:
+        """Acceleration of free fall, base axes, (..., 3) [m/s^2]."""
+        return self._part(GRAVITY)
+
+    @property
+    def linear_acceleration(self) -> Array:
+        """Acceleration of the base's origin, base axes, (..., 3) [m/s^2]."""
+        return self._part(BASE_ACCELERATION)
+
+    @property
+    def angular_velocity(self) -> Array:
+        """Angular velocity, base axes, (..., 3) [rad/s]."""
+        return self._part(BASE_ANGULAR_VELOCITY)
+
+    @property
+    def angular_acceleration(self) -> Array:
+        """Angular acceleration, base axes, (..., 3) [rad/s^2]."""
+        return self._part(BASE_ANGULAR_ACCELERATION)
+
+    def _in_words(self) -> str:
+        return (f'gravity {listed(self.gravity)} m/s^2, acceleration '
+                f'{listed(self.linear_acceleration)} m/s^2, turning '
+                f'{listed(self.angular_velocity)} rad/s, {listed(self.angular_acceleration)} '
+                'rad/s^2')
+
+
+# The same for one sample and for many: each number is a float, or an array of samples.
+
+_STILL = (0.0, 0.0, 0.0)
+
+
+def row_of_pose(rotation: Matrix3, gravity: Vector3) -> tuple[Any, ...]:
+    """Return the row (BASE,) of a base at rest with base axes turned so in the world."""
+    return (*rotate_back(rotation, gravity), *_STILL, *_STILL, *_STILL)
+
+
+def row_of_motion(rotation: Matrix3, acceleration: Vector3, spin: Vector3, spin_rate: Vector3,
+                  gravity: Vector3) -> tuple[Any, ...]:
+    """Return the row (BASE,) of a base whose motion is given in world axes."""
+    return (*rotate_back(rotation, gravity), *rotate_back(rotation, acceleration),
+            *rotate_back(rotation, spin), *rotate_back(rotation, spin_rate))
+
+
+def row_of_imu(specific_force: Vector3, spin: Vector3, spin_rate: Vector3, position: Vector3,
+               rotation: Matrix3) -> tuple[Any, ...]:
+    """Return the row (BASE,) of what an IMU reads, IMU axes; its mounting in the base frame."""
+    spin, spin_rate = rotate(rotation, spin), rotate(rotation, spin_rate)
+    gravity = subtract(carried(spin, spin_rate, position), rotate(rotation, specific_force))
+    return (*gravity, *_STILL, *spin, *spin_rate)
+
+
+def _columns(array: Array) -> Any:
+    """Return the numbers of a vector or matrix, each as an array of samples."""
+    return tuple(np.moveaxis(array, -1, 0))
+
+
+def _stacked(row: tuple[Any, ...]) -> Array:
+    rows = np.stack(np.broadcast_arrays(*row), axis=-1)
+    return check_finite('base motion', rows, rows.ndim - 1)

@@ -1,0 +1,225 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The home pose of a hexapod, from its geometry and its limits.
+
+Home has parallel axes and the center of the platform joints above that of the base joints along
+the normal of their plane, at the height where the mean leg is halfway between the limits of its
+length, or has the zero length where there are no limits. Where no level pose with parallel axes
+has all legs within their limits, the platform is turned about the normal by the smallest angle
+that brings them there.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.parameters.table import Parameters
+
+# Largest length, in larger radii: legs have 1 to 10, legs given in mm 1000 times that.
+_LENGTH_RATIO = 100.0
+
+# Heights that are tried if the parameters do not give one, in larger radii.
+HEIGHTS = (0.3, 0.6, 1.0, 1.7, 3.0)
+_YAWS = np.deg2rad(np.arange(0.0, 360.0, 10.0))
+
+
+class Shape(NamedTuple):
+    """A hexapod's joints in axes of which the third is the normal of the base joints' plane."""
+
+    base: Array
+    """From their center (6, 3) [m]."""
+    platform: Array
+    """From their center (6, 3) [m], while the axes of both frames are parallel."""
+    axes: Array
+    """Those axes in the base frame (3, 3), row by row."""
+    base_radius: float
+    platform_radius: float
+
+    @property
+    def radius(self) -> float:
+        """Return the larger one [m]."""
+        return max(self.base_radius, self.platform_radius)
+
+
+class Reach(NamedTuple):
+    """The level poses within the limits of length."""
+
+    yaw: float | None
+    """The angle nearest to 0 at which all legs are within them at some height; else None."""
+    longest: float
+    """The longest leg to be expected [m]."""
+
+
+class Home(NamedTuple):
+    """The height of the platform at home."""
+
+    heights: Array
+    """Above the base joints' center, negative below it, the most likely first (N,) [m]."""
+    yaw: float
+    """Turn about the normal [rad]."""
+    length: float | None
+    """Of the mean leg [m]; None if the parameters do not give it."""
+
+    @property
+    def text(self) -> str:
+        """Return the pose in words."""
+        turned = f'turned by {math.degrees(self.yaw):.0f} degrees' if self.yaw else (
+            'the axes parallel')
+        return (f'{turned}, at any height' if self.length is None
+                else f'{turned}, a mean leg of {self.length:.3g} m')
+
+
+def home_pose(parameters: Parameters) -> Pose:
+    """
+    Return the home pose, on that side of the base where the normal's largest part is positive.
+
+    Raises
+    ------
+    ParameterError
+        Neither both limits of length nor a zero length that level legs can have give its height.
+
+    """
+    with np.errstate(all='ignore'):
+        shape = shape_of(parameters)
+        reach = reach_of(parameters, shape)
+        home = home_of(parameters, shape, reach)
+        if reach.yaw is None:
+            raise ParameterError('home pose: no level pose has all legs between '
+                                 'limits.length_min and limits.length_max')
+        if home.length is None:
+            raise ParameterError(
+                'home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
+                'must give a length that the legs can have in a level pose')
+        positions, rotations = homes(parameters)
+    return Pose(positions[0], rotations[0])
+
+
+def homes(parameters: Parameters) -> tuple[Array, Array]:
+    """
+    Return possible home poses, the most likely first.
+
+    Positions (N, 3) [m] and rotations (N, 3, 3). The normal of the base joints' plane may point up
+    or down, so half of them are on its other side; if the parameters do not give the height, there
+    are several.
+    """
+    with np.errstate(all='ignore'):
+        shape = shape_of(parameters)
+        home = home_of(parameters, shape, reach_of(parameters, shape))
+        return poses_of(parameters, shape, home.heights,
+                        turns_about(2, np.full(len(home.heights), home.yaw)))
+
+
+def shape_of(p: Parameters) -> Shape:
+    base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
+    around, carried = base - base.mean(axis=0), platform - platform.mean(axis=0)
+    axes = level_axes(around)
+    return Shape(around @ axes.T, carried @ axes.T, axes, mean_norm(around),
+                 mean_norm(carried))
+
+
+def level_axes(around: Array) -> Array:
+    """Return two axes in the plane of points, and its normal, (3, 3)."""
+    moments = around.T @ around
+    if not np.isfinite(moments).all():
+        return np.eye(3)
+    # The normal of a plane is the direction in which its points spread least.
+    normal = np.linalg.eigh(moments)[1][:, 0]
+    nearest = int(np.argmax(np.abs(normal)))
+    normal = normal * np.sign(normal[nearest])
+    first = np.cross(np.eye(3)[(nearest + 2) % 3], normal)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(normal, first), normal])
+
+
+def mean_norm(vectors: Array) -> float:
+    return float(np.mean(np.linalg.norm(vectors, axis=-1)))
+
+
+def is_too_long(p: Parameters, name: str, shape: Shape) -> bool:
+    return p[name] is not None and bool(np.max(p[name]) > _LENGTH_RATIO * shape.radius)
+
+
+def reach_of(p: Parameters, shape: Shape) -> Reach:
+    shortest, longest = p['limits.length_min'], p['limits.length_max']
+    low = np.zeros(6) if shortest is None else shortest
+    high = np.full(6, np.inf) if longest is None else longest
+    turned = turns_about(2, _YAWS) @ shape.platform.T  # (yaws, 3, 6)
+    offset = turned.swapaxes(-1, -2) - shape.base
+    along = offset[..., 2]
+    across = np.linalg.norm(offset[..., :2], axis=-1)
+    reached = np.zeros(len(_YAWS), dtype=bool)
+    for side in (1.0, -1.0):  # above the base, and below it
+        # The height of a leg is that of the platform plus the platform joint's own.
+        least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - side * along
+        most = np.where(high >= across, np.sqrt(np.abs(high ** 2 - across ** 2)), -np.inf)
+        reached |= least.max(axis=-1) <= (most - side * along).min(axis=-1)
+    angles = np.abs((_YAWS + np.pi) % (2.0 * np.pi) - np.pi)
+    yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else None
+    if longest is not None and not is_too_long(p, 'limits.length_max', shape):
+        return Reach(yaw, float(longest.max()))
+    return Reach(yaw, math.hypot(HEIGHTS[-1] * shape.radius, float(across.max())))
+
+
+def home_of(p: Parameters, shape: Shape, reach: Reach) -> Home:
+    """Return the possible heights of the platform at home."""
+    yaw = reach.yaw or 0.0
+    low, high = p['limits.length_min'], p['limits.length_max']
+    length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
+                           else 0.5 * (low + high)))
+    legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
+    if mean_norm(legs) < length < _LENGTH_RATIO * shape.radius:
+        heights = [side * _height(shape, side, legs, length) for side in (1.0, -1.0)]
+        return Home(np.array(heights), yaw, length)
+    heights = [side * height * shape.radius for side in (1.0, -1.0) for height in HEIGHTS]
+    return Home(np.array(heights), yaw, None)
+
+
+def _height(shape: Shape, side: float, legs: Array, length: float) -> float:
+    """Return the height above or below the base at which the mean leg has a length."""
+    raised = legs.copy()
+    low, high = 0.0, length + shape.base_radius + shape.platform_radius
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        raised[:, 2] = legs[:, 2] + side * middle
+        if mean_norm(raised) < length:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def poses_of(p: Parameters, shape: Shape, heights: Array, rotations: Array,
+             ) -> tuple[Array, Array]:
+    """Return positions (N, 3) and rotations (N, 3, 3) at these heights and turns of the shape."""
+    middle = p['geometry.platform_joints'].mean(axis=0)
+    rotations = shape.axes.T @ rotations @ shape.axes
+    positions = (p['geometry.base_joints'].mean(axis=0) - rotations @ middle
+                 + heights[:, None] * shape.axes[2])
+    return positions, rotations
+
+
+def turns_about(axis: int, angles: Array) -> Array:
+    """Return rotations about one of the axes, (N, 3, 3)."""
+    euler = np.zeros((len(angles), 3))
+    euler[:, axis] = angles
+    return from_euler(euler)

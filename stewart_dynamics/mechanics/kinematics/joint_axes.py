@@ -1,0 +1,163 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The axes from which the angles of the joints are measured, and the angles of a hexapod's joints.
+
+Axes that are not given are the directions of the legs at the home pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import math
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
+from stewart_dynamics.mechanics.kinematics.joint_angles import joint_angles, joint_haversines
+from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, HomeDirections
+from stewart_dynamics.mechanics.limits import ANGLES, OF_JOINTS
+from stewart_dynamics.mechanics.rows import JOINT_ANGLES
+from stewart_dynamics.parameters.table import Parameters
+
+BASE_AXES, PLATFORM_AXES = AXES = 'geometry.base_joint_axes', 'geometry.platform_joint_axes'
+
+# No ball joint or universal joint reaches this angle, 92 degrees [rad].
+_WIDEST = 1.6
+# A leg so far from its axis at home has another one [rad].
+_AWAY = 0.5 * math.pi
+
+
+class JointAngles:
+    """
+    The angles of a hexapod's joints.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+    needed : sequence of str
+        Of AXES; the angles of others are nan.
+
+    Attributes
+    ----------
+    axes : (12, 3)
+        Unit vectors from which the angles are measured: of the base joints in base axes, of the
+        platform joints in platform axes; nan those that are not needed.
+
+    Raises
+    ------
+    ParameterError
+        Axes that are needed are not given, and there is no home pose.
+
+    """
+
+    def __init__(self, parameters: Parameters, needed: Sequence[str] = AXES) -> None:
+        self._constants = hexapod_constants(parameters)
+        self.axes = np.concatenate([
+            axes if name in needed else np.full((6, 3), np.nan)
+            for name, axes in zip(AXES, _axes(parameters, needed), strict=True)])
+
+    def __call__(self, motions: Array) -> Array:
+        """Return the angles (N, JOINT_ANGLES) [rad] in motions (N, MOTION)."""
+        angles = np.empty((len(motions), JOINT_ANGLES))
+        batch.in_parts(self._angles, self._constants, batch.compact(motions), angles)
+        return angles
+
+    def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
+        """Return a function that gives the angles (JOINT_ANGLES,) in what is now in a row."""
+        angles = np.empty((1, JOINT_ANGLES))
+        compute = joint_angles.bound(
+            self._constants, self.axes, motion.reshape(1, len(motion)), angles)
+
+        def of_row() -> tuple[float, ...]:
+            compute()
+            return tuple(angles[0].tolist())
+
+        return of_row
+
+    def haversines(self, motions: Array) -> tuple[Array, Array]:
+        """Return sin^2(angle / 2) and its rate [1/s], both (N, JOINT_ANGLES), in motions."""
+        values, rates = (np.empty((len(motions), JOINT_ANGLES)) for _ in range(2))
+        joint_haversines(self._constants, self.axes, batch.compact(motions), values, rates)
+        return values, rates
+
+    def _angles(self, constants: Array, motions: Array, angles: Array) -> None:
+        joint_angles(constants, self.axes, motions, angles)
+
+
+def angles_to_check(parameters: Parameters, limits: Sequence[str]) -> JointAngles | None:
+    """Return the angles for those of the joints' limits that are given; none for none."""
+    needed = [axes for axes, limit in zip(AXES, OF_JOINTS, strict=True) if limit in limits]
+    return JointAngles(parameters, needed) if needed else None
+
+
+def likely_mistakes(parameters: Parameters) -> Iterator[str]:
+    """Yield likely mistakes in the joints' limits and axes, each in one line."""
+    for name in OF_JOINTS:
+        bounds = parameters[name]
+        if bounds is not None and bounds.max() > _WIDEST:
+            yield (f'{name}: {bounds.max():.3g} rad, {math.degrees(bounds.max()):.0f} degrees: '
+                   'more than any joint of a leg: in degrees?')
+    given = [axes for axes in AXES if parameters[axes] is not None]
+    if not given:
+        return  # the angles at home are zero; no machine code is loaded for that
+    try:
+        home = Motion.from_pose(home_pose(parameters)).rows
+    except ParameterError:
+        return  # without a home pose
+    angles = JointAngles(parameters, given)(home[None])[0]
+    for axes, (limit, where) in zip(AXES, ANGLES.items(), strict=True):
+        if axes not in given:
+            continue
+        at_home, bounds = angles[where], parameters[limit]
+        leg = int(np.argmax(at_home if bounds is None else at_home - bounds))
+        joint, angle = parameters['joints'][leg], at_home[leg]
+        if angle > _AWAY:
+            yield (f'{axes}: at home {joint} is {angle:.3g} rad from it: does it point from the '
+                   'platform to the base, or are the legs in another order?')
+        elif bounds is not None and angle > bounds[leg]:
+            yield (f'{limit}: {bounds[leg]:.3g} rad, but at home {joint} is {angle:.3g} rad from '
+                   f'its axis in {axes}')
+
+
+def _axes(p: Parameters, needed: Sequence[str]) -> list[Array]:
+    """Return the unit vectors of base joints and platform joints, (6, 3) each."""
+    with np.errstate(all='ignore'):
+        directions = _at_home(p, [name for name in needed if p[name] is None])
+        found = [at_home if p[name] is None else _unit(p[name])
+                 for name, at_home in zip(AXES, directions, strict=True)]
+    return found
+
+
+def _at_home(p: Parameters, missing: Sequence[str]) -> HomeDirections:
+    if missing:
+        try:
+            home_pose(p)
+        except ParameterError as exc:
+            raise ParameterError(f'{missing[0]}: missing, and {exc}') from exc
+    return home_directions(p)
+
+
+def _unit(vectors: Array) -> Array:
+    # Scaled first: the squares of very large or small numbers are out of range.
+    vectors = vectors / np.abs(vectors).max(axis=1, keepdims=True)
+    units: Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return units

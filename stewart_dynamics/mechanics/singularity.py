@@ -1,0 +1,169 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The singularity warning: thresholds, hysteresis, and prediction of crossings.
+
+Near det(J) = 0 leg forces grow as 1 / det. A crossing may be between two samples, so a change of
+sign counts as one; it is predicted from d(det)/dt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntEnum
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import inlined
+from stewart_dynamics.parameters.table import Parameters
+
+# At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of
+# sixteen: forces are neither computed nor published.
+UNSOLVABLE_CONDITION = 1e12
+
+# Hysteresis: a warning or stop ends below this part of the condition number at which it began,
+# or when the predicted time to the crossing exceeds the time divided by it.
+LEAVING = 0.8
+
+
+class Cause(IntEnum):
+    """Why the warning is on."""
+
+    NONE = 0
+    CONDITION = 1
+    PREDICTED = 2
+    CROSSED = 3
+
+    @property
+    def text(self) -> str:
+        """Return the cause as text."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Cause.NONE: 'none',
+    Cause.CONDITION: 'condition number above warn_condition',
+    Cause.PREDICTED: 'crossing of det(J) = 0 predicted within warn_time',
+    Cause.CROSSED: 'det(J) changed its sign since the last sample',
+}
+
+# The state after a sample as an array: the cause, whether the condition number is inside
+# stop_condition, the last det(J) that was not zero, time to crossing, changes of sign so far.
+CAUSE, STOPPED, LAST, TIME, CROSSINGS, STATE = range(6)
+
+# The thresholds as an array, in this order.
+WARN_CONDITION, STOP_CONDITION, WARN_TIME, THRESHOLDS = range(4)
+
+
+def time_to_crossing(determinant: ArrayLike, determinant_rate: ArrayLike) -> NDArray[Any]:
+    """Return the time after which det(J) is zero at its present rate [s]; inf if never."""
+    det, rate = np.asarray(determinant, dtype=float), np.asarray(determinant_rate, dtype=float)
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+        time = -det / rate
+    return np.where(time >= 0.0, time, np.inf)
+
+
+def thresholds(parameters: Parameters) -> Array:
+    """Return the thresholds that parameters give, (THRESHOLDS,)."""
+    values = np.empty(THRESHOLDS)
+    values[WARN_CONDITION] = parameters['singularity.warn_condition']
+    values[STOP_CONDITION] = parameters['singularity.stop_condition']
+    values[WARN_TIME] = parameters['singularity.warn_time']
+    return values
+
+
+@inlined
+def forget(state: Array) -> None:
+    """Reset the state but for the count of crossings: the next sample is the first."""
+    state[CAUSE] = Cause.NONE.value
+    state[STOPPED] = 0.0
+    state[LAST] = 0.0
+
+
+@inlined
+def advance(state: Array, limits: Array, determinant: float, determinant_rate: float,
+            condition: float) -> None:
+    """
+    Update a state by one more sample.
+
+    Parameters
+    ----------
+    state : (STATE,)
+        Written.
+    limits : (THRESHOLDS,)
+        The thresholds; what follows them in the array is not read.
+    determinant, determinant_rate, condition : float
+        Of the sample.
+
+    """
+    leaving = LEAVING if state[CAUSE] > 0.0 else 1.0
+    time = -determinant / determinant_rate if determinant_rate != 0.0 else math.inf
+    if not time >= 0.0:
+        time = math.inf
+    cause = Cause.NONE.value
+    if determinant * state[LAST] < 0.0:
+        cause = Cause.CROSSED.value
+        state[CROSSINGS] += 1.0
+    elif condition >= limits[WARN_CONDITION] * leaving:
+        cause = Cause.CONDITION.value
+    elif time < limits[WARN_TIME] / leaving:
+        cause = Cause.PREDICTED.value
+    stop = limits[STOP_CONDITION] * (LEAVING if state[STOPPED] > 0.0 else 1.0)
+    state[CAUSE], state[STOPPED], state[TIME] = cause, condition >= stop, time
+    if determinant != 0.0:
+        state[LAST] = determinant
+
+
+class Singularity(NamedTuple):
+    """The state of the warning after a sample; the first sample follows Singularity()."""
+
+    cause: Cause = Cause.NONE
+    stopped: bool = False
+    """Inside stop_condition."""
+    determinant: float = 0.0
+    """The last that was not zero."""
+    time_to_crossing: float = math.inf
+    crossings: int = 0
+    """Changes of sign of det(J) so far."""
+
+    @property
+    def warning(self) -> bool:
+        """Whether the warning is on."""
+        return self.cause is not Cause.NONE
+
+    @classmethod
+    def of(cls, numbers: Iterable[float]) -> Singularity:
+        """Return the state of an array (STATE,)."""
+        cause, stopped, determinant, time, crossings = numbers
+        return cls(_CAUSES[int(cause)], stopped > 0.0, determinant, time, int(crossings))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Return the state as numbers, in the order of an array (STATE,)."""
+        return self.cause, self.stopped, self.determinant, self.time_to_crossing, self.crossings
+
+    def after(self, parameters: Parameters, determinant: float, determinant_rate: float,
+              condition: float) -> Singularity:
+        """Return the state after one more sample."""
+        state = np.array(self.numbers, dtype=float)
+        advance(state, thresholds(parameters), determinant, determinant_rate, condition)
+        return Singularity.of(state.tolist())
+
+
+_CAUSES = tuple(Cause)  # far faster to look up by number than Cause(number)

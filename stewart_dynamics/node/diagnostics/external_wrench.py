@@ -1,0 +1,157 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The status ``external wrench``: there is one once a measurement has come."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+import math
+
+from stewart_dynamics.external_wrench.estimate import Estimate, Overload
+from stewart_dynamics.node.diagnostics.periodic_report import (
+    ERROR, Held, Level, LevelLog, LogLine, OK, STALE, Status, WARN)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.rejections import Rejection
+
+_NAME = 'external wrench'
+_NEVER = -math.inf
+_QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
+               'external_wrench.moment_max': ('moment', 'N m')}
+_COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'moment y (N m)',
+               'moment z (N m)')
+
+
+class ExternalWrenchDiagnostics:
+    """
+    Notes what becomes of measured legs.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names of the legs, and timeout.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._joints = parameters['joints']
+        self._timeout = parameters['setpoint.timeout']
+        self._begun = self._heard = self._estimated_at = _NEVER
+        self._estimated = 0
+        self._estimate: Estimate | None = None
+        self._target: Sequence[float] | None = None
+        self._rejections: Counter[Rejection] = Counter()
+        self._held = Held()
+        self._log = LevelLog(_NAME)
+        self._reported = OK  # the level in the last report
+
+    def heard(self, now: float) -> None:
+        """Note that a message came."""
+        self._heard = now
+        if self._begun == _NEVER:
+            self._begun = now
+
+    def silence(self, now: float) -> float:
+        """Return how long no message has come [s]."""
+        return now - self._heard
+
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
+        """Note a rejection."""
+        self._rejections[rejection] += 1
+        self._held.happened(
+            Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
+
+    def estimated(self, estimate: Estimate, target: Sequence[float] | None, now: float) -> bool:
+        """
+        Note an estimate and the last setpoint, a row of motion, None where there is none.
+
+        Return whether the level is another than in the last report.
+        """
+        self._estimate, self._target = estimate, target
+        if estimate.wrench is None:
+            return False
+        self._estimated += 1
+        self._estimated_at = now
+        self._held.see(Level(ERROR if estimate.overloads else OK,
+                             ', '.join(map(_words, estimate.overloads))), now)
+        return self._held.level(now) != self._reported
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+        if self._begun == _NEVER:
+            return OK
+        return STALE if self._is_stale(now) else self._held.level(now)
+
+    def status(self, now: float) -> Status | None:
+        """Return the status, None before a measurement has come."""
+        self._reported = self.level(now)
+        if self._begun == _NEVER:
+            return None
+        values = [('wrenches', str(self._estimated))]
+        if self._estimated:
+            values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
+        if self._estimate is not None:
+            values += self._numbers(self._estimate)
+        values += [(f'rejected, {topic}: {reason}', str(n))
+                   for (topic, reason), n in sorted(self._rejections.items())]
+        return Status(_NAME, *self._state(now), tuple(values))
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return the changes of level."""
+        return self._log.lines(self._state(now))
+
+    def _is_stale(self, now: float) -> bool:
+        last = max(self._begun, self._estimated_at)
+        return last != _NEVER and now - last > self._timeout
+
+    def _state(self, now: float) -> Level:
+        held = self._held.at(now)
+        if not self._is_stale(now):
+            return Level(held.level, held.message or 'no overload')
+        silent = now - self._heard
+        return Level(STALE, 'no wrench: ' + (
+            f'measured_legs silent for {silent:.1f} s' if silent > self._timeout
+            else held.message or 'measurements are farther apart than setpoint.timeout, '
+            f'{self._timeout:g} s'))
+
+    def _numbers(self, estimate: Estimate) -> list[tuple[str, str]]:
+        values = []
+        if estimate.wrench is not None and estimate.differences is not None:
+            values = [('force (N)', f'{estimate.force:.6g}'),
+                      ('moment (N m)', f'{estimate.moment:.6g}'),
+                      *((key, f'{value:.6g}') for key, value in zip(
+                          _COMPONENTS, estimate.wrench, strict=True))]
+            differences = estimate.differences
+            worst = max(range(6), key=lambda leg: abs(differences[leg]))
+            values += [('largest measured - model force of a leg (N)',
+                        f'{differences[worst]:.6g}'), ('its leg', self._joints[worst])]
+        if self._target is not None:
+            distance, angle = _apart(estimate.motion, self._target)
+            values += [('distance from the last setpoint (m)', f'{distance:.6g}'),
+                       ('turn from the last setpoint (rad)', f'{angle:.6g}')]
+        return values
+
+
+def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:
+    """Return how far two rows of motion are apart [m] and turned against each other [rad]."""
+    # The difference of two rotations has the norm sqrt(8) sin(angle / 2), exact for small angles.
+    half = math.dist(motion[3:12], target[3:12]) / math.sqrt(8.0)
+    return math.dist(motion[:3], target[:3]), 2.0 * math.asin(min(half, 1.0))
+
+
+def _words(overload: Overload) -> str:
+    quantity, unit = _QUANTITIES[overload.limit]
+    return (f'{quantity} {overload.value:.6g} {unit} is {overload.value - overload.bound:.6g} '
+            f'{unit} above {overload.limit}')

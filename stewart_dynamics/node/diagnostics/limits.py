@@ -1,0 +1,149 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The status ``limits``: each kind of limit has a state, a line and a peak of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from stewart_dynamics.mechanics.limits import ANGLES, Exceedance, FORCE_MAX, LIMITS, QUANTITIES
+from stewart_dynamics.node.diagnostics.periodic_report import (
+    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status)
+from stewart_dynamics.node.diagnostics.setpoints import Answers
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.step import Output
+
+_NAME = 'limits'
+
+
+class _Limit:
+    """What is known of one kind of limit."""
+
+    def __init__(self) -> None:
+        self.held = Held()
+        self.log = LevelLog(_NAME)
+        self.setpoints = 0
+        """How many have exceeded it."""
+        self.worst: Exceedance | None = None
+
+    def see(self, exceeded: Sequence[Exceedance], words: Callable[[Exceedance], str],
+            now: float) -> None:
+        """Note which legs exceed it with a setpoint."""
+        if not exceeded:
+            self.held.see(FINE, now)
+            return
+        self.held.see(Level(ERROR, ', '.join(map(words, exceeded))), now)
+        self.setpoints += 1
+        worst = self.worst
+        self.worst = max([*exceeded, worst] if worst else exceeded, key=_amount)
+
+
+class LimitsDiagnostics:
+    """
+    Notes which limits setpoints exceed, and the largest force demanded.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names of the legs, and which limits are given.
+    answers : Answers
+        The setpoints that were answered.
+
+    """
+
+    def __init__(self, parameters: Parameters, answers: Answers) -> None:
+        self._joints: tuple[str, ...] = parameters['joints']
+        self._parameters = parameters
+        self._answers = answers
+        self._output: Output | None = None
+        self._limits = {name: _Limit() for name in LIMITS}
+        self._exceeding = False
+        self._held = False  # one of them may be held
+        self._largest_force, self._its_leg = 0.0, 0
+
+    def answered(self, output: Output, now: float) -> None:
+        """Note an output."""
+        self._output = output
+        forces = output.demanded_forces
+        if forces is not None:
+            largest = abs(self._largest_force)
+            # These two take less time than abs of each.
+            if max(forces) > largest or min(forces) < -largest:
+                self._largest_force = max(forces, key=abs)
+                self._its_leg = forces.index(self._largest_force)
+        if output.exceedances or self._exceeding:
+            self._held = True
+            self._exceeding = bool(output.exceedances)
+            for name, limit in self._limits.items():
+                limit.see([each for each in output.exceedances if each.limit == name],
+                          self._words, now)
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+        if not self._held:
+            return OK
+        level = max([limit.held.level(now) for limit in self._limits.values()])
+        self._held = level > OK
+        return level
+
+    def status(self, now: float) -> Status:
+        """Return the status."""
+        output = self._output
+        if output is None:
+            return Status(_NAME, OK, 'no setpoint yet', ())
+        values = [(f'{leg}: length (m)', f'{length:.6g}') for leg, length in
+                  zip(self._joints, output.lengths, strict=True)]
+        values += [(f'{leg}: rate (m/s)', f'{rate:.6g}') for leg, rate in
+                   zip(self._joints, output.rates, strict=True)]
+        if output.demanded_forces is not None:
+            values += [(f'{leg}: force demanded (N)', f'{force:.6g}') for leg, force in
+                       zip(self._joints, output.demanded_forces, strict=True)]
+        if output.joint_angles:
+            values += [(f'{leg}: {quantity} ({unit})', f'{angle:.6g}')
+                       for limit, where in ANGLES.items() if self._parameters[limit] is not None
+                       for quantity, unit in [QUANTITIES[limit]]
+                       for leg, angle in zip(
+                           self._joints, output.joint_angles[where], strict=True)]
+        if self._largest_force:
+            values += [
+                ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
+                ('leg of the largest force demanded', self._joints[self._its_leg])]
+        for name, limit in self._limits.items():
+            if limit.worst is not None:
+                values += [(f'setpoints that exceed {name}', str(limit.setpoints)),
+                           (f'worst since activation, {name}', self._words(limit.worst))]
+        found = [limit.held.at(now).message for limit in self._limits.values()]
+        message = '; '.join(filter(None, found)) or 'all held'
+        return Status(_NAME, self.level(now), message + self._answers.age(now), tuple(values))
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return the changes of each kind of limit."""
+        return [line for name, limit in self._limits.items()
+                for line in limit.log.lines(self._state(name, limit, now))]
+
+    def _state(self, name: str, limit: _Limit, now: float) -> Level:
+        state = limit.held.at(now)
+        if state.message or limit.worst is None:
+            return state
+        return Level(state.level, f'{name}: no longer exceeded; {limit.setpoints} setpoints since '
+                     f'activation, worst: {self._words(limit.worst)}')
+
+    def _words(self, exceedance: Exceedance) -> str:
+        clipped = ', clipped' if exceedance.limit == FORCE_MAX else ''
+        return exceedance.words(self._joints) + clipped
+
+
+def _amount(exceedance: Exceedance) -> float:
+    return abs(abs(exceedance.value) - exceedance.bound)

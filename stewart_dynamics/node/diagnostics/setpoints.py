@@ -1,0 +1,211 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The status ``setpoints``: which topics are silent, what is rejected, and who else publishes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+import math
+
+from stewart_dynamics.node.diagnostics.periodic_report import (
+    ERROR, Held, Level, LogLine, STALE, Status, WARN)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.ros.repeated_events import SECONDS
+from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection
+
+_NEVER = -math.inf
+
+# Setpoint messages arrive for so long, but no setpoint is complete: that is logged [s].
+_PATIENCE = 0.9
+
+
+class Answers:
+    """
+    How many setpoints have been answered, and when the last one was.
+
+    Parameters
+    ----------
+    timeout : float
+        After this time the last one is old [s].
+    now : float
+        From when on they are counted.
+
+    """
+
+    def __init__(self, timeout: float, now: float) -> None:
+        self.number = 0
+        self.at = now
+        self._timeout = timeout
+
+    def add(self, now: float) -> None:
+        """Note an answer."""
+        self.number += 1
+        self.at = now
+
+    def stale(self, now: float) -> bool:
+        """Return whether there is none, or only an old one."""
+        return not self.number or now - self.at > self._timeout
+
+    def age(self, now: float) -> str:
+        """Return how old the last one is, in words to append, where it is old."""
+        if not self.number or not self.stale(now):
+            return ''
+        return f' (of the last setpoint, {now - self.at:.1f} s ago)'
+
+
+class SetpointDiagnostics:
+    """
+    Notes what becomes of setpoint messages.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Timeout and tolerance.
+    topics : sequence of str
+        The setpoint topics that are joined.
+    answers : Answers
+        The setpoints that were answered.
+    now : float
+        The time.
+
+    """
+
+    def __init__(self, parameters: Parameters, topics: Sequence[str], answers: Answers,
+                 now: float) -> None:
+        self._timeout: float = parameters['setpoint.timeout']
+        self._tolerance: float = parameters['setpoint.sync_tolerance']
+        self._answers = answers
+        self._heard = dict.fromkeys(topics, _NEVER)
+        self._writers: dict[str, int] = {}
+        self._readers: dict[str, int] = {}
+        self._namesakes = '', 1
+        self._lines: list[LogLine] = []
+        self._trouble: list[str] = []  # who publishes that should not
+        self._rejections: Counter[Rejection] = Counter()
+        self._rejected = Held()
+        self._incomplete = Held()
+        # Since when messages arrive that complete no setpoint, as reports have seen it.
+        self._incomplete_since = math.inf
+        self._warned_at = _NEVER
+        # When the last windows of a second began, and how many answers there were.
+        self._windows = [(now, 0), (now, 0)]
+
+    def heard(self, topic: str, now: float) -> None:
+        """Note that a message came on a setpoint topic."""
+        self._heard[topic] = now
+
+    def found(self, writers: Mapping[str, int], readers: Mapping[str, int], name: str,
+              namesakes: int) -> None:
+        """
+        Note who else takes part.
+
+        Parameters
+        ----------
+        writers : mapping of topic to int
+            How many publishers setpoint topics have; others keep their number.
+        readers : mapping of topic to int
+            How many subscribers the topics have that controllers read.
+        name : str
+            The node's name.
+        namesakes : int
+            How many nodes have it.
+
+        """
+        self._writers.update(writers)
+        self._readers.update(readers)
+        alone = self._namesakes[1] <= 1
+        self._namesakes = name, namesakes
+        self._trouble = [f'{topic} has {n} writers' for topic, n in self._writers.items() if n > 1]
+        if namesakes > 1:
+            self._trouble.append(f'{namesakes} nodes are named {name}')
+            if alone:
+                self._lines = [LogLine(WARN, f'setpoints: {self._trouble[-1]}')]
+
+    def found_writers(self, topic: str, writers: int) -> None:
+        """Note how many publishers one setpoint topic has."""
+        if writers != self._writers.get(topic):
+            self.found({topic: writers}, {}, *self._namesakes)
+
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
+        """Note a rejection."""
+        self._rejections[rejection] += 1
+        held = self._incomplete if rejection.reason == NOT_JOINED else self._rejected
+        held.happened(Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+        if self._trouble:
+            return ERROR
+        if self._answers.stale(now):
+            return STALE
+        return max(self._rejected.level(now), self._incomplete.level(now))
+
+    def status(self, now: float) -> Status:
+        """Return the status; the rate is that of the last one or two seconds."""
+        answers = self._answers
+        (begin, before), (last, _) = self._windows
+        seconds = now - begin
+        rate = (answers.number - before) / seconds if seconds > 0.0 else 0.0
+        # Reports come at changes of level as well, and may be much less than a second apart.
+        if now - last >= 1.0:
+            self._windows = [self._windows[1], (now, answers.number)]
+        values = [('setpoints answered', str(answers.number)), ('rate (Hz)', f'{rate:.1f}')]
+        if answers.number:
+            values.append(('age of the last (s)', f'{now - answers.at:.3f}'))
+        values += [(f'{topic}: last heard (s ago)', 'never' if at == _NEVER
+                    else f'{now - at:.3f}') for topic, at in self._heard.items()]
+        values += [(f'{topic}: writers', str(n)) for topic, n in self._writers.items()]
+        values += [(f'{topic}: readers', str(n)) for topic, n in self._readers.items()]
+        values += [(f'rejected, {topic}: {reason}', str(n))
+                   for (topic, reason), n in sorted(self._rejections.items())]
+        return Status('setpoints', self.level(now), self._message(now), tuple(values))
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """
+        Return the warnings: another node of this name; messages that complete no setpoint.
+
+        Nothing else: rejections are logged one by one, and without setpoints there is no
+        fault.
+        """
+        lines, self._lines = self._lines, []
+        last = max(self._heard.values())
+        if last <= self._answers.at:
+            self._incomplete_since = math.inf
+            return lines
+        self._incomplete_since = min(self._incomplete_since, now)
+        if (last - self._incomplete_since < _PATIENCE or last <= self._warned_at
+                or now - self._warned_at < SECONDS or self._rejected.level(now)):
+            return lines
+        self._warned_at = now
+        return [*lines, LogLine(WARN, f'setpoints: {self._no_setpoint(now)}')]
+
+    def _message(self, now: float) -> str:
+        found = list(self._trouble)
+        if self._answers.stale(now):
+            found.append(self._no_setpoint(now))
+        if found:
+            return ', '.join(found)
+        rejected, incomplete = self._rejected.at(now), self._incomplete.at(now)
+        return rejected.message or incomplete.message or 'answered'
+
+    def _no_setpoint(self, now: float) -> str:
+        """Return why there is no setpoint: silence, rejections or stamps."""
+        silent = ', '.join(
+            f'{topic} never came' if at == _NEVER else f'{topic} silent for {now - at:.1f} s'
+            for topic, at in self._heard.items() if now - at > self._timeout)
+        return 'no setpoint: ' + (silent or self._rejected.at(now).message or (
+            'all topics arrive, but none is joined: their stamps differ by more than '
+            f'setpoint.sync_tolerance, {self._tolerance:g} s'))

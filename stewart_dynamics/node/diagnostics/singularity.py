@@ -1,0 +1,160 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The status ``singularity``: how near one is, why the warning is on, and each crossing."""
+
+from __future__ import annotations
+
+from stewart_dynamics.mechanics.singularity import Cause, LEAVING
+from stewart_dynamics.node.diagnostics.periodic_report import (
+    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, PERIOD, Status, WARN)
+from stewart_dynamics.node.diagnostics.setpoints import Answers
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.step import Output
+
+_NAME = 'singularity'
+
+
+def singularity_state(output: Output, parameters: Parameters) -> Level:
+    """Return the level of one output, and its cause with the output's own numbers."""
+    if not output.solvable:
+        return Level(ERROR, 'J_inv cannot be solved: no forces')
+    state = output.singularity
+    if state.stopped:
+        is_suppressed = output.forces is None and output.demanded_forces is not None
+        suppressed = ': forces suppressed' if is_suppressed else ''
+        return Level(ERROR, f'inside stop_condition{suppressed}: '
+                     + _condition(output, parameters, 'stop_condition'))
+    if not state.warning:
+        return FINE
+    if state.cause is Cause.CROSSED:
+        return Level(ERROR, 'det(J) crossed zero since the last setpoint')
+    if state.cause is Cause.CONDITION:
+        return Level(WARN, _condition(output, parameters, 'warn_condition'))
+    time, bound = state.time_to_crossing, parameters['singularity.warn_time']
+    ends = '' if time < bound else f' (the warning ends above {bound / LEAVING:g} s)'
+    return Level(WARN, f'crossing of det(J) = 0 predicted in {time:.3g} s, singularity.warn_time '
+                 f'is {bound:g} s{ends}')
+
+
+def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
+    bound, condition = parameters[f'singularity.{threshold}'], output.condition
+    if condition >= bound:
+        return f'condition number {condition:.4g} exceeds singularity.{threshold}, {bound:g}'
+    return (f'condition number {condition:.4g} has exceeded singularity.{threshold}, {bound:g}, '
+            f'and is not yet below {LEAVING * bound:g}')
+
+
+class SingularityDiagnostics:
+    """
+    Notes how near a singularity setpoints come.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names of the legs, thresholds. Others may take their place at any time.
+    answers : Answers
+        The setpoints that were answered.
+    now : float
+        The time.
+
+    """
+
+    def __init__(self, parameters: Parameters, answers: Answers, now: float) -> None:
+        self.parameters = parameters
+        self._answers = answers
+        self._output: Output | None = None
+        self._state, self._crossing = Held(), Held()
+        self._log = LevelLog(_NAME)
+        self._crossed = False  # with the last setpoint
+        self._crossing_held = False  # it may be
+        self._crossings: list[str] = []  # since the last report
+        self._crossing_logged_at = -PERIOD
+        self._largest = self._second_largest = self._second_before_largest = 1.0
+        self._second_begin = now
+
+    def answered(self, output: Output, now: float) -> bool:
+        """Note an output; return whether it is to be reported at once, whatever the level."""
+        before, self._output = self._output, output
+        if output.condition > self._second_largest:
+            self._second_largest = output.condition
+            self._largest = max(self._largest, output.condition)
+        state = singularity_state(output, self.parameters)
+        if output.singularity.cause is not Cause.CROSSED:
+            self._state.see(state, now)
+            if self._crossed:
+                self._crossing.see(FINE, now)
+                self._crossed = False
+            return False
+        self._crossed = self._crossing_held = True
+        crossing = Level(ERROR, _crossing(before, output))
+        self._crossings.append(crossing.message)
+        self._crossing.see(crossing, now)
+        stopped = output.singularity.stopped or not output.solvable
+        self._state.see(state if stopped else FINE, now)
+        return now - self._crossing_logged_at >= PERIOD
+
+    def level(self, now: float) -> int:
+        """Return the present level."""
+        level = self._state.level(now)
+        return max(level, self._crossing.level(now)) if self._crossing_held else level
+
+    def status(self, now: float) -> Status:
+        """Return the status."""
+        output = self._output
+        if output is None:
+            return Status(_NAME, OK, 'no setpoint yet', ())
+        forces = output.unit_load_forces
+        worst = max(range(6), key=forces.__getitem__)
+        crossing = output.singularity.time_to_crossing
+        of_the_last_second = max(
+            output.condition, self._second_largest, self._second_before_largest)
+        if now - self._second_begin >= 1.0:
+            self._second_begin = now
+            self._second_before_largest, self._second_largest = self._second_largest, 1.0
+        found = [held.at(now).message for held in (self._crossing, self._state)]
+        message = '; '.join(filter(None, found)) or 'clear'
+        return Status(_NAME, self.level(now), message + self._answers.age(now), (
+            ('det(J) (m^3)', f'{output.determinant:.9g}'),
+            ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
+            ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
+            ('crossings', str(output.singularity.crossings)),
+            ('condition number', f'{output.condition:.6g}'),
+            ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
+            ('worst condition number since activation', f'{self._largest:.6g}'),
+            ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
+            ('its leg', self.parameters['joints'][worst])))
+
+    def log_lines(self, now: float) -> list[LogLine]:
+        """Return the crossing since the last report, and the change of level besides."""
+        lines = []
+        if self._crossings:
+            many = len(self._crossings)
+            how_many = f' (the last of {many} crossings)' if many > 1 else ''
+            lines = [LogLine(ERROR, f'{_NAME}: {self._crossings[-1]}{how_many}')]
+            self._crossings = []
+            self._crossing_logged_at = now
+        state = self._state.at(now)
+        return lines + self._log.lines(Level(state.level, state.message or 'clear'))
+
+
+def _crossing(before: Output | None, output: Output) -> str:
+    """Return when det(J) crossed zero, on a straight line between two outputs."""
+    seconds, nanoseconds = divmod(output.stamp, 1_000_000_000)
+    stamp = f'stamp {seconds}.{nanoseconds:09d} s'
+    passed = 0 if before is None else output.stamp - before.stamp
+    if before is None or passed <= 0:
+        return f'det(J) crossed zero before {stamp}'
+    now, then = abs(output.determinant), abs(before.determinant)
+    return f'det(J) crossed zero {passed * 1e-9 * now / (now + then):.3g} s before {stamp}'

@@ -1,0 +1,291 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The markers of an answer for RViz and Foxglove: base, platform and legs coloured by force.
+
+They are one visualization_msgs/MarkerArray in bytes (CDR), made once for a set of parameters; for
+an answer only stamp, poses, lengths, colours and the text are written into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import pack, Struct
+
+import numpy as np
+from stewart_dynamics.arrays import Array, Six
+from stewart_dynamics.mechanics.frames.rotation import quaternion_of
+from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
+from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN
+from stewart_dynamics.node.diagnostics.singularity import singularity_state
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.step import Output
+from visualization_msgs.msg import Marker
+
+Color = tuple[float, float, float, float]
+
+# Okabe and Ito's blue, vermillion and yellow, distinct for the colour-blind. A leg without load is
+# nearly white: the darker a leg, the larger its force, whether it pushes or pulls.
+PUSH: Color = (0.835, 0.369, 0.0, 1.0)
+PULL: Color = (0.0, 0.447, 0.698, 1.0)
+NO_LOAD: Color = (0.95, 0.95, 0.95, 1.0)
+NO_FORCE: Color = (0.4, 0.4, 0.4, 1.0)
+PLATFORM: dict[int, Color] = {
+    OK: (0.62, 0.7, 0.76, 1.0), WARN: (0.941, 0.894, 0.259, 1.0), ERROR: PUSH}
+_BASE: Color = (0.3, 0.32, 0.35, 1.0)
+_JOINT: Color = (0.12, 0.12, 0.12, 1.0)
+_CENTER_OF_MASS: Color = (0.8, 0.475, 0.655, 1.0)  # Okabe and Ito's reddish purple
+_WHITE: Color = (1.0, 1.0, 1.0, 1.0)
+_AXES: list[Color] = [(0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.3, 0.9, 1.0)]
+
+# In terms of the platform's size, the mean distance of its joints from their center.
+_BARREL, _ROD, _BALL, _PLATE, _AXIS, _LINE = 0.1, 0.055, 0.14, 0.05, 1.2, 0.02
+_HEAVY = 0.2  # the ball at the centre of mass
+_TEXT_SIZE, _TEXT_ABOVE = 0.11, 1.4
+_NAME_OUTSIDE = 0.15  # in terms of the base's
+# The barrel's length, in terms of limits.length_min, or without it of the leg's length.
+_OF_SHORTEST, _OF_LENGTH = 0.9, 0.5
+
+# Markers stay so long [s]: setpoints that are sent by hand come once in a second. Where the
+# rate is lower it is two periods, a day at most: a Duration holds no more than 68 years.
+STAYS = 2.0
+_LONGEST = 86400.0
+
+_STAMP = Struct('<iI')
+_POSE = Struct('<7d')
+_POSE_AND_SCALE = Struct('<10d')
+_COLOR = Struct('<4f')  # it follows the scale
+_COUNT = Struct('<I')
+# Two empty names, an empty file and a bool.
+_BEHIND_TEXT = 8 + 8 + 5
+
+
+class Markers:
+    """
+    Writes the markers of a hexapod.
+
+    A leg is a piston, from joint to joint, in a cylinder that begins at the base joint. Their
+    colour goes from white to vermillion as the leg pushes with up to ``limits.force_max``, to blue
+    as it pulls; where there is no such limit, with up to the largest of the six forces. They are
+    grey where no forces are published. The platform is grey blue, yellow while the singularity
+    warning is on, and vermillion inside ``singularity.stop_condition`` and at a crossing. A purple
+    ball is the platform's centre of mass.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Geometry, centre of mass, limits, thresholds, names and ``visualization_rate``. Some of
+        them may change while the node is active: other parameters need other ``Markers``.
+
+    """
+
+    # Near the end of what a double holds sizes overflow: nothing is answered there, nor drawn.
+    @np.errstate(all='ignore')
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._names = parameters['joints']
+        self._base = parameters['geometry.base_joints']
+        self._platform = parameters['geometry.platform_joints']
+        self._bounds = parameters['limits.force_max']
+        self._shortest = parameters['limits.length_min']
+        size = float(np.mean(np.linalg.norm(
+            self._platform - self._platform.mean(axis=0), axis=1)))
+        self._radii = np.repeat([_BARREL * size, _ROD * size], 6)
+        self._text_above = _TEXT_ABOVE * size
+        self._frame = parameters['base_frame']
+        rate = parameters['visualization_rate']
+        self._stays = min(max(STAYS, 2.0 / rate if rate else 0.0), _LONGEST)
+
+        ball, line = (_BALL * size,) * 3, (_LINE * size, 0.0, 0.0)
+        text_size = 0.0, 0.0, _TEXT_SIZE * size
+        thickness = _PLATE * size
+        axes = np.zeros((6, 3))
+        axes[[1, 3, 5], [0, 1, 2]] = _AXIS * size
+        self._stamps: list[int] = []
+        self._body = bytearray(LITTLE_ENDIAN)
+        self._put(4, 'I', 0)  # how many there are
+        self._marker('base', 0, Marker.TRIANGLE_LIST, _BASE, points=_plate(self._base, thickness))
+        self._marker('base', 1, Marker.SPHERE_LIST, _JOINT, ball, self._base)
+        outside = self._base + _NAME_OUTSIDE * (self._base - self._base.mean(axis=0))
+        for n, name in enumerate(self._names):
+            self._marker('names', n, Marker.TEXT_VIEW_FACING, _WHITE, text_size,
+                         position=outside[n], text=name)
+        self._plate = self._marker('platform', 0, Marker.TRIANGLE_LIST, PLATFORM[OK],
+                                   points=_plate(self._platform, thickness))
+        self._with_platform = [
+            self._plate,
+            self._marker('platform', 1, Marker.SPHERE_LIST, _JOINT, ball, self._platform),
+            self._marker('platform', 2, Marker.LINE_LIST, _WHITE, line, axes,
+                         [color for color in _AXES for _ in range(2)]),
+            self._marker('platform', 3, Marker.SPHERE_LIST, _CENTER_OF_MASS, (_HEAVY * size,) * 3,
+                         parameters['platform.center_of_mass'][None])]
+        self._bodies = [self._marker('cylinders' if n < 6 else 'pistons', n % 6, Marker.CYLINDER,
+                                     NO_FORCE) for n in range(12)]
+        self._text = self._marker('singularity', 0, Marker.TEXT_VIEW_FACING, _WHITE, text_size)
+        _COUNT.pack_into(self._body, len(LITTLE_ENDIAN), len(self._stamps))
+        # Its text is of any length: what stands before it is kept, and what behind it.
+        self._end = bytes(self._body[-_BEHIND_TEXT:])
+        del self._body[-_BEHIND_TEXT - 8:]
+
+    def write(self, motion: Sequence[float], output: Output) -> bytes:
+        """
+        Return the message.
+
+        Parameters
+        ----------
+        motion : sequence of float
+            That of the setpoint, laid out as for ``inverse_dynamics``.
+        output : Output
+            The result for the setpoint.
+
+        """
+        body = self._body
+        stamp = divmod(output.stamp, 1_000_000_000)
+        for at in self._stamps:
+            _STAMP.pack_into(body, at, *stamp)
+        rotation = np.reshape(motion[3:12], (3, 3))
+        pose = (*motion[:3], *quaternion_of(motion[3:12]))
+        for at in self._with_platform:
+            _POSE.pack_into(body, at, *pose)
+        level, message = singularity_state(output, self._parameters)
+        _put_color(body, self._plate, PLATFORM[level])
+
+        vectors = motion[:3] + self._platform @ rotation.T - self._base
+        colors = 2 * self._colors(output.forces)
+        for at, numbers, color in zip(
+                self._bodies, self._cylinders(vectors, output.lengths), colors, strict=True):
+            _POSE_AND_SCALE.pack_into(body, at, *numbers)
+            _put_color(body, at, color)
+
+        x, y, z = motion[:3]
+        _POSE.pack_into(body, self._text, x, y, z + self._text_above, 0.0, 0.0, 0.0, 1.0)
+        text = self._words(output, message).encode() + b'\x00'
+        return b''.join((body, _COUNT.pack(len(text)), text, bytes(-len(text) % 4), self._end))
+
+    def _cylinders(self, vectors: Array, of_legs: Six) -> list[list[float]]:
+        """Return pose and scale of six cylinders and of six pistons, ten numbers each."""
+        lengths = np.array(of_legs)
+        along = vectors / lengths[:, None]
+        barrels = _OF_LENGTH * lengths
+        if self._shortest is not None:
+            barrels = np.minimum(_OF_SHORTEST * self._shortest, lengths)
+        numbers = np.zeros((12, 10))
+        numbers[:6, :3] = self._base + 0.5 * barrels[:, None] * along
+        numbers[6:, :3] = self._base + 0.5 * vectors
+        # The rotation that turns z into a direction on the shortest way. The one up is taken of
+        # the two that a cylinder has: half the way is far from upside down then.
+        up = np.copysign(1.0, along[:, 2:]) * along
+        half = np.sqrt(0.5 + 0.5 * up[:, 2])
+        numbers[:, 3] = np.tile(-0.5 * up[:, 1] / half, 2)
+        numbers[:, 4] = np.tile(0.5 * up[:, 0] / half, 2)
+        numbers[:, 6] = np.tile(half, 2)
+        numbers[:, 7] = numbers[:, 8] = self._radii
+        numbers[:6, 9], numbers[6:, 9] = barrels, lengths
+        rows: list[list[float]] = numbers.tolist()
+        return rows
+
+    def _full(self, forces: Six) -> Sequence[float]:
+        """Return the force of each leg at which its colour is saturated."""
+        if self._bounds is not None:
+            bounds: list[float] = self._bounds.tolist()
+            return bounds
+        return [max(map(abs, forces)) or 1.0] * 6
+
+    def _colors(self, forces: Six | None) -> list[Color]:
+        if forces is None:
+            return [NO_FORCE] * 6
+        return [_between(NO_LOAD, PUSH if force > 0.0 else PULL, abs(force) / full)
+                for force, full in zip(forces, self._full(forces), strict=True)]
+
+    def _words(self, output: Output, message: str) -> str:
+        lines = [f'det(J) {output.determinant:.4g} m^3, condition number {output.condition:.4g}']
+        if message:
+            lines.insert(0, message)
+        legs = sorted({exceedance.leg for exceedance in output.exceedances})
+        if legs:
+            lines.append('limits exceeded: ' + ', '.join(self._names[leg] for leg in legs))
+        if output.forces is not None:
+            full = self._full(output.forces)
+            force = 'limits.force_max' if len(set(full)) > 1 else f'{full[0]:.4g} N'
+            lines.append(f'vermillion: push, blue: pull, saturated at {force}')
+        return '\n'.join(lines)
+
+    # -- the message that is made once ------------------------------------------------------
+
+    def _put(self, size: int, layout: str, *values: object) -> int:
+        """Append numbers of a size and return where they begin."""
+        self._body += bytes((4 - len(self._body)) % size)
+        at = len(self._body)
+        self._body += pack('<' + layout, *values)
+        return at
+
+    def _text_of(self, text: str) -> None:
+        encoded = text.encode() + b'\x00'
+        self._put(4, f'I{len(encoded)}s', len(encoded), encoded)
+        self._body += bytes(-len(self._body) % 4)
+
+    def _marker(self, namespace: str, number: int, kind: int, color: Color,
+                scale: tuple[float, ...] = (1.0, 1.0, 1.0), points: Array | tuple[()] = (),
+                colors: Sequence[Color] = (), position: Sequence[float] = (0.0, 0.0, 0.0),
+                text: str = '') -> int:
+        """Append a marker and return where its pose begins."""
+        self._stamps.append(self._put(4, 'iI', 0, 0))
+        self._text_of(self._frame)
+        self._text_of(namespace)
+        self._put(4, '3i', number, kind, 0)
+        at = self._put(8, '10d', *position, 0.0, 0.0, 0.0, 1.0, *scale)
+        self._put(4, '4f', *color)
+        seconds = int(self._stays)
+        self._put(4, 'iI?', seconds, int((self._stays - seconds) * 1e9), False)
+        self._put(4, 'I', len(points))
+        for point in points:
+            self._put(8, '3d', *point)
+        self._put(4, 'I', len(colors))
+        for each in colors:
+            self._put(4, '4f', *each)
+        self._text_of('')  # no texture: its name, stamp, frame, format and data
+        self._put(4, 'iI', 0, 0)
+        self._text_of('')
+        self._text_of('')
+        self._put(4, 'II', 0, 0)  # and no coordinates in it
+        self._text_of(text)
+        self._text_of('')  # no mesh: its name, that of its file, and the file
+        self._text_of('')
+        self._put(4, 'I?', 0, False)
+        return at
+
+
+def _put_color(body: bytearray, at: int, color: Color) -> None:
+    _COLOR.pack_into(body, at + _POSE_AND_SCALE.size, *color)
+
+
+def _between(first: Color, last: Color, share: float) -> Color:
+    r, g, b, a = (x + share * (y - x) for x, y in zip(first, last, strict=True))
+    return r, g, b, a
+
+
+def _plate(joints: Array, thickness: float) -> Array:
+    """Return the corners (72, 3) of the triangles of a plate through joints (6, 3), outside up."""
+    center = joints.mean(axis=0)
+    first, second, normal = level_axes(joints - center)
+    around = np.argsort(np.arctan2((joints - center) @ second, (joints - center) @ first))
+    up = 0.5 * thickness * normal
+    rim = joints[around]  # counterclockwise as seen from the normal's end
+    triangles = []
+    for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
+        triangles += [center + up, a + up, b + up, center - up, b - up, a - up,
+                      a - up, b - up, b + up, a - up, b + up, a + up]
+    return np.array(triangles)

@@ -1,0 +1,425 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node: setpoints in, leg lengths, forces and the singularity warning out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+import gc
+import math
+import time
+from typing import Any, NamedTuple
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+
+from stewart_dynamics.compilation import machine_code
+from stewart_dynamics.compilation.preparation import Preparation
+from stewart_dynamics.description.joint_states import JOINT_STATES, ModelMessages, TF
+from stewart_dynamics.errors import ParameterError, StewartError
+from stewart_dynamics.external_wrench import estimate as external_wrench, payload
+from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH, ExternalWrench
+from stewart_dynamics.external_wrench.history import LegHistory
+from stewart_dynamics.external_wrench.measured_legs import (
+    MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.node import parameter_changes
+from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
+from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
+from stewart_dynamics.node.markers_publisher import MarkersPublisher
+from stewart_dynamics.node.model_publisher import ModelPublisher
+from stewart_dynamics.node.payload_service import inertia_message, PayloadService
+from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
+from stewart_dynamics.node.repeated_log import RepeatedLog
+from stewart_dynamics.node.setpoint_queue import SetpointQueue
+from stewart_dynamics.node.topics import LEG_TRAJECTORY, MARKERS, PAYLOAD, QUEUE, Topics
+from stewart_dynamics.parameters.files import is_of_ros
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
+from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.rclpy_workarounds import (
+    answer_impossible_transitions, OneShotTimer, set_parameters_together, take_waiting_messages)
+from stewart_dynamics.ros.run import run
+from stewart_dynamics.ros.signals import SIGNALS
+from stewart_dynamics.setpoints import base_wrench
+from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.rejections import NOT_EXCLUSIVE, Rejection
+from stewart_dynamics.setpoints.step import Output, Setpoint, Step
+from stewart_dynamics.setpoints.topics import WRENCH
+
+
+# A message that comes so long after the last one was handled [s] has not waited: the executor
+# takes less from one to the next. Else a task looks for messages behind those that wait, which
+# costs a tenth of the processor time.
+_REST = 0.0003
+
+
+class _Models(NamedTuple):
+    """What computes, with one set of parameters."""
+
+    step: Step
+    external_wrench: ExternalWrench
+    base_wrench: BaseWrench
+
+    @classmethod
+    def of(cls, parameters: Parameters) -> _Models:
+        return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
+
+
+class DynamicsNode(LifecycleNode):
+    """
+    Answers each joined setpoint with leg lengths, rates and forces.
+
+    Raises ParameterError where the parameters break a rule: nothing starts then.
+    """
+
+    def __init__(self) -> None:
+        # Undeclared parameters are allowed so that they come to our own check, which rejects
+        # them with a better text.
+        super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True,
+                         allow_undeclared_parameters=True)
+        self._settings = declare_parameters(self, Parameters)
+        self._log = RepeatedLog(self.get_logger())
+        self._active = False
+        self._configured = False
+        self._topics = Topics(self)
+        self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
+        self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
+        self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
+        self._base_wrench_read = False  # somebody subscribes to it
+        self._planned: PlannedTrajectoryQueue = PlannedTrajectoryQueue(
+            OneShotTimer(self, PAUSE, lambda: self._planned.tick()).start,
+            self._planned_code, self._on_outcome)
+        self._payload = PayloadService(self, self._identify_payload, self._on_payload)
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        # A steady clock: ROS time may stand still or jump.
+        self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        answer_impossible_transitions(
+            self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
+        set_parameters_together(self)
+        if machine_code.HINT:
+            self.get_logger().warning(machine_code.HINT)
+        if self._settings['autostart']:
+            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                raise StewartError(f'cannot be configured: {self._fault}')
+            self.trigger_activate()
+        else:
+            self.get_logger().info('unconfigured: autostart is false')
+
+    # -- lifecycle --------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Compile the dynamics and open the topics."""
+        try:
+            self._configure()
+        except Exception as exc:
+            # rclpy turns an exception in a transition into ERROR and logs nothing.
+            self._fault = ' '.join(f'{type(exc).__name__}: {exc}'.split())
+            self.get_logger().error(f'cannot be configured: {self._fault}')
+            self._close()
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to answer; earlier messages do not matter."""
+        parameters, models = self._settings, self._models
+        self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
+        self._history = LegHistory(parameters['payload.window'])
+        self._measured_legs = MeasuredLegs(
+            parameters, models.external_wrench, self._on_rejection, self._on_notice,
+            self._history)
+        self._diagnostics = DynamicsDiagnostics(
+            parameters, self._setpoints.topics, self._setpoints.base.topics, time.monotonic())
+        self._queue = SetpointQueue(
+            models.step, self._publish, self._setpoints.on_base, self._reject_joined,
+            self._take_waiting, self._on_answered)
+        publishers = self._topics.publishers
+        self._markers = MarkersPublisher(parameters, publishers.get(MARKERS))
+        self._model = ModelPublisher(
+            self._model_messages, parameters['visualization_rate'], publishers.get(JOINT_STATES),
+            publishers.get(TF))
+        self._model_measured = parameters['joint_states.source'] == 'measured'
+        self._handled, self._rested = -math.inf, False
+        self._active = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer no more."""
+        self._active = False
+        self._drop_work()
+        self._log.write_last()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the topics."""
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer no more and close the topics."""
+        self._active = False
+        self._drop_work()
+        self._close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def destroy_node(self) -> None:
+        """Log the last line of each series, and end."""
+        self._log.write_last()
+        super().destroy_node()
+
+    def _configure(self) -> None:
+        begun = time.monotonic()
+        self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
+        how = 'compiled ' if machine_code.COMPILED else ''
+        self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
+        self._messages = OutputMessages(self._settings)
+        self._model_messages = ModelMessages(self._settings)
+        self._topics.make(self._settings, self._on_setpoint, self._on_base, {
+            WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
+            planned.INPUT: self._on_trajectory})
+        self._payload.make()
+        self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
+        self._exclusive = self._settings['setpoint.exclusive']
+        self._configured = True
+        # These objects stay: the collector would go through all of them again and again, for
+        # 50 ms and more, while a setpoint waits.
+        gc.unfreeze()  # the objects of an earlier configuration
+        gc.collect()
+        gc.freeze()
+
+    def _close(self) -> None:
+        self._configured = False
+        self._topics.destroy()
+        self._payload.destroy()
+
+    # -- setpoints --------------------------------------------------------------------------
+
+    def _on_setpoint(self, topic: str, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        self._rested = self._rested or now - self._handled > _REST
+        self._diagnostics.setpoints.heard(topic, now)
+        if self._exclusive and self._has_writers(topic):
+            return
+        setpoint = self._setpoints.take(topic, data, self._ros_time)
+        if setpoint is not None:
+            self._queue.add(setpoint, now)
+        self._handled = time.monotonic()
+
+    def _has_writers(self, topic: str) -> bool:
+        """Return whether a topic has more than one writer, and reject a message on it."""
+        writers = self._topics.writers_of(topic)
+        self._diagnostics.setpoints.found_writers(topic, writers)
+        if writers > 1:
+            self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
+        return writers > 1
+
+    def _ros_time(self) -> int:
+        now: int = self.get_clock().now().nanoseconds
+        return now
+
+    def _take_waiting(self) -> None:
+        executor, topics = self.executor, self._topics
+        # Where no setpoint has waited, the executor has taken the base's messages before it.
+        if take_waiting_messages(executor, topics.setpoints, self._on_setpoint, QUEUE):
+            take_waiting_messages(executor, topics.base, self._on_base, QUEUE)
+
+    def _answer(self) -> None:
+        if self._active:
+            self._queue.answer()
+
+    def _publish(self, setpoint: Setpoint, output: Output, came: float) -> None:
+        publishers = self._topics.publishers
+        for topic, message in self._messages.of_output(output):
+            publishers[topic].publish(message)
+        if self._base_wrench_read:
+            self._publish_base_wrench(setpoint)
+        self._markers.answered(setpoint, output)
+        if not self._model_measured:
+            self._model.moved(setpoint.stamp, setpoint.motion)
+        now = time.monotonic()
+        if setpoint.base is not None:
+            self._diagnostics.base.answered(setpoint, now)
+        if self._diagnostics.answered(output, came, now):
+            self._report()
+
+    def _publish_base_wrench(self, setpoint: Setpoint) -> None:
+        wrench = self._models.base_wrench(setpoint)
+        if wrench is not None:
+            self._topics.publishers[BASE_WRENCH].publish(
+                self._messages.of_wrench(setpoint.stamp, wrench))
+
+    def _on_answered(self) -> bool:
+        now = time.monotonic()
+        self._markers.publish_due(now)
+        self._model.publish_due(now)
+        rested, self._rested = self._rested, False
+        if rested:  # nothing has waited for this answer
+            return False
+        executor: Any = self.executor
+        executor.create_task(self._answer)
+        return True
+
+    # -- base, wrench, measured legs, planned trajectories ----------------------------------
+
+    def _on_base(self, topic: str, data: bytes) -> None:
+        if self._active:
+            now = time.monotonic()
+            self._diagnostics.base.heard(topic, now)
+            if self._exclusive and self._has_writers(topic):
+                return
+            if self._setpoints.base.take(topic, data, self._ros_time):
+                self._diagnostics.base.sampled(self._setpoints.base, now)
+
+    def _on_wrench(self, data: bytes) -> None:
+        if self._active:
+            self._setpoints.take_wrench(data)
+
+    def _on_measured_legs(self, data: bytes) -> None:
+        if not self._active:
+            return
+        if not self._external_wrench_code.ready:
+            self._external_wrench_code.begin()
+            self._on_rejection(Rejection(MEASURED_LEGS, NOT_COMPILED), 'this takes seconds, once')
+            return
+        now = time.monotonic()
+        diagnostics, target = self._diagnostics.external_wrench, self._queue.target
+        diagnostics.heard(now)
+        estimate = self._measured_legs.take(
+            data, self._setpoints.wrench, target, self._setpoints.base)
+        if estimate is None:
+            return
+        if self._model_measured:
+            self._model.moved(estimate.stamp, estimate.motion)
+            self._model.publish_due(now)
+        if estimate.wrench is not None:
+            self._topics.publishers[EXTERNAL_WRENCH].publish(
+                self._messages.of_wrench(estimate.stamp, estimate.wrench))
+        if diagnostics.estimated(estimate, target, now):
+            self._report()
+
+    def _identify_payload(self) -> Iterator[payload.Outcome | None] | payload.Outcome:
+        if not self._active:
+            return payload.Outcome('the node is not active')
+        silence = self._diagnostics.external_wrench.silence(time.monotonic())
+        if self._settings['setpoint.timeout'] < silence < math.inf:
+            return payload.Outcome(f'measured_legs silent for {silence:.1f} s')
+        # Parameters are those of now, whatever changes meanwhile.
+        return payload.identify(self._history, StewartPlatform(self._settings))
+
+    def _on_payload(self, outcome: payload.Outcome, seconds: float) -> None:
+        if not self._active:
+            return
+        if outcome.payload:
+            self._topics.publishers[PAYLOAD].publish(
+                inertia_message(outcome.payload, self._settings['platform_frame']))
+        self._diagnostics.payload.done(outcome, seconds)
+        self._report()
+
+    def _on_trajectory(self, data: bytes) -> None:
+        if not self._active:
+            return
+        now = time.monotonic()
+        if self._planned.full:
+            self._on_outcome(
+                planned.rejected(planned.QUEUE_FULL, f'{LENGTH} are in work or wait'), now)
+            return
+        # Parameters, load and gravity are those of now, whatever changes meanwhile.
+        base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
+        self._planned.add(
+            planned.answer(self._settings, self._setpoints.wrench, data, base), now)
+
+    def _on_outcome(self, outcome: planned.Outcome, came: float) -> None:
+        if outcome.answer:
+            self._topics.publishers[LEG_TRAJECTORY].publish(outcome.answer)
+        self._diagnostics.planned_trajectory.done(outcome, time.monotonic() - came)
+        self._report()
+
+    def _drop_work(self) -> None:
+        self._payload.drop('the node is deactivated')
+        if number := self._planned.drop():
+            self.get_logger().warning(
+                f'planned trajectories dropped, because the node is deactivated: {number}')
+
+    # -- diagnostics and log ----------------------------------------------------------------
+
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
+        self._diagnostics.rejected(rejection, details, time.monotonic())
+        self._log.write([LogLine(WARN, rejection.words(details), rejection)])
+
+    def _reject_joined(self, reason: str, details: str) -> None:
+        self._setpoints.reject('setpoint', reason, details)
+
+    def _on_notice(self, text: str) -> None:
+        # Two writers whose clocks differ restart with every setpoint.
+        self._log.write([LogLine(WARN, text, text[:20])])
+
+    def _on_tick(self) -> None:
+        now = time.monotonic()
+        self._log.write_last(now)
+        if not self._active:
+            return
+        for topic, code in ((planned.INPUT, self._planned_code),
+                            (MEASURED_LEGS, self._external_wrench_code),
+                            (MEASURED_LEGS, self._payload.code)):
+            if not code.ready and self._topics.writers_of(topic):
+                code.begin()  # the first message will come soon
+        reads = self._topics.publishers[BASE_WRENCH].get_subscription_count() > 0
+        if reads and not self._base_wrench_code.ready:
+            self._base_wrench_code.begin()
+        self._base_wrench_read = reads and self._base_wrench_code.ready
+        self._markers.publish_due(now)  # the last answer before a silence
+        self._model.publish_due(now)
+        self._model.look()
+        if self._diagnostics.due_at_tick(now):
+            self._report()
+
+    def _report(self) -> None:
+        self._diagnostics_publisher.publish(self._diagnostics)
+
+    # -- parameters -------------------------------------------------------------------------
+
+    def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
+        """Take all of these, between two setpoints, or none."""
+        ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
+        try:
+            parameters = parameter_changes.changed(self._settings, ours, self._configured)
+            models = _Models.of(parameters)
+        except ParameterError as exc:
+            return SetParametersResult(
+                successful=False, reason=str(exc).removeprefix('parameters: '))
+        self._log.write(parameter_changes.log_lines(self._settings, parameters))
+        self._settings, self._models = parameters, models
+        if self._active:
+            self._queue.step = models.step
+            self._measured_legs.step = models.external_wrench
+            self._diagnostics.singularity.parameters = parameters
+            self._markers.use(parameters)
+        return SetParametersResult(successful=True)
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    return run(DynamicsNode, Parameters)

@@ -1,0 +1,119 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The service that identifies mass, center of mass and inertia of platform and payload."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import time
+from typing import Any
+
+from geometry_msgs.msg import Inertia, InertiaStamped, Vector3
+from rclpy.node import Node
+from rclpy.time import Time
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+from stewart_dynamics.compilation.preparation import Preparation
+from stewart_dynamics.external_wrench.payload import FUNCTIONS, Outcome, Payload
+from stewart_dynamics.ros.rclpy_workarounds import create_later_service, OneShotTimer
+
+IDENTIFY_PAYLOAD = 'identify_payload'
+
+# Between two pieces of the work [s]: it takes less than a tenth of the time, and a second in all.
+_PAUSE = 0.004
+
+
+class PayloadService:
+    """
+    Does the work on requests in pieces, one at each tick of a timer; there is one work at a time.
+
+    Parameters
+    ----------
+    node : Node
+        Whose service it is.
+    work : callable
+        Called at a request that no work is done for yet: returns the work, or its outcome.
+    done : callable
+        Gets an outcome, and how long the work took [s].
+
+    """
+
+    def __init__(self, node: Node, work: Callable[[], Iterator[Outcome | None] | Outcome],
+                 done: Callable[[Outcome, float], None]) -> None:
+        self.code = Preparation(*FUNCTIONS)
+        self._node, self._begin, self._done = node, work, done
+        self._timer = OneShotTimer(node, _PAUSE, self._on_timer)
+        self._work: Iterator[Outcome | None] | None = None
+        self._begun = 0.0
+        self._waiting: list[Callable[[Any], None]] = []
+        self._service: Any = None
+
+    def make(self) -> None:
+        """Begin to take requests."""
+        self._service = create_later_service(
+            self._node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)
+
+    def destroy(self) -> None:
+        """Take no more."""
+        if self._service is not None:
+            self._node.destroy_service(self._service)
+            self._service = None
+
+    def drop(self, reason: str) -> None:
+        """End the work in progress without result, if there is any."""
+        self._timer.stop()
+        self._answer(Outcome(reason))
+
+    def _on_request(self, answer: Callable[[Any], None]) -> None:
+        self._waiting.append(answer)
+        if self._work is not None:
+            return
+        self._begun = time.monotonic()
+        work = self._begin()
+        if isinstance(work, Outcome):
+            self._end(work)
+            return
+        self._work = work
+        self.code.begin()
+        self._timer.start()
+
+    def _on_timer(self) -> None:
+        outcome = next(self._work) if self._work and self.code.ready else None
+        if outcome is not None:
+            self._end(outcome)
+        elif self._work:
+            self._timer.start()
+
+    def _end(self, outcome: Outcome) -> None:
+        self._done(outcome, time.monotonic() - self._begun)
+        self._answer(outcome)
+
+    def _answer(self, outcome: Outcome) -> None:
+        waiting, self._waiting, self._work = self._waiting, [], None
+        for answer in waiting:
+            answer(Trigger.Response(
+                success=outcome.payload is not None, message=outcome.message))
+
+
+def inertia_message(payload: Payload, frame: str) -> InertiaStamped:
+    """Return a payload as a message; the inertia is about the center of mass, as in a URDF."""
+    mass, center, inertia = payload.fitted.body
+    x, y, z = center.tolist()
+    ixx, ixy, ixz, iyy, iyz, izz = inertia.tolist()
+    return InertiaStamped(
+        header=Header(stamp=Time(nanoseconds=payload.stamp).to_msg(), frame_id=frame),
+        inertia=Inertia(m=mass, com=Vector3(x=x, y=y, z=z),
+                        ixx=ixx, ixy=ixy, ixz=ixz, iyy=iyy, iyz=iyz, izz=izz))

@@ -1,0 +1,232 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A table of parameters, and sets of values that are checked by it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import difflib
+from itertools import chain
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, ClassVar, TYPE_CHECKING
+
+import numpy as np
+
+from stewart_dynamics.errors import ParameterError, shown, shown_name
+from stewart_dynamics.parameters.files import (
+    check_given, check_sections, flat, is_of_ros, parameters_of, read_yaml, write_yaml)
+from stewart_dynamics.parameters.rules import checked, Parameter
+from stewart_dynamics.parameters.yaml_file import no_space, read_document, read_value
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class ParameterSet(Mapping[str, Any]):
+    """
+    A complete, checked set of parameters under their dotted names; immutable.
+
+    Arrays are read-only numpy arrays: joints (6, 3), values of the legs (6,); limits that are not
+    checked are None.
+
+    Parameters
+    ----------
+    values : mapping of dotted name to value
+        As YAML, ROS or Python give them; None stands for the default.
+    source : str
+        Where they come from, for the text of an error.
+    exact_types : bool
+        Reject an integer in place of a double, as ROS does.
+
+    Raises
+    ------
+    ParameterError
+        At the first rule that is broken.
+
+    """
+
+    table: ClassVar[Mapping[str, Parameter]]
+    node: ClassVar[str]
+    unused: ClassVar[frozenset[str]] = frozenset()  # accepted in a shared file, without effect
+
+    def __init__(self, values: Mapping[str, Any], source: str = 'parameters', *,
+                 exact_types: bool = False) -> None:
+        if not isinstance(values, Mapping):
+            raise ParameterError(
+                f'{source}: {shown(values)}: must be a mapping of names to values')
+        for name, value in values.items():
+            self.declared(name, value, source)
+        self._given = {
+            name: _plain(value) if exact_types else _as_double(self.table[name], _plain(value))
+            for name, value in values.items() if value is not None}
+        self._values = {
+            name: checked(parameter, self._given.get(name, parameter.default), source)
+            for name, parameter in self.table.items()}
+        self._check_together(source)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a parameter's value."""
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return an iterator over the names."""
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        """Return the number of parameters."""
+        return len(self._values)
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether all values are equal."""
+        return isinstance(other, type(self)) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        """Return a hash of all values."""
+        return hash(self._key())
+
+    def __repr__(self) -> str:
+        """Return the number of values that were given."""
+        return f'<{type(self).__name__}: {len(self._given)} of {len(self)} given>'
+
+    def __reduce__(self) -> tuple[type[Self], tuple[dict[str, Any]]]:
+        """Return how to make a copy, which is checked and read-only as well."""
+        return type(self), (self._given,)
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """Return the values that are not defaults, as they were given."""
+        return MappingProxyType(self._given)
+
+    def _key(self) -> tuple[Any, ...]:
+        return tuple(tuple(value.ravel()) if isinstance(value, np.ndarray) else value
+                     for value in self._values.values())
+
+    def replaced(self, changes: Mapping[str, Any], source: str = 'parameters', *,
+                 exact_types: bool = False) -> Self:
+        """Return a copy with these values changed, checked as a whole."""
+        if not isinstance(changes, Mapping):
+            raise ParameterError(
+                f'{source}: {shown(changes)}: must be a mapping of names to values')
+        return type(self)({**self._given, **changes}, source, exact_types=exact_types)
+
+    @classmethod
+    def from_yaml(cls, path: str | Path, node: str = '') -> Self:
+        """
+        Read a ROS parameter file, ``/**:`` or the node's name, then ``ros__parameters:``.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        node : str
+            The name of the node with its namespace, if it is not the default one.
+
+        Raises
+        ------
+        ParameterError
+            Names file, parameter, value and rule.
+
+        """
+        return cls(read_yaml(path, node or cls.node), str(path), exact_types=True)
+
+    def to_yaml(self, path: str | Path, comments: Mapping[str, str] | None = None) -> None:
+        """
+        Write a complete ROS parameter file, for any node (``/**:``), that reads back equal.
+
+        An existing file is replaced.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        comments : mapping of name to str, optional
+            What is written behind the unit of a parameter.
+
+        Raises
+        ------
+        ParameterError
+            The file cannot be written.
+
+        """
+        values = {name: self._given.get(name, parameter.default)
+                  for name, parameter in self.table.items()}
+        added = comments or {}
+        texts = {name: '; '.join(filter(None, (parameter.unit, added.get(name))))
+                 for name, parameter in self.table.items()}
+        write_yaml(path, {name: value for name, value in values.items()
+                          if value is not None and value != ()}, texts)
+
+    @classmethod
+    def check_file(cls, path: str | Path) -> None:
+        """Raise ParameterError if a value of a file breaks a rule; the file may be incomplete."""
+        source = str(path)
+        document = read_document(path)
+        check_sections(path, document, cls.node)
+        for name, value in list(parameters_of(document, cls.node, source)):
+            parameter = cls.declared(name, value, source)
+            if value is not None:
+                checked(parameter, value, source)
+
+    @classmethod
+    def read_value(cls, name: str, text: str, source: str) -> Any:
+        """Return a value that is text on a command line; ParameterError if it breaks a rule."""
+        given = read_value(text, f'{source}: {shown_name(name)}')
+        for _, value in flat({name: given}, '', source):
+            check_given(name, value, source)
+            if value is None:
+                raise ParameterError(f'{source}: {shown_name(name)}: has no value')
+            if not is_of_ros(name):
+                checked(cls.declared(name, value, source), value, source)
+        return given
+
+    @classmethod
+    def declared(cls, name: str, value: Any = None, source: str = 'parameters') -> Parameter:
+        """Return the declaration of a parameter; ParameterError suggests the most similar name."""
+        if isinstance(name, str) and name in cls.table:
+            return cls.table[name]
+        text = shown_name(name)
+        near = difflib.get_close_matches(text, cls.table, n=1)
+        hint = f'; do you mean {near[0]}?' if near else ''
+        if isinstance(value, str) and (missing := no_space(value)):
+            hint = f'; {missing}'
+        raise ParameterError(f'{source}: {text}: unknown parameter{hint}')
+
+    def _check_together(self, source: str) -> None:
+        """Check the rules between parameters."""
+
+
+def _plain(value: Any) -> Any:
+    """Return an immutable copy of a value; arrays as flat tuples."""
+    if isinstance(value, np.ndarray):
+        value = value.ravel() if value.ndim else value[()]
+    if hasattr(value, 'tolist'):
+        value = value.tolist()
+    if isinstance(value, list | tuple):  # rows of joints as well
+        entries = [each.tolist() if hasattr(each, 'tolist') else each for each in value]
+        return tuple(chain.from_iterable(
+            each if isinstance(each, list | tuple) else (each,) for each in entries))
+    return value
+
+
+def _as_double(parameter: Parameter, value: Any) -> Any:
+    """Return a value with integers converted to double where the parameter is a double."""
+    if parameter.kind != 'double':
+        return value
+    if isinstance(value, tuple):
+        return tuple(_as_double(parameter, each) for each in value)
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2 ** 63:
+        return float(value)
+    return value

@@ -1,0 +1,241 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The table of the parameters of a hexapod, and the rules between them.
+
+The check, the node's declaration, ``--help`` and the documents are all made from PARAMETERS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import math
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameters.parameter_set import ParameterSet
+from stewart_dynamics.parameters.rules import Parameter
+
+
+# The length of a given quaternion may differ from one by this; the quaternion is normalized.
+QUATERNION_TOLERANCE = 1e-3
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+"""[m/s^2]"""
+
+
+def _legs(name: str, text: str, unit: str, default: Any = (0.0,), **rule: Any) -> Parameter:
+    return Parameter(name, 'double', text, unit, default, sizes=(1, 6), **rule)
+
+
+def _meshes() -> Iterator[Parameter]:
+    for part, body in (('base', 'base'), ('platform', 'platform'), ('cylinder', 'each cylinder'),
+                       ('piston', 'each piston')):
+        axes = {'base': 'base frame', 'platform': 'platform frame'}.get(
+            part, 'z along the leg, from the ' + (
+                'base joint' if part == 'cylinder' else 'platform joint'))
+        yield Parameter(f'meshes.{part}', 'string', f'file of the mesh of {body}, as '
+                        'stewart_describe writes it; empty: a simple shape', default='')
+        yield Parameter(f'meshes.{part}_offset', 'double', 'x y z, and roll pitch yaw, of this '
+                        f'mesh; {axes}', 'm, rad', (0.0,) * 6, sizes=(6,))
+    yield Parameter('meshes.scale', 'double', 'scale of all meshes; 0.001 for files in mm', '',
+                    1.0, minimum=0.0, above=True)
+
+
+PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
+    Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
+    Parameter('platform_frame', 'string', 'frame that moves with the platform',
+              default='platform'),
+    Parameter('joints', 'string', 'names of the legs, in the order of all arrays of six',
+              default=tuple(f'leg_{n}' for n in range(1, 7)), sizes=(6,)),
+    Parameter('geometry.base_joints', 'double',
+              'x y z of the six base joints, leg by leg, base frame', 'm', required=True,
+              sizes=(18,)),
+    Parameter('geometry.platform_joints', 'double',
+              'x y z of the six platform joints, in the same order, platform frame', 'm',
+              required=True, sizes=(18,)),
+    Parameter('geometry.base_joint_axes', 'double', 'x y z of the direction from which the angle '
+              'of each base joint is measured, toward the platform, of any length, base axes; '
+              'none: of the leg at the home pose', '', (), sizes=(18,)),
+    Parameter('geometry.platform_joint_axes', 'double', 'likewise of each platform joint, from '
+              'the base toward the platform, platform axes; none: of the leg at the home pose', '',
+              (), sizes=(18,)),
+    _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
+          minimum=0.0),
+    Parameter('platform.mass', 'double', 'mass of the platform with its payload', 'kg',
+              required=True, minimum=0.0, above=True, while_active=True),
+    Parameter('platform.center_of_mass', 'double',
+              'center of mass of the platform with its payload, from the platform frame', 'm',
+              (0.0, 0.0, 0.0), sizes=(3,), while_active=True),
+    Parameter('platform.inertia', 'double', 'ixx ixy ixz iyy iyz izz of the platform with its '
+              'payload, about its center of mass, platform axes', 'kg m^2', required=True,
+              sizes=(6,), while_active=True),
+    _legs('legs.cylinder.mass', 'mass of a cylinder, the lower part of a leg', 'kg', minimum=0.0),
+    _legs('legs.cylinder.center_of_mass', 'distance of its center of mass from the base joint',
+          'm'),
+    _legs('legs.cylinder.inertia', 'transverse inertia about its center of mass', 'kg m^2',
+          minimum=0.0),
+    _legs('legs.piston.mass', 'mass of a piston, the upper part of a leg', 'kg', minimum=0.0),
+    _legs('legs.piston.center_of_mass', 'distance of its center of mass from the platform joint',
+          'm'),
+    _legs('legs.piston.inertia', 'transverse inertia about its center of mass', 'kg m^2',
+          minimum=0.0),
+    _legs('actuator.reflected_mass', 'inertia of rotor and screw along the leg, J (2 pi / lead)^2',
+          'kg', minimum=0.0),
+    _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
+    _legs('actuator.coulomb_friction',
+          'Coulomb friction along the leg; linear at rates below 1 mm/s', 'N', minimum=0.0),
+    _legs('actuator.screw_lead', 'travel of a leg in one turn of its motor; used by '
+          'stewart_identify alone, where efforts are torques', 'm', (), minimum=0.0, above=True),
+    Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
+              'base.source is pose or motion; not used where it is imu', 'm/s^2',
+              STANDARD_GRAVITY, sizes=(3,)),
+    _legs('limits.length_min', 'minimum length of a leg; none: not checked', 'm', (), minimum=0.0),
+    _legs('limits.length_max', 'maximum length of a leg; none: not checked', 'm', (), minimum=0.0,
+          above=True),
+    _legs('limits.velocity_max', 'maximum rate of a leg; none: not checked', 'm/s', (),
+          minimum=0.0, above=True),
+    _legs('limits.force_max',
+          'maximum force of a leg, to which forces are clipped; none: not checked', 'N', (),
+          minimum=0.0, above=True),
+    _legs('limits.base_joint_angle_max', 'maximum angle between a leg and its '
+          'geometry.base_joint_axes; none: not checked', 'rad', (), minimum=0.0, above=True,
+          maximum=math.pi),
+    _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
+          'geometry.platform_joint_axes; none: not checked', 'rad', (), minimum=0.0, above=True,
+          maximum=math.pi),
+    Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
+              'divided in the condition number; default: mean distance of the platform joints '
+              'from their center', 'm', minimum=0.0, above=True),
+    Parameter('singularity.warn_condition', 'double', 'condition number of J_inv at which the '
+              'singularity warning begins; it ends below 0.8 of this', '', 20.0, minimum=1.0,
+              while_active=True),
+    Parameter('singularity.stop_condition', 'double',
+              'condition number at which singularity.action begins; it ends below 0.8 of this', '',
+              100.0, minimum=1.0, while_active=True),
+    Parameter('singularity.warn_time', 'double',
+              'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's',
+              0.5, minimum=0.0, while_active=True),
+    Parameter('singularity.action', 'string',
+              'action above stop_condition: warn only, or publish no forces', '', 'warn',
+              choices=('warn', 'suppress_forces'), while_active=True),
+    Parameter('setpoint.source', 'string', 'setpoints on three topics, on one combined topic, or '
+              'poses alone (quasi-static: no motion terms)', '', 'separate',
+              choices=('separate', 'combined', 'pose')),
+    Parameter('setpoint.sync_tolerance', 'double',
+              'largest difference between the stamps of one setpoint', 's', 0.0, minimum=0.0,
+              maximum=1e9),
+    Parameter('setpoint.timeout', 'double', 'time without setpoints after which they are stale; '
+              'a longer jump back in time is a restart', 's', 0.1, minimum=0.0, above=True,
+              maximum=1e9),
+    Parameter('setpoint.exclusive', 'bool',
+              'reject setpoints and base motion while a topic of them has more than one publisher',
+              default=False),
+    Parameter('base.source', 'string', 'how the base moves: not at all, by its orientation in the '
+              'world (~/base/pose, at rest), by its motion in the world (~/base/pose, twist and '
+              'accel), or as an IMU on it measures (~/base/imu)', '', 'fixed',
+              choices=('fixed', 'pose', 'motion', 'imu')),
+    Parameter('base.timeout', 'double',
+              'age of the last base motion above which no forces are published', 's', 0.1,
+              minimum=0.0, above=True, maximum=1e9),
+    Parameter('base.imu.position', 'double', 'position of the IMU, base frame', 'm',
+              (0.0, 0.0, 0.0), sizes=(3,)),
+    Parameter('base.imu.orientation', 'double',
+              'quaternion x y z w that turns IMU axes into base axes', '', (0.0, 0.0, 0.0, 1.0),
+              sizes=(4,)),
+    Parameter('base.imu.cutoff', 'double', 'cut-off frequency of the low-pass filter on the '
+              'angular acceleration, the derivative of the angular velocity', 'Hz', 20.0,
+              minimum=0.0, above=True),
+    Parameter('world_frame', 'string', 'frame of ~/base/pose, twist and accel', default='world'),
+    Parameter('trajectory.effort', 'bool', 'publish forces with the points of ~/leg_trajectory; '
+              'a joint_trajectory_controller without an effort command interface rejects points '
+              'with effort', default=True),
+    Parameter('external_wrench.cutoff', 'double',
+              'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0,
+              minimum=0.0, above=True, while_active=True),
+    Parameter('external_wrench.force_max', 'double',
+              'external force above which diagnostics report an ERROR; none: not checked', 'N',
+              minimum=0.0, above=True, while_active=True),
+    Parameter('external_wrench.moment_max', 'double', "external moment at the platform's origin "
+              'above which diagnostics report an ERROR; none: not checked', 'N m', minimum=0.0,
+              above=True, while_active=True),
+    Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
+              'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),
+    *_meshes(),
+    Parameter('visualization_rate', 'double', 'maximum rate of ~/markers and ~/joint_states; 0: '
+              'off', 'Hz', 30.0, minimum=0.0),
+    Parameter('publish_tf', 'bool', 'publish the transform from base_frame to platform_frame on '
+              '/tf, with every pose', default=False),
+    Parameter('joint_states.source', 'string', 'whose poses ~/joint_states and /tf have: those of '
+              'setpoints, or of the measured legs (~/measured_legs)', '', 'setpoint',
+              choices=('setpoint', 'measured')),
+    Parameter('autostart', 'bool', 'configure and activate the node when it starts', default=True),
+)})
+
+
+class Parameters(ParameterSet):
+    """The parameters of a hexapod and of the node that computes its leg forces."""
+
+    table = PARAMETERS
+    node = 'stewart_dynamics'
+
+    def _check_together(self, source: str) -> None:
+        """Check the rules between parameters."""
+        joints = self['joints']
+        if len(set(joints)) < 6 or '' in joints:
+            raise ParameterError(f'{source}: joints: {list(joints)}: six different names needed')
+        moments = np.linalg.eigvalsh(inertia_matrix(self['platform.inertia']))
+        if moments[0] <= 0.0:
+            raise ParameterError(
+                f'{source}: platform.inertia: {self["platform.inertia"].tolist()}: must be '
+                f'positive definite, but its smallest principal moment is {moments[0]:.6g} '
+                'kg m^2 (the order is ixx ixy ixz iyy iyz izz)')
+        low, high = self['limits.length_min'], self['limits.length_max']
+        if low is not None and high is not None and np.any(low >= high):
+            raise ParameterError(
+                f'{source}: limits.length_min: {low.tolist()}: must be less than '
+                f'limits.length_max, {high.tolist()}')
+        warn, stop = self['singularity.warn_condition'], self['singularity.stop_condition']
+        if stop < warn:
+            raise ParameterError(
+                f'{source}: singularity.stop_condition: {stop}: must be at least '
+                f'singularity.warn_condition, {warn}')
+        length = float(np.linalg.norm(self['base.imu.orientation']))
+        if abs(length - 1.0) > QUATERNION_TOLERANCE:
+            raise ParameterError(
+                f'{source}: base.imu.orientation: {self["base.imu.orientation"].tolist()}: length '
+                f'{length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1')
+        platform_joints = self['geometry.platform_joints']
+        size = float(np.mean(np.linalg.norm(
+            platform_joints - platform_joints.mean(axis=0), axis=1)))
+        if size == 0.0:
+            raise ParameterError(
+                f'{source}: geometry.platform_joints: all six are at one point')
+        if self['singularity.characteristic_length'] is None:
+            self._values['singularity.characteristic_length'] = size
+        for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes'):
+            axes = self[name]
+            if axes is not None and not axes.any(axis=1).all():
+                raise ParameterError(
+                    f'{source}: {name}: {axes.tolist()}: a direction must not be 0, 0, 0')
+
+
+def inertia_matrix(six: ArrayLike) -> Any:
+    """Return the matrix (3, 3) of ixx ixy ixz iyy iyz izz [kg m^2]."""
+    ixx, ixy, ixz, iyy, iyz, izz = np.asarray(six, dtype=float)
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])

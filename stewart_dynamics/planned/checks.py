@@ -1,0 +1,250 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The checks of a planned trajectory: limits and singularities, at samples and between them.
+
+Between two samples, lengths and rates of the legs, det(J) and sin^2(angle / 2) of the joints are
+cubics in time through their values and derivatives at both.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
+from stewart_dynamics.mechanics.rows import (
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
+from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.planned.cubics import Cubics
+from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
+
+# Where |det(J)| falls below this part of its values at two samples, the samples between them are
+# made closer.
+DIP = 0.9
+
+LIMIT = 'a limit is exceeded'
+SINGULAR = 'a singularity is met'
+
+
+class Violation(NamedTuple):
+    """Why a trajectory is rejected, and when."""
+
+    time: float
+    """[s]"""
+    reason: str
+    words: str
+    leg: int | None = None
+    limit: str = ''
+
+    @property
+    def order(self) -> tuple[float, bool, str]:
+        """Return the place among others: of one time singularities first, they cause others."""
+        return self.time, self.reason != SINGULAR, self.words
+
+
+class Checks:
+    """
+    Finds violations in samples of a trajectory that come in the order of time.
+
+    Attributes
+    ----------
+    violations : list of Violation
+        Those found so far, in no order.
+    condition_number, condition_time : float
+        The largest so far, and when [s].
+    force, force_leg : float, int
+        The largest absolute force so far [N], and of which leg.
+    load : float
+        The largest absolute force so far as a part of limits.force_max.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.violations: list[Violation] = []
+        self.condition_number, self.condition_time = 0.0, 0.0
+        self.force, self.force_leg, self.load = -1.0, 0, 0.0
+        self._joints = parameters['joints']
+        self._limits = Limits(parameters)
+        self._angles = angles_to_check(parameters, self._limits.of_joints)
+        self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
+
+    def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
+              ) -> list[int]:
+        """
+        Check samples, and what lies between them.
+
+        Parameters
+        ----------
+        times : (M,)
+            [s]
+        durations : (M - 1,)
+            From each to the next [s].
+        results : (M, RESULT)
+            Rows of results.
+        joined : (M - 1,)
+            The next one follows it in the trajectory.
+        near : (M - 1,)
+            The next one is so near that det(J) between the two follows from its values there.
+
+        Returns
+        -------
+        list of int
+            After which samples det(J) needs closer samples.
+
+        """
+        finite = np.isfinite(results).all(axis=1)
+        if not finite.all():
+            n = int(np.argmin(finite))
+            self.violations.append(Violation(float(times[n]), OUT_OF_RANGE, f': {OUT_OF_RANGE}'))
+            if n == 0:
+                return []
+            times, results = times[:n], results[:n]
+            durations, joined, near = durations[:n - 1], joined[:n - 1], near[:n - 1]
+        self._keep_largest_force(results[:, FORCES])
+        for limit, values in ((LENGTH_MIN, results[:, LENGTHS]), (LENGTH_MAX, results[:, LENGTHS]),
+                              (VELOCITY_MAX, results[:, RATES]), (FORCE_MAX, results[:, FORCES])):
+            self._check_limit(limit, values, np.broadcast_to(times[:, None], values.shape))
+        self._check_cubics(times, durations, results, joined)
+        return self.check_singularities(times, durations, results, near)
+
+    def check_joints(self, times: Array, durations: Array, motions: Array, joined: Flags) -> None:
+        """
+        Check the angles of the joints at samples, and between those that are joined.
+
+        Parameters
+        ----------
+        times, durations, joined : (M,), (M - 1,), (M - 1,)
+            As in ``check``.
+        motions : (M, MOTION)
+            Rows of motion.
+
+        """
+        if self._angles is None:
+            return
+        with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
+            values, rates = self._angles.haversines(motions)
+            cubics = Cubics.between(values, rates, durations[:, None])
+            _, high = cubics.bounds()
+        for limit in self._limits.of_joints:
+            where = ANGLES[limit]
+            at = np.broadcast_to(times[:, None], (len(times), 6))
+            self._check_limit(limit, _angle(values[:, where]), at)
+            suspect = np.flatnonzero(
+                joined & self._limits.exceeds(limit, _angle(high[:, where])).any(axis=1))
+            begin, duration = times[suspect, None], durations[suspect, None]
+            between = Cubics._make(each[suspect, where] for each in cubics)
+            for fraction in between.extrema():
+                self._check_limit(
+                    limit, _angle(between.at(fraction)), begin + fraction * duration)
+
+    def check_singularities(self, times: Array, durations: Array, results: Array, near: Flags,
+                            ) -> list[int]:
+        """Do what ``check`` does, for singularities alone."""
+        self._check_conditions(times, results)
+        return self._check_determinants(times, durations, results, near)
+
+    def no_pose(self, time: float) -> None:
+        """Note that no pose on this side of singularities has the lengths of the legs."""
+        self.violations.append(Violation(
+            time, SINGULAR, ": the legs' cubics lead to no pose on this side of a singularity"))
+
+    def _keep_largest_force(self, forces: Array) -> None:
+        magnitudes = np.abs(forces)
+        largest = float(magnitudes.max())
+        if largest > self.force:
+            self.force, self.force_leg = largest, int(np.argmax(magnitudes)) % 6
+        self.load = max(self.load, float((magnitudes / self._limits.force_max).max()))
+
+    def _check_limit(self, limit: str, values: Array, times: Array) -> None:
+        """Note the first of the values (M, 6) at their times that exceeds a limit."""
+        exceeding = self._limits.exceeds(limit, values)
+        if not exceeding.any():
+            return
+        n, leg = map(int, np.unravel_index(
+            np.argmin(np.where(exceeding, times, np.inf)), exceeding.shape))
+        exceedance = Exceedance(
+            limit, leg, float(values[n, leg]), float(self._limits.bounds[limit][leg]))
+        self.violations.append(Violation(
+            float(times[n, leg]), LIMIT, f' {exceedance.words(self._joints)}', leg, limit))
+
+    def _check_cubics(self, times: Array, durations: Array, results: Array, joined: Flags,
+                      ) -> None:
+        """Check lengths and rates between the samples."""
+        cubics = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
+        # Most are within the bounds of their control points, and those within the limits.
+        low, high = cubics.bounds()
+        with np.errstate(all='ignore'):  # samples that are not joined may be of the same time
+            middle = np.abs(cubics.middle_rate() / durations[:, None])
+        shortest, longest, fastest = self._limits.thresholds[:3]
+        suspect = np.flatnonzero(joined & (
+            (low < shortest) | (high > longest) | (middle > fastest)).any(axis=1))
+        if not len(suspect):
+            return
+        begin, duration = times[suspect, None], durations[suspect, None]
+        cubics = cubics.selected(suspect)
+        for fraction in cubics.extrema():
+            lengths = cubics.at(fraction)
+            for limit in (LENGTH_MIN, LENGTH_MAX):
+                self._check_limit(limit, lengths, begin + fraction * duration)
+        fraction = cubics.rate_extremum()
+        self._check_limit(
+            VELOCITY_MAX, cubics.rate_at(fraction) / duration, begin + fraction * duration)
+
+    def _check_conditions(self, times: Array, results: Array) -> None:
+        condition = results[:, CONDITION]
+        n = int(np.argmax(condition))
+        if condition[n] > self.condition_number:
+            self.condition_number, self.condition_time = float(condition[n]), float(times[n])
+        if condition[n] >= self._stop:
+            n = int(np.argmax(condition >= self._stop))
+            self._singular(times[n], results[n], f'condition number {condition[n]:.4g} reaches '
+                           f'singularity.stop_condition, {self._stop:g}')
+
+    def _check_determinants(self, times: Array, durations: Array, results: Array, near: Flags,
+                            ) -> list[int]:
+        """Check whether det(J) crosses zero between samples; return where that is not clear."""
+        determinants, condition = results[:, DETERMINANT], results[:, CONDITION]
+        cubics = Cubics.between(determinants, results[:, DETERMINANT_RATE], durations)
+        cubics = Cubics._make(each * np.sign(determinants[:-1]) for each in cubics)
+        if (crossed := near & (cubics.end < 0.0)).any():
+            n = int(np.argmax(crossed))
+            self._singular(times[n] + cubics.selected(n).root() * durations[n], results[n],
+                           'det(J) crosses zero')
+        smaller = np.minimum(cubics.start, cubics.end)
+        dips = np.flatnonzero(near & (cubics.end > 0.0) & (cubics.bounds()[0] < smaller))
+        cubics, smaller = cubics.selected(dips), smaller[dips]
+        lowest = np.fmin.reduce([smaller, *map(cubics.at, cubics.extrema())])
+        # The condition number grows about as det(J) falls.
+        predicted = np.maximum(condition[dips], condition[dips + 1]) * smaller
+        unclear: list[int] = dips[(lowest < DIP * smaller) | (
+            (lowest < smaller) & (predicted >= self._stop * lowest))].tolist()
+        return unclear
+
+    def _singular(self, time: float, result: Array, words: str) -> None:
+        leg = int(np.argmax(result[UNIT_LOAD_FORCES]))
+        self.violations.append(Violation(
+            float(time), SINGULAR, f': {words}, worst for {self._joints[leg]}', leg))
+
+
+def _angle(haversines: Array) -> Array:
+    """Return angles [rad] of sin^2(angle / 2)."""
+    angles: Array = 2.0 * np.arcsin(np.sqrt(np.clip(haversines, 0.0, 1.0)))
+    return angles

@@ -1,0 +1,233 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Planned trajectories as messages: platform trajectory in, leg trajectory or a rejection out.
+
+A trajectory_msgs/MultiDOFJointTrajectory is read, checked and answered in pieces, so that
+setpoints are answered between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array, Six, Stamps
+from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LINEAR_ACCELERATION, MOTION,
+    POSITION, ROTATION)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.cdr import MalformedError
+from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.planned.result import PlannedTrajectory
+from stewart_dynamics.planned.trajectory import (
+    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE)
+from stewart_dynamics.setpoints.inputs import unit_quaternions
+from stewart_dynamics.setpoints.rejections import (
+    BASE_NOT_KNOWN, frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
+
+INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
+OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
+
+MOST_POINTS = 100_000
+# So many points are read or written between two yields: some tenths of a millisecond of work.
+_READ = 2 * PIECE
+_WRITTEN = 8 * PIECE
+
+QUEUE_FULL = 'queue full'
+
+_POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
+
+
+class Outcome(NamedTuple):
+    """The outcome of the check of a trajectory."""
+
+    message: str
+    """In words: accepted or rejected, and why."""
+    reason: str = ''
+    """Why it is rejected, a constant; empty where it is accepted."""
+    answer: bytes = b''
+    """A trajectory_msgs/JointTrajectory; empty where rejected."""
+    warning: bool = False
+    """Accepted, but the condition number reaches singularity.warn_condition."""
+    values: tuple[tuple[str, str], ...] = ()
+    """Keys with their units, and values."""
+
+
+class _RejectedError(Exception):
+
+    def __init__(self, reason: str, details: str) -> None:
+        super().__init__(reason, details)
+        self.outcome = rejected(reason, details)
+
+
+def rejected(reason: str, details: str) -> Outcome:
+    """Return the outcome of a trajectory that cannot be checked."""
+    return Outcome(f'rejected: {reason}: {details}', reason)
+
+
+def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None = None,
+           ) -> Iterator[Outcome | None]:
+    """
+    Yield None after each piece of the work, and the outcome at the end.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        They hold for all of the work.
+    wrench : (6,)
+        External wrench at the platform's origin, base axes [N, N m].
+    data : bytes
+        A trajectory_msgs/MultiDOFJointTrajectory as received. Its second joint, if it has one,
+        is the base, which moves in the world as its points say.
+    base : (BASE,), optional
+        A row of the base's motion for a trajectory without the base, one of nan: it is not
+        known; none: it is still.
+
+    """
+    try:
+        message = _checked_header(data, parameters['base_frame'])
+        times, rows, given = yield from _read(message, parameters)
+        if given is None and base is not None and np.isnan(base).any():
+            raise _RejectedError(
+                BASE_NOT_KNOWN, 'give it with the points, or publish the topics of the base')
+    except MalformedError as exc:
+        yield rejected(MALFORMED, str(exc))
+        return
+    except _RejectedError as exc:
+        yield exc.outcome
+        return
+    result = None
+    for result in check_in_pieces(StewartPlatform(parameters), times, rows, np.array(wrench),
+                                  base if given is None else given):
+        if result is None:
+            yield None
+    assert result is not None  # the last one
+    written = b''
+    if result.accepted:
+        written = yield from _written(parameters, message, result)
+    yield Outcome(result.message, result.reason, written, result.warning,
+                  _values(parameters, result))
+
+
+def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
+    message = PlatformTrajectory(data)
+    if message.frame not in (b'', base_frame.encode()):
+        raise _RejectedError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
+    if not 1 <= message.size <= MOST_POINTS:
+        raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
+    if message.joints == 2 and (message.names[1] != base_frame.encode()
+                                or message.names[0] == message.names[1]):
+        names = [name[:60].decode(errors='replace') for name in message.names]
+        raise MalformedError(
+            f'joint_names: {names}: the first joint is the platform, the second the base, '
+            f'{base_frame!r}')
+    return message
+
+
+def _read(message: PlatformTrajectory, parameters: Parameters,
+          ) -> Generator[None, None, tuple[Stamps, Array, Array | None]]:
+    """
+    Return times (N,) [ns], rows of motion (N, MOTION), and of the base (N, BASE) if given.
+
+    Bad points are rejected.
+    """
+    times, rows = np.empty(message.size, dtype=np.int64), np.empty((message.size, MOTION))
+    bases = np.empty((message.size, BASE)) if message.joints == 2 else None
+    gravity = parameters['gravity'].tolist()
+    for first in range(0, message.size, _READ):
+        end = min(first + _READ, message.size)
+        points = message.points(first, end)
+        if (late := points['nanosec'] >= 1_000_000_000).any():
+            n = int(np.argmax(late))
+            raise MalformedError(
+                f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
+                'under 1000000000')
+        times[first:end] = points['sec'] * np.int64(1_000_000_000) + points['nanosec']
+        stuck = first_not_increasing(times[first:end], times[first - 1] if first else -1)
+        if stuck is not None:
+            n = first + stuck
+            raise _RejectedError(NOT_INCREASING, f'points[{n}]: {times[n] * 1e-9:.9g} s, ' + (
+                f'after {times[n - 1] * 1e-9:.9g} s' if n else 'must be at least 0'))
+        rows[first:end] = _rows(first, _numbers(points, 0))
+        if bases is not None:
+            r: Any = _rows(first, _numbers(points, 1)).T
+            bases[first:end] = np.stack(np.broadcast_arrays(*row_of_motion(
+                r[ROTATION], r[LINEAR_ACCELERATION], r[ANGULAR_VELOCITY],
+                r[ANGULAR_ACCELERATION], gravity)), axis=-1)
+        yield
+    return times, rows, bases
+
+
+def _numbers(points: NDArray[np.void], joint: int) -> Array:
+    """Return pose, twist and acceleration of a joint at points (N, 19)."""
+    return np.column_stack([points[part][:, joint] for part in ('pose', 'twist', 'accel')])
+
+
+def _rows(first: int, numbers: Array) -> Array:
+    """Return rows of motion (N, MOTION) of points (N, 19) from an index on; reject bad ones."""
+    if not (finite := np.isfinite(numbers).all(axis=1)).all():
+        n = int(np.argmin(finite))
+        raise _RejectedError(NOT_FINITE, f'points[{first + n}]: {tuple(numbers[n].tolist())}')
+    quaternions, lengths, unit = unit_quaternions(numbers[:, _QUATERNION])
+    if not unit.all():
+        n = int(np.argmin(unit))
+        raise _RejectedError(
+            NOT_UNIT, f'points[{first + n}]: {length_details(float(lengths[n]))}')
+    rows = np.empty((len(numbers), MOTION))
+    rows[:, POSITION] = numbers[:, _POSITION]
+    rows[:, ROTATION] = np.column_stack(from_quaternion(*quaternions))
+    rows[:, ROTATION.stop:] = numbers[:, _TWIST_AND_ACCELERATION]
+    return rows
+
+
+def _written(parameters: Parameters, message: PlatformTrajectory, result: PlannedTrajectory,
+             ) -> Generator[None, None, bytes]:
+    """Return the trajectory_msgs/JointTrajectory of an accepted trajectory."""
+    answer = LegTrajectory(
+        message.stamp, parameters['joints'], result.points, parameters['trajectory.effort'])
+    for first in range(0, result.points, _WRITTEN):
+        some = slice(first, min(first + _WRITTEN, result.points))
+        answer.put(
+            first, message.points(some.start, some.stop),
+            result.lengths[some] - parameters['geometry.zero_length'], result.rates[some],
+            result.forces[some])
+        yield
+    return answer.message()
+
+
+def _values(parameters: Parameters, result: PlannedTrajectory) -> tuple[tuple[str, str], ...]:
+    """Return the keys and values for diagnostics."""
+    values = [('points', str(result.points)), ('duration (s)', f'{result.duration:.9g}')]
+    joints = parameters['joints']
+    if result.accepted and result.force_leg is not None:
+        values += [('worst condition number', f'{result.condition_number:.6g}'),
+                   ('its time (s)', f'{result.condition_time:.3f}'),
+                   ('largest force (N)', f'{result.force:.6g}'),
+                   ('its leg', joints[result.force_leg])]
+        if parameters['limits.force_max'] is not None:
+            values.append(('largest force, of limits.force_max', f'{result.load:.4g}'))
+    elif not np.isnan(result.time):
+        values.append(('rejected at (s)', f'{result.time:.6g}'))
+        if result.leg is not None:
+            values.append(('leg', joints[result.leg]))
+    return tuple(values)

@@ -1,0 +1,373 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Planned trajectories: motion of the platform in, lengths, rates and forces of the legs out.
+
+A trajectory is rejected as a whole where it exceeds a limit or meets a singularity, at its points
+or between them, in what the platform is to do there (``interpolation``) and in what the legs do
+that a joint_trajectory_controller moves: it joins positions and velocities of a leg by cubics in
+time, efforts by straight lines.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.compilation.machine_code import COMPILED
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.kinematics import forward_kinematics, joint_angles
+from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, RATES, WRENCH
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.planned.checks import Checks, Violation
+from stewart_dynamics.planned.cubics import Cubics
+from stewart_dynamics.planned.interpolation import Interpolation
+from stewart_dynamics.planned.result import PlannedTrajectory
+
+# The machine code that a check needs.
+FUNCTIONS = (
+    inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses,
+    joint_angles.joint_haversines)
+
+# Points and samples between them that a trajectory may need.
+MOST_SAMPLES = 1_000_000
+# At most so many intervals between points or samples are worked on between two yields: about half
+# a millisecond of work. Uncompiled, one takes a millisecond.
+PIECE = 256 if COMPILED else 1
+# Where nothing waits meanwhile, larger pieces take less time in all.
+_LARGE_PIECE = 16 * PIECE
+# A time_from_start holds less [s].
+_TIMES_END = 2 ** 31
+
+# Between two samples, a point of the platform at the characteristic length from its origin moves
+# by at most this part of that length, and its acceleration deviates from a straight line by at
+# most this [m/s^2], a hundredth of gravity.
+_STEP = 0.01
+_BEND = 0.1
+# Closer samples part an interval in so many, down to this part of the interval of two points.
+_PARTS = 16
+_CLOSEST = 1e-6
+
+NOT_INCREASING = 'time_from_start is not strictly increasing'
+TOO_FAR = 'points too far apart'
+
+_LENGTHS, _RATES, _FORCES = consecutive(6, 6, 6)
+# After which points of a block samples are (M,), and at which fraction of the interval (M,).
+_Samples = tuple[Integers, Array]
+
+
+def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion: Motion,
+                             wrench: ArrayLike | None = None, base: BaseMotion | None = None,
+                             ) -> PlannedTrajectory:
+    """
+    Check a planned trajectory against limits and singularities, and compute what the legs do.
+
+    The node does the same for ``~/platform_trajectory``. At the points lengths, rates and forces
+    are those of ``inverse_dynamics``, to the last bit. Between two points the platform is taken to
+    move by quintic polynomials of position and rotation vector through pose, twist and
+    acceleration of both; and the legs by cubics through their lengths and rates, as
+    joint_trajectory_controller moves them. Both are checked.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        Its parameters have the limits and the thresholds of the condition number.
+    times : (N,)
+        When the points are [s], from 0 and strictly increasing; taken to the nanosecond.
+    motion : Motion of shape (N,)
+        Pose, twist and acceleration of the platform at the points.
+    wrench : (6,), optional
+        Force [N] and moment [N m] that act on the platform at its origin all the time, base axes;
+        None by default.
+    base : BaseMotion of shape () or (N,), optional
+        How the base moves: all the time alike, or at the points, and between two of them along
+        the straight line; by default it is still.
+
+    Returns
+    -------
+    PlannedTrajectory
+        Lengths, rates and forces of the legs, or why the trajectory is rejected.
+
+    Raises
+    ------
+    MotionError
+        Shapes do not fit, numbers are not finite or times not strictly increasing.
+
+    """
+    if not isinstance(platform, StewartPlatform):
+        raise wrong_type('platform', platform, 'a StewartPlatform')
+    if not isinstance(motion, Motion):
+        raise wrong_type('motion', motion, 'a Motion')
+    if len(motion.shape) != 1 or not motion.shape[0]:
+        raise MotionError(f'motion: shape {motion.shape}: must be (N,), of N points')
+    seconds = as_array('times', times, motion.shape)
+    if seconds.shape != motion.shape:
+        raise MotionError(f'times: shape {seconds.shape}: must be {motion.shape}')
+    outside = (seconds < 0.0) | (seconds >= _TIMES_END)
+    if outside.any():
+        n = int(np.argmax(outside))
+        raise MotionError(f'times[{n}]: {seconds[n]} s: must be 0 to {_TIMES_END} s')
+    stamps = np.rint(seconds * 1e9).astype(np.int64)
+    if (stuck := first_not_increasing(stamps)) is not None:
+        raise MotionError(f'times[{stuck}]: {seconds[stuck]} s after {seconds[stuck - 1]} s: must '
+                          'be strictly increasing, by at least a nanosecond')
+    load = optional_array('wrench', wrench, (WRENCH,))
+    if load.shape != (WRENCH,):
+        raise MotionError(f'wrench: shape {load.shape}: must be ({WRENCH},)')
+    if base is not None:
+        if not isinstance(base, BaseMotion):
+            raise wrong_type('base', base, 'a BaseMotion')
+        if base.shape not in ((), motion.shape):
+            raise MotionError(f'base: shape {base.shape}: must be () or {motion.shape}')
+    *_, result = check_in_pieces(platform, stamps, motion.rows, load,
+                                 None if base is None else base.rows, _LARGE_PIECE)
+    assert result is not None  # the last one
+    return result
+
+
+def check_in_pieces(platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
+                    bases: Array | None = None, piece: int = PIECE,
+                    ) -> Iterator[PlannedTrajectory | None]:
+    """
+    Yield None after each piece of the work, and the result at the end.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        Its parameters hold for all of the work.
+    times : (N,)
+        [ns], strictly increasing.
+    rows : (N, MOTION)
+        Rows of motion, finite, their rotations checked.
+    wrench : (6,)
+        External wrench at the platform's origin, base axes [N, N m].
+    bases : (BASE,) or (N, BASE), optional
+        Rows of the base's motion; none: it is still.
+    piece : int
+        At most so many intervals are worked on between two yields.
+
+    """
+    work = _Work(platform, times, rows, wrench, bases, piece)
+    try:
+        yield from work.check()
+    except _RejectedError as exc:
+        yield work.rejected(exc.violation)
+    else:
+        yield work.accepted()
+
+
+def first_not_increasing(times: Stamps, before: int = -1) -> int | None:
+    """Return the index of the first time [ns] that is not after the one before it."""
+    stuck = np.diff(times, prepend=before) <= 0
+    return int(np.argmax(stuck)) if stuck.any() else None
+
+
+class _RejectedError(Exception):
+
+    def __init__(self, violation: Violation) -> None:
+        super().__init__(violation)
+        self.violation = violation
+
+
+class _Work:
+    """The work on one trajectory; see ``check_in_pieces``."""
+
+    def __init__(self, platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
+                 bases: Array | None, piece: int) -> None:
+        self._platform, self._times, self._motions = platform, times, rows
+        self._parameters = platform.parameters
+        self._wrench = wrench[None]
+        self._bases = bases
+        self._piece = piece
+        self._legs = np.empty((len(times), 18))
+        self._checks = Checks(self._parameters)
+        self._legs_checks = Checks(self._parameters)
+        self._samples = 0
+
+    def check(self) -> Iterator[None]:
+        """Compute what the legs do; raise _RejectedError where they must not."""
+        last = len(self._times) - 1
+        for first in range(0, max(last, 1), self._piece):
+            yield from self._check_block(first, min(first + self._piece, last))
+            if violations := self._checks.violations or self._legs_checks.violations:
+                raise _RejectedError(min(violations, key=lambda each: each.order))
+
+    def _check_block(self, first: int, end: int) -> Iterator[None]:
+        """Check from one point to another, both included."""
+        block = slice(first, end + 1)
+        motions, times = self._motions[block], _seconds(self._times[block])
+        results = self._solve(motions, np.arange(first, end + 1), 0.0)
+        for here, there in ((_LENGTHS, LENGTHS), (_RATES, RATES), (_FORCES, FORCES)):
+            self._legs[block, here] = results[:, there]
+        durations = _seconds(np.diff(self._times[block]))
+        with np.errstate(all='ignore'):
+            between = Interpolation(durations, motions)
+            many = self._parts_between(first, between)
+        legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
+        near = many == 1.0
+        dips = self._checks.check(times, durations, results, np.ones_like(near), near)
+        self._checks.check_joints(times, durations, motions, near)
+        self._count(_PARTS * len(dips))
+        closer: deque[_Samples] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
+        coarse = _samples(many, self._piece)
+        while samples := closer.popleft() if closer else next(coarse, None):
+            yield
+            which, fraction = samples
+            with np.errstate(all='ignore'):
+                rows = between.at(which, fraction)
+            joined = which[1:] == which[:-1]
+            step = np.diff(fraction)
+            at, after = times[which] + fraction * durations[which], step * durations[which[1:]]
+            self._checks.check_joints(at, after, rows, joined)
+            self._check_legs_path(
+                at, after, legs.selected(which), fraction, durations[which], rows)
+            for n in self._checks.check(
+                    at, after, self._solve(rows, first + which, fraction), joined, joined):
+                if step[n] > _CLOSEST:
+                    self._count(_PARTS)
+                    closer.append(
+                        (np.full(_PARTS + 1, which[n]), fraction[n] + step[n] * _IN_PARTS))
+        yield
+
+    def _solve(self, rows: Array, which: Integers, fraction: Array | float) -> Array:
+        """Return the results of rows of motion, so far between the points ``which`` and next."""
+        bases = self._bases
+        if bases is not None:
+            if bases.ndim == 1:
+                bases = bases[None]
+            elif np.ndim(fraction):
+                bases = bases[which] + np.reshape(fraction, (-1, 1)) * (
+                    bases[which + 1] - bases[which])
+            else:
+                bases = bases[which]
+        return self._platform.solve(rows, self._wrench, bases)
+
+    def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
+                         durations: Array, rows: Array) -> None:
+        """
+        Check singularities and joint angles where the legs' cubics lead the platform.
+
+        Parameters
+        ----------
+        times, after : (M,), (M - 1,)
+            When samples are, and from each to the next [s].
+        legs, fraction, durations : Cubics of (M, 6), (M,), (M,)
+            Of the interval of points that each is in, where in it, and how long it is [s].
+        rows : (M, MOTION)
+            Where the platform is to be.
+
+        """
+        poses, many = rows.copy(), len(rows)
+        codes, steps = np.empty(many, dtype=np.int64), np.empty(many, dtype=np.int64)
+        constants = self._platform.constants
+        forward_kinematics.poses(
+            constants, legs.at(fraction[:, None]), poses, codes, steps, np.empty(many))
+        lost = np.flatnonzero(codes != forward_kinematics.FOUND)
+        found = int(lost[0]) if len(lost) else many
+        if found < many:
+            self._legs_checks.no_pose(float(times[found]))
+        if found:
+            poses = poses[:found]
+            forward_kinematics.twists(
+                constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
+                poses)
+            joined = after[:found - 1] > 0.0
+            self._legs_checks.check_singularities(
+                times[:found], after[:found - 1], self._platform.solve(poses), joined)
+            self._legs_checks.check_joints(times[:found], after[:found - 1], poses, joined)
+
+    def _parts_between(self, first: int, between: Interpolation) -> Array:
+        """Return in how many parts each interval of points is sampled."""
+        arm = self._parameters['singularity.characteristic_length']
+        many: Array = np.ceil(np.maximum(
+            between.path_bound(arm) / (_STEP * arm), np.sqrt(between.bend_bound(arm) / _BEND)))
+        many = np.maximum(many, 1.0, dtype=float)
+        if not (bounded := many <= MOST_SAMPLES).all():
+            n = first + int(np.argmin(bounded))
+            raise self._too_far(f'{TOO_FAR}: points[{n}] and the next: more', n)
+        self._count(int(many.sum()))
+        return many
+
+    def _count(self, samples: int) -> None:
+        self._samples += samples
+        if self._samples > MOST_SAMPLES:
+            raise self._too_far(f'{TOO_FAR}: more', None)
+
+    def _too_far(self, words: str, point: int | None) -> _RejectedError:
+        time = math.nan if point is None else float(self._times[point]) * 1e-9
+        return _RejectedError(Violation(
+            time, TOO_FAR, f'{words} than {MOST_SAMPLES} samples are needed to check what lies '
+            'between'))
+
+    def accepted(self) -> PlannedTrajectory:
+        """Return the result of a trajectory without violations."""
+        checks, points = self._checks, len(self._times)
+        message = f'accepted: {points} point{"s" * (points > 1)} over {self._duration:.6g} s'
+        warn = self._parameters['singularity.warn_condition']
+        if warning := checks.condition_number >= warn:
+            message += (f', condition number {checks.condition_number:.4g} at '
+                        f'{checks.condition_time:.3f} s is not below '
+                        f'singularity.warn_condition, {warn:g}')
+        return PlannedTrajectory(
+            True, message, points, self._duration,
+            lengths=self._legs[:, _LENGTHS], rates=self._legs[:, _RATES],
+            forces=self._legs[:, _FORCES], warning=warning,
+            condition_number=checks.condition_number, condition_time=checks.condition_time,
+            force=checks.force, force_leg=checks.force_leg, load=checks.load)
+
+    def rejected(self, violation: Violation) -> PlannedTrajectory:
+        """Return the result of a trajectory with a violation."""
+        when = '' if violation.reason == TOO_FAR else f'at {violation.time:.3f} s'
+        return PlannedTrajectory(
+            False, f'rejected: {when}{violation.words}', len(self._times), self._duration,
+            violation.reason, violation.time, violation.leg, violation.limit)
+
+    @property
+    def _duration(self) -> float:
+        """From the first point to the last [s]."""
+        return float(self._times[-1] - self._times[0]) * 1e-9
+
+
+def _seconds(nanoseconds: Stamps) -> Array:
+    return np.multiply(nanoseconds, 1e-9, dtype=float)
+
+
+def _samples(many: Array, piece: int) -> Iterator[_Samples]:
+    """
+    Yield pieces of the samples that part the intervals of points (N,) in so many.
+
+    Both points are among them, where there is more than one part.
+    """
+    which = np.flatnonzero(many > 1.0)
+    ends = np.cumsum(many[which] + 1.0)
+    begins = ends - many[which] - 1.0
+    samples = int(ends[-1]) if len(which) else 0
+    # The last of a piece is the first of the next one: something lies between two samples.
+    for first in range(0, samples - 1, piece):
+        index = np.arange(first, min(first + piece + 1, samples), dtype=float)
+        of = np.searchsorted(ends, index, side='right')
+        yield which[of], (index - begins[of]) / many[which[of]]
+
+
+_IN_PARTS: Array = np.linspace(0.0, 1.0, _PARTS + 1, dtype=np.float64)

@@ -1,0 +1,227 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Publishes a motion as setpoints, in real time or in that of a simulation."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from geometry_msgs.msg import (
+    Accel, AccelStamped, Point, Pose, PoseStamped, Quaternion, Transform, Twist, TwistStamped,
+    Vector3)
+from rclpy.clock import Clock, ClockType, JumpThreshold
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from rclpy.time import Time
+from std_msgs.msg import Header
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.rows import MOTION
+from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sample_time
+from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.run import run
+from stewart_dynamics.setpoints import topics as inputs
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+# Samples are computed so many at once: one by one they cost more than to publish.
+_BLOCK = 256
+
+_SETTLE = 500_000_000  # [ns]
+
+
+class TrajectoryNode(Node):
+    """
+    Publishes the motion's samples when they are due, then holds the final pose or is done.
+
+    With ``use_sim_time`` they are due by /clock and published as soon as it comes: a simulation
+    may run as fast or as slowly as it can, or wait for what it is answered.
+
+    Parameters
+    ----------
+    done : Future
+        Gets the exit code after the last sample.
+
+    Raises ParameterError where the parameters break a rule.
+
+    """
+
+    def __init__(self, done: Future) -> None:
+        super().__init__(
+            'stewart_trajectory', automatically_declare_parameters_from_overrides=True,
+            allow_undeclared_parameters=True)
+        self._settings = declare_parameters(self, ReferenceMotionParameters)
+        self._done = done
+        self._loop = self._settings['loop']
+        self._samples = sample_count(self._settings)
+        self._frame = self._settings['base_frame']
+        self._index = 0
+        self._block: Any = None
+        self._held: list[list[float]] | None = None
+        self._row()  # an error in it is raised before anything moves
+        target = self._settings['target']
+        qos = QoSProfile(depth=1000)
+        if self._settings['output'] == 'combined':
+            self._combined = self.create_publisher(
+                MultiDOFJointTrajectory, f'{target}/{inputs.COMBINED}', qos)
+            self._outputs = [self._combined]
+            self._publish = self._publish_combined
+        else:
+            self._pose = self.create_publisher(PoseStamped, f'{target}/{inputs.POSE}', qos)
+            self._twist = self.create_publisher(TwistStamped, f'{target}/{inputs.TWIST}', qos)
+            self._accel = self.create_publisher(AccelStamped, f'{target}/{inputs.ACCEL}', qos)
+            self._outputs = [self._pose, self._twist, self._accel]
+            self._publish = self._publish_separate
+        self._begun = self._subscribed = False
+        self._start = time.monotonic_ns() + round(self._settings['start_timeout'] * 1e9)
+        self._timer = self.create_timer(
+            1.0 / self._settings['rate'], self._on_timer,
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._simulated = self.get_parameter('use_sim_time').value
+        if self._simulated:
+            self._jumps = self.get_clock().create_jump_callback(
+                JumpThreshold(min_forward=Duration(nanoseconds=1),
+                              min_backward=Duration(nanoseconds=-1), on_clock_change=False),
+                post_callback=self._on_clock)
+        motion, rate = self._settings['motion.type'], self._settings['rate']
+        self.get_logger().info(
+            f'{motion} motion at {rate:g} Hz to {target}' + (
+                ', until stopped' if self._loop else f', {self._samples} setpoints'))
+
+    def _on_timer(self) -> None:
+        """Begin, and go on in real time."""
+        now = time.monotonic_ns() - self._start
+        if self._begun:
+            self._publish_due(now)
+            return
+        self._wait(now)
+        if self._begun and self._simulated:
+            self._timer.cancel()
+            self._publish_due(0)  # the clock may wait for what comes of it
+
+    def _on_clock(self, jump: Any) -> None:
+        """Go on in simulated time."""
+        if not self._begun:
+            return
+        now = self.get_clock().now().nanoseconds - self._stamp
+        # A simulation that starts anew begins where the motion began.
+        if now < 0 or (now == 0 and jump.delta.nanoseconds < 0):
+            self.get_logger().warning('/clock is back at the start of the motion: it restarts')
+            self._stamp += now
+            self._index = now = 0
+            self._held = None
+        self._publish_due(now)
+
+    def _publish_due(self, now: int) -> None:
+        """Publish what is due, each sample with its own stamp, however late it is [ns]."""
+        if self._held:  # of these the last one is enough
+            self._index = max(self._index, int(now * 1e-9 * self._settings['rate']))
+        while not self._done.done():
+            due = int(sample_time(self._settings, self._index))
+            if due > now:
+                return
+            row = self._row()
+            self._publish(row, Time(nanoseconds=self._stamp + due).to_msg())
+            self._index += 1
+            if not self._loop and self._index == self._samples:
+                self._end(*row[:2])
+
+    def _end(self, position: list[float], quaternion: list[float]) -> None:
+        """Hold the pose of the last sample, or end."""
+        log = self.get_logger()
+        if self._settings['motion.hold_at_end']:
+            self._held = [position, quaternion, *[[0.0] * 3] * 4]
+            log.info(f'{self._samples} setpoints published; holds the final pose until stopped')
+        else:
+            log.info(f'{self._samples} setpoints published')
+            self._done.set_result(0)
+
+    def _wait(self, now: int) -> None:
+        """Begin when it is time, which comes sooner once all topics have subscribers."""
+        if not self._subscribed and all(p.get_subscription_count() for p in self._outputs):
+            self._subscribed = True
+            # A subscriber may discover the publisher later than the publisher discovers it.
+            if now < -_SETTLE:
+                self._start += now + _SETTLE
+                now = -_SETTLE
+        stamp = self.get_clock().now().nanoseconds
+        if now >= 0 and not stamp:  # simulated time stands at zero until there is a clock
+            self.get_logger().warning('waiting for /clock', once=True)
+        elif now >= 0:
+            self._begun = True
+            if not self._subscribed:
+                self.get_logger().warning('begun, but not every topic has a subscriber: '
+                                          + ', '.join(p.topic_name for p in self._outputs
+                                                      if not p.get_subscription_count()))
+            self._start += now
+            self._stamp = stamp
+
+    def _row(self) -> list[list[float]]:
+        """Return position, quaternion and the four rates of the sample that is due."""
+        if self._held:
+            return self._held
+        at = self._index % _BLOCK
+        if at == 0:
+            times = sample_time(self._settings, range(self._index, self._index + _BLOCK)) * 1e-9
+            motion = motion_at(self._settings, times)
+            quaternions = to_quaternion(motion.rotation)
+            self._block = [
+                [row[0:3], quaternion, row[12:15], row[15:18], row[18:21], row[21:MOTION]]
+                for row, quaternion in zip(
+                    motion.rows.tolist(), quaternions.tolist(), strict=True)]
+        row: list[list[float]] = self._block[at]
+        return row
+
+    def _publish_separate(self, row: list[list[float]], stamp: Any) -> None:
+        header = Header(stamp=stamp, frame_id=self._frame)
+        position, quaternion, *rates = row
+        linear, angular, linear_rate, angular_rate = map(_vector, rates)
+        self._pose.publish(PoseStamped(header=header, pose=Pose(
+            position=_xyz(Point, position), orientation=_quaternion(quaternion))))
+        self._twist.publish(TwistStamped(
+            header=header, twist=Twist(linear=linear, angular=angular)))
+        self._accel.publish(AccelStamped(
+            header=header, accel=Accel(linear=linear_rate, angular=angular_rate)))
+
+    def _publish_combined(self, row: list[list[float]], stamp: Any) -> None:
+        position, quaternion, *rates = row
+        linear, angular, linear_rate, angular_rate = map(_vector, rates)
+        self._combined.publish(MultiDOFJointTrajectory(
+            header=Header(stamp=stamp, frame_id=self._frame), joint_names=['platform'],
+            points=[MultiDOFJointTrajectoryPoint(
+                transforms=[Transform(
+                    translation=_vector(position), rotation=_quaternion(quaternion))],
+                velocities=[Twist(linear=linear, angular=angular)],
+                accelerations=[Twist(linear=linear_rate, angular=angular_rate)])]))
+
+
+def _xyz(kind: Any, three: list[float]) -> Any:
+    return kind(x=three[0], y=three[1], z=three[2])
+
+
+def _vector(three: list[float]) -> Any:
+    return _xyz(Vector3, three)
+
+
+def _quaternion(four: list[float]) -> Any:
+    return Quaternion(x=four[0], y=four[1], z=four[2], w=four[3])
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    done: Future = Future()
+    return run(lambda: TrajectoryNode(done), ReferenceMotionParameters, done)

@@ -1,0 +1,243 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The report of one bag: an HTML page with tables, plots linked in time and the platform in motion.
+
+It needs no network: plotly.js is taken from the PyPI package plotly. Numbers are embedded as
+base64 of typed arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import hashlib
+import os
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.report_verdicts import (
+    date, exceeded_limits, rejections, smallest_margins, units, verdicts)
+from stewart_dynamics.reporting import plots as channels
+from stewart_dynamics.reporting.curves import Curves, Frames
+from stewart_dynamics.reporting.force_sources import sources_of
+from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
+from stewart_dynamics.reporting.plots import (
+    base_wrench_plots, COLORS, measured_plots, motion_plots, spectrum_plots)
+from stewart_dynamics.reporting.spectrum import drawn, Spectrum
+from stewart_dynamics.setpoints.step import Batch, Outputs
+
+FOLDER = Path(__file__).with_name('templates')
+# A frame of the moving platform: position, rotation, lengths, forces.
+_FRAME = 24
+# At most so many times of one kind are listed, the first ones.
+_MOST_TIMES = 20
+
+
+class Report:
+    """
+    The plots of a bag, collected block by block, and the file that contains them.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod.
+    measured : bool
+        There are measured forces: ``add_measured`` will be called.
+
+    """
+
+    def __init__(self, parameters: Parameters, measured: bool = False) -> None:
+        self._parameters = parameters
+        self._legs: tuple[str, ...] = parameters['joints']
+        timeout = parameters['setpoint.timeout']
+        self._channels = channels.channels_of(parameters)
+        self._curves = Curves(self._channels, timeout)
+        self._spectrum = Spectrum(6, timeout)
+        self._frames = Frames(_FRAME)
+        self._compared = Curves(channels.COMPARED, timeout) if measured else None
+        self._angles: Array = np.zeros((1, 3))
+
+    def add(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
+            breakdown: Array) -> None:
+        """
+        Add setpoints and their outputs.
+
+        Parameters
+        ----------
+        seconds : (N,)
+            Since the first setpoint of the bag, never decreasing [s].
+        setpoints : Batch
+            At least one.
+        outputs : Outputs
+            Of these setpoints.
+        base_wrenches : (N, 6)
+            What the hexapod puts on its base [N, N m]; nan: not known.
+        breakdown : (N, 7, 6)
+            The demanded forces by source: sample, source, leg [N].
+
+        """
+        motions, forces = setpoints.motions, outputs.demanded_forces
+        rows = np.empty((self._channels, len(seconds)))
+        rows[channels.POSITION] = motions[:, 0:3].T
+        rows[channels.ANGLES] = self._continued(_euler(motions[:, 3:12])).T
+        rows[channels.VELOCITY] = motions[:, 12:15].T
+        rows[channels.OMEGA] = np.degrees(motions[:, 15:18]).T
+        rows[channels.ACCELERATION] = motions[:, 18:21].T
+        rows[channels.ALPHA] = np.degrees(motions[:, 21:24]).T
+        rows[channels.LENGTHS] = outputs.lengths.T
+        rows[channels.RATES] = outputs.rates.T
+        rows[channels.FORCES] = forces.T
+        with np.errstate(over='ignore'):
+            rows[channels.POWERS] = (forces * outputs.rates).T
+        rows[channels.DETERMINANT] = outputs.determinants
+        rows[channels.CONDITION] = outputs.conditions
+        rows[channels.BASE_WRENCH] = base_wrenches.T
+        parts = rows[channels.BREAKDOWN.start:channels.joint_angles_of(self._parameters).start]
+        parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
+        rows[channels.joint_angles_of(self._parameters)] = np.degrees(outputs.joint_angles).T
+        self._curves.add(seconds, rows)
+        self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
+        self._frames.add(seconds, np.concatenate(
+            [motions[:, :12], outputs.lengths, forces], axis=1))
+
+    def add_measured(
+            self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:
+        """
+        Add measured forces and the computed ones at the same times.
+
+        Parameters
+        ----------
+        seconds : (M,)
+            Since the first setpoint of the bag, never decreasing [s].
+        measured, computed : (M, 6)
+            Leg forces [N].
+        wrench : (M, 6)
+            The external wrench that accounts for their difference [N, N m].
+
+        """
+        if self._compared is None:
+            raise ValueError('the report was created without measured forces')
+        self._compared.add(seconds, np.concatenate(
+            [measured, computed, measured - computed, wrench], axis=1).T)
+
+    def write(self, path: Path, summary: Mapping[str, Any], plotly: Path | None = None) -> None:
+        """
+        Write the report.
+
+        Parameters
+        ----------
+        path : Path
+            The file; one that exists is overwritten.
+        summary : mapping
+            The content of summary.json.
+        plotly : Path, optional
+            The file of plotly.js that several reports share; by default it is in the report.
+
+        Raises StewartError if plotly is not installed.
+
+        """
+        script = plotly_script() if plotly is None else ''
+        text = page(
+            FOLDER, 'report', [script] if script else [], plotly is not None, s=summary,
+            p=self._parameters, legs=list(self._legs),
+            name=Path(summary['bag']).name or summary['bag'], plotly=script,
+            plotly_file=None if plotly is None else quote(Path(
+                os.path.relpath(plotly, path.parent)).as_posix()),
+            data=self._data(summary), sources=sources_of(self._parameters),
+            verdicts=verdicts(summary), exceeded=exceeded_limits(summary['limits']),
+            margins=smallest_margins(summary),
+            rejected=sum(each['count'] for each in summary['rejected']),
+            rejections=rejections(summary),
+            date=date(summary['setpoints']['first_stamp_ns']), units=units(),
+            most_times=_MOST_TIMES)
+        path.write_text(text, encoding='utf-8', errors='backslashreplace', newline='\n')
+
+    def _continued(self, angles: Array) -> Array:
+        """Return angles [deg] without jumps at half a turn."""
+        whole = np.concatenate([self._angles, angles])
+        turns = np.cumsum(np.round(np.diff(whole, axis=0) / 360.0), axis=0)
+        continued: Array = angles - 360.0 * turns
+        self._angles = continued[-1:]
+        return continued
+
+    def _data(self, summary: Mapping[str, Any]) -> dict[str, Any]:
+        times, frames = self._frames.chosen()
+        singularity = summary['singularity']
+        p = self._parameters
+        known = not summary['quasi_static']
+        curves = [_curve(self._curves, n) for n in range(self._channels)]
+        plots = [*motion_plots(p, known), *base_wrench_plots()] if self._curves.samples else []
+        density = self._spectrum.density()
+        if density is not None:
+            plots += spectrum_plots(density, len(curves))
+            curves += [_packed(*drawn(density.frequencies, each)) for each in density.amplitudes]
+        if self._compared is not None and self._compared.samples:
+            plots += measured_plots(p, len(curves))
+            curves += [_curve(self._compared, n) for n in range(channels.COMPARED)]
+        return {
+            'samples': self._curves.samples,
+            'samplesInBucket': self._curves.samples_in_bucket,
+            'begin': float(times[0]) if len(times) else 0.0,
+            'end': float(times[-1]) if len(times) else 0.0,
+            'legs': self._legs,
+            'colors': COLORS,
+            'baseJoints': p['geometry.base_joints'].tolist(),
+            'platformJoints': p['geometry.platform_joints'].tolist(),
+            'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},
+            'warnings': singularity['warnings_from_to_s'],
+            'crossings': singularity['crossings_at_s'],
+            'allWarnings': singularity['warnings'],
+            'allCrossings': singularity['crossings'],
+            'contacts': [[each['from_s'], each['to_s']] for each in (
+                summary['measured']['contacts']['strongest'] if summary['measured'] else ())],
+            'curves': curves,
+            'plots': [plot.plain() for plot in plots],
+        }
+
+
+def _euler(rotations: Array) -> Array:
+    """Return alpha, beta, gamma (N, 3) [deg] of rows of R = Rz(gamma) Ry(beta) Rx(alpha)."""
+    r = rotations.T
+    level = np.hypot(r[0], r[3])
+    angles: Array = np.degrees(np.stack([
+        np.arctan2(r[7], r[8]), np.arctan2(-r[6], level), np.arctan2(r[3], r[0])], axis=1))
+    return angles
+
+
+def _curve(curves: Curves, channel: int) -> dict[str, str]:
+    return _packed(*curves.drawn(channel))
+
+
+def _packed(times: Array, values: Array) -> dict[str, str]:
+    most = float(np.finfo(np.float32).max)
+    return {'times': base64_of(times, '<f8'), 'values': base64_of(values.clip(-most, most), '<f4')}
+
+
+def share_plotly(folder: Path) -> Path:
+    """Write plotly.js into a folder, if it is not there; return its path."""
+    script = plotly_script().encode()
+    path = folder.absolute() / f'plotly-{hashlib.sha256(script).hexdigest()[:12]}.min.js'
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f'.{path.name}.{os.getpid()}')
+        partial.write_bytes(script)
+        partial.replace(path)
+    return path

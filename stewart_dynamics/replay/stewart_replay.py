@@ -1,0 +1,186 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The command line of stewart_replay."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from stewart_dynamics.program import DONE, interrupt_on_signals, node_name, Program
+from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.table import Parameters
+
+_PROGRAM = Program('stewart_replay')
+_CUTOFF = 10.0
+_TOPICS = {
+    'pose': 'poses', 'twist': 'twists', 'accel': 'accelerations',
+    'combined': 'setpoints in one message; sets setpoint.source',
+    'wrench': 'external wrench on the platform; never found by its type',
+    'base_pose': 'poses of the base in the world', 'base_twist': 'twists of the base',
+    'base_accel': 'accelerations of the base', 'base_imu': 'IMU on the base'}
+# Up to this number of bags the summary of each is printed; of more only the totals.
+_FEW = 10
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    parser = _arguments()
+    given = parser.parse_args(arguments)
+    if given.cutoff and not given.differentiate:
+        parser.error('--cutoff: needs --differentiate')
+    return _PROGRAM.exit_code(lambda: _run(given, _options(given)))
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Compute leg lengths, forces and singularity warnings of recorded setpoints, '
+                    'as the node does, bit for bit.',
+        epilog='For every bag, DIR/<name of the bag>/ gets bag/ (MCAP, the topics of the node), '
+               'legs.csv,\nsummary.json and report.html; of several bags DIR/ gets fleet.csv and '
+               'index.html.\n\nexit codes: 0 done; 1 with --strict, when a limit or singularity '
+               'warning was met;\n2 bad arguments, parameters or bags; 3 part of a bag could not '
+               'be read, the rest is done; 130 interrupted;\n'
+               'of several bags the most severe: 2, then 3, then 1')
+    parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
+                        help='rosbag2 folder, .mcap or .db3 file, .bag file of ROS 1, or a folder '
+                             'with bags in it')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the hexapod, the file that the node takes')
+    parser.add_argument('--output', type=Path, default=Path('replayed'), metavar='DIR',
+                        help='folder of the results (default: replayed)')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when a limit or singularity warning was met')
+    topics = parser.add_argument_group(
+        'topics', 'Inputs are looked for under the usual names, then by their type.')
+    topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
+                        help=f'name before the usual topics (default: {NODE})')
+    for name, what in _TOPICS.items():
+        topics.add_argument(f'--{name.replace("_", "-")}', metavar='TOPIC',
+                            help=f'topic of the {what}')
+    topics.add_argument('--measured', metavar='TOPIC',
+                        help='JointState whose efforts are compared with the computed forces')
+    poses = parser.add_argument_group('bags that have only poses')
+    poses.add_argument('--differentiate', action='store_true',
+                       help='compute twist and acceleration from the poses by smoothing splines')
+    poses.add_argument('--cutoff', type=_frequency, metavar='HZ',
+                       help=f'cut-off frequency of the splines (default: {_CUTOFF:g}); as low as '
+                            'the motion allows: noise grows with its power of 2.5')
+    output = parser.add_argument_group('what is written')
+    output.add_argument('--no-report', action='store_true', help='write no report.html')
+    output.add_argument('--plotly', choices=('inline', 'shared'), default='inline',
+                        help='shared: one file of plotly.js in DIR for all reports, which are '
+                             '5 MB smaller and need it (default: inline)')
+    output.add_argument('--parquet', action='store_true',
+                        help='write legs.parquet in place of legs.csv')
+    many = parser.add_argument_group('many bags')
+    many.add_argument('--jobs', type=_number, default=1, metavar='N',
+                      help='bags that are replayed at the same time (default: 1)')
+    many.add_argument('--scheduler', metavar='ADDRESS',
+                      help='replay on the workers of this Dask scheduler; they must see '
+                           'the same folders')
+    return parser
+
+
+def _options(given: argparse.Namespace) -> Options:
+    return Options(
+        node=given.node,
+        topics={name: getattr(given, name) for name in _TOPICS if getattr(given, name)},
+        cutoff=(given.cutoff or _CUTOFF) if given.differentiate else None,
+        measured=given.measured or None,
+        parquet=given.parquet, report=not given.no_report, force=given.force)
+
+
+def _run(given: argparse.Namespace, options: Options) -> int:
+    # Imported here, so that --help is fast.
+    from stewart_dynamics.bags.find import FLEET_PAGE, folders_of_results
+    from stewart_dynamics.compilation.entry_point import prepare
+    from stewart_dynamics.compilation.machine_code import HINT
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters.table import Parameters
+    from stewart_dynamics.replay.bag_report import share_plotly
+    from stewart_dynamics.replay.many_bags import replay_fleet
+    from stewart_dynamics.replay.one_bag import FUNCTIONS
+
+    interrupt_on_signals()
+    parameters = Parameters.from_yaml(given.params, given.node)
+    bags = folders_of_results(given.bags, given.output)
+    if options.report and given.plotly == 'shared':
+        options = options._replace(plotly=share_plotly(given.output))
+    if HINT:
+        _PROGRAM.complain(HINT)
+    prepare(FUNCTIONS)  # now, side by side, and not in each process
+    for mistake in likely_mistakes(parameters):
+        _PROGRAM.complain(f'warning: {mistake}')
+    if len(bags) == 1 and given.scheduler is None and bags[0][0] == given.bags[0]:
+        return _one(*bags[0], parameters, options, given.strict)
+    fleet = replay_fleet(
+        bags, parameters, given.output, options, given.jobs, given.scheduler)
+    for ended in fleet.ended:
+        if ended.text and len(bags) <= _FEW:
+            _PROGRAM.say(f'{ended.text}\n')
+        if ended.error:
+            _PROGRAM.complain(ended.error)
+    _PROGRAM.say(fleet.text().partition('\n')[0])
+    _PROGRAM.say(f'results: {given.output / FLEET_PAGE}')
+    return fleet.code(given.strict)
+
+
+def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, strict: bool) -> int:
+    from tqdm import tqdm
+
+    from stewart_dynamics.bags.find import bytes_of
+    from stewart_dynamics.replay.one_bag import replay
+    from stewart_dynamics.reporting.results_folder import remove_abandoned
+
+    remove_abandoned([folder])
+    with tqdm(total=bytes_of(bag), unit='B', unit_scale=True, disable=None, leave=False,
+              dynamic_ncols=True) as bar:
+        done = 0
+
+        def progress(read: int, setpoints: int) -> None:
+            nonlocal done
+            done += setpoints
+            bar.set_postfix_str(f'{tqdm.format_sizeof(done)} setpoints', refresh=False)
+            bar.update(read)
+
+        replayed = replay(bag, parameters, folder, options, progress)
+    _PROGRAM.say(replayed.text)
+    _PROGRAM.say(f'results: {folder}')
+    if replayed.summary['missing']:
+        missing = '; '.join(replayed.summary['missing'])
+        _PROGRAM.complain(f'{bag}: part of it could not be read: {missing}')
+    return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
+
+
+def _frequency(text: str) -> float:
+    value = float(text)
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least 1e-6, at most 1e6')
+    return value
+
+
+def _number(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least 1')
+    return value

@@ -1,0 +1,133 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+HTML pages from the templates in this package, by Jinja2 with autoescaping.
+
+A page contains its style and scripts; its content security policy allows no other scripts, by
+their digests. Names given by users are text, never markup.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+import functools
+import hashlib
+import importlib.util
+import math
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+import numpy as np
+from numpy.typing import ArrayLike
+from stewart_dynamics.errors import StewartError
+
+_SHARED = Path(__file__).with_name('templates')
+
+# Between thousands: a narrow space that does not break, as SI recommends.
+_THIN_SPACE = '\u202f'
+
+
+def number(value: float | None, decimals: int) -> str:
+    """Return a number with so many decimals, without any from 1e5 on."""
+    if value is None or not math.isfinite(value):
+        return '–'
+    return _typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)
+
+
+def digits(value: float | None) -> str:
+    """Return a number with five digits, or all digits before the point."""
+    if value is None or not math.isfinite(value):
+        return '–'
+    if not 1e3 <= abs(value) < 1e10:
+        return _typeset(f'{value:.5g}')
+    text = f'{value:.5g}' if abs(value) < 1e5 else f'{value:.0f}'
+    decimals = len(text.partition('.')[2]) if 'e' not in text else 0
+    return _typeset(f'{value:,.{decimals}f}')
+
+
+def thousands(count: int) -> str:
+    """Return a count with spaces between thousands."""
+    return _typeset(f'{count:,}')
+
+
+def _typeset(text: str) -> str:
+    return text.replace(',', _THIN_SPACE).replace('-', '−')
+
+
+@functools.lru_cache(maxsize=2)
+def _environment(folder: Path) -> Environment:
+    made = Environment(loader=FileSystemLoader([folder, _SHARED]), autoescape=True,
+                       undefined=StrictUndefined, keep_trailing_newline=True)
+    made.filters.update(number=number, digits=digits, thousands=thousands, exactly=repr)
+    made.tests['finite'] = lambda value: value is not None and math.isfinite(value)
+    # Data cannot end the element that contains them: the filter escapes < > & and '.
+    made.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
+    return made
+
+
+def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool = False,
+         **values: Any) -> str:
+    """
+    Return a page.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the template.
+    template : str
+        Name of the template (.html), its style (.css) and its script (.js).
+    scripts : sequence of str
+        Other scripts that the page is allowed to run.
+    shared : bool
+        The page is allowed to run scripts in files.
+    values : mapping
+        Variables of the template.
+
+    """
+    script, style = (folder.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
+                     for suffix in ('.js', '.css'))
+    script = f'\n{script}'
+    hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script)),
+                       *(["'self'"] if shared else [])])
+    return _environment(folder).get_template(f'{template}.html').render(
+        hashes=hashes, script=script, style=style, **values)
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def base64_of(numbers: ArrayLike, kind: str) -> str:
+    """Return numbers as a typed array, in base64."""
+    return base64.b64encode(np.ascontiguousarray(numbers, dtype=kind).tobytes()).decode()
+
+
+@functools.lru_cache(maxsize=1)
+def plotly_script() -> str:
+    """Return plotly.js; the package plotly is not imported."""
+    found = importlib.util.find_spec('plotly')
+    for folder in found.submodule_search_locations or () if found else ():
+        try:
+            script = (Path(folder) / 'package_data' / 'plotly.min.js').read_text(encoding='utf-8')
+        except OSError:
+            continue
+        # A browser reads line ends as \n, and ends a script at the first of these.
+        script = script.replace('\r\n', '\n').replace('\r', '\n')
+        return script.replace('</script', r'<\/script').replace('<!--', r'<\!--')
+    raise StewartError('the report needs plotly, which is not installed: pip install plotly, or '
+                       'use --no-report')

@@ -1,0 +1,256 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The plots of a report over time and frequency: channels, titles, notes and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
+from stewart_dynamics.mechanics.limits import ANGLES as ANGLES_OF, BASE_ANGLE_MAX, OF_JOINTS
+from stewart_dynamics.mechanics.rows import JOINT_ANGLES
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.force_sources import sources_of
+from stewart_dynamics.reporting.spectrum import Density
+
+# Okabe and Ito's palette for the color-blind, without yellow, which is not visible on white.
+COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
+_AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
+_BLACK = '#222222'
+_SOURCE_COLORS = dict(zip(SOURCES, (*COLORS, _BLACK), strict=True))
+
+# The channels of a sample.
+POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
+    slice(n, n + 3) for n in range(0, 18, 3))
+LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
+DETERMINANT, CONDITION = 42, 43
+BASE_WRENCH = slice(44, 50)
+# How many there are depends on the sources. Last, where they have limits, the joints' angles.
+BREAKDOWN = slice(50, 50 + 6 * len(SOURCES))
+
+BASE_SECTION = 'base_wrench'
+
+# The channels of a comparison with measured forces, after those of the motion.
+MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
+COMPARED = 24
+
+
+def channels_of(parameters: Parameters) -> int:
+    """Return the number of channels of a sample."""
+    stop: int = joint_angles_of(parameters).stop
+    return stop
+
+
+def joint_angles_of(parameters: Parameters) -> slice:
+    """Return the channels of the joints' angles; there are none without limits."""
+    first = BREAKDOWN.start + 6 * len(sources_of(parameters))
+    limited = any(parameters[name] is not None for name in OF_JOINTS)
+    return slice(first, first + JOINT_ANGLES * limited)
+
+
+class Curve(NamedTuple):
+    """A line in a plot."""
+
+    name: str
+    color: str
+    curve: int
+    dash: str = 'solid'
+    width: float = 1.6
+
+
+class Bound(NamedTuple):
+    """A horizontal line in a plot."""
+
+    value: float
+    text: str
+    color: str = _BLACK
+
+
+class Plot(NamedTuple):
+    """A plot over time, or over frequency; the user selects one of its variants."""
+
+    key: str
+    figure: str
+    title: str
+    unit: str
+    variants: Mapping[str, Sequence[Curve]]
+    note: str = ''
+    bounds: Sequence[Bound] = ()
+    log: bool = False
+    contacts: bool = False
+    """Shade the intervals with an external load."""
+    spikes: bool = False
+    """A few samples may be far larger than the others: they do not set the scale."""
+    section: str = 'plots'
+    """Where it is in the report."""
+    spectrum: bool = False
+    """Over frequency, both axes logarithmic."""
+
+    def plain(self) -> dict[str, Any]:
+        """Return the plot for JSON."""
+        return self._asdict() | {
+            'bounds': [bound._asdict() for bound in self.bounds],
+            'variants': [{'name': name, 'curves': [curve._asdict() for curve in curves]}
+                         for name, curves in self.variants.items()]}
+
+
+def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
+    """Return the plots of motion and forces; those of velocities only if they are known."""
+    p, joints = parameters, parameters['joints']
+    of_motion = [
+        Plot('velocity', '13', 'Velocity of the platform', 'm/s',
+             _of_axes(VELOCITY, 'v x', 'v y', 'v z'), 'of its origin, base axes'),
+        Plot('angular_velocity', '13', 'Angular velocity of the platform', 'deg/s',
+             _of_axes(OMEGA, 'w x', 'w y', 'w z'),
+             'base axes; not the rates of alpha, beta, gamma'),
+        Plot('acceleration', '14', 'Acceleration of the platform', 'm/s²',
+             _of_axes(ACCELERATION, 'a x', 'a y', 'a z'), 'of its origin, base axes'),
+        Plot('angular_acceleration', '14', 'Angular acceleration of the platform', 'deg/s²',
+             _of_axes(ALPHA, 'dw/dt x', 'dw/dt y', 'dw/dt z'), 'base axes')]
+    of_rates = [
+        Plot('rates', '', 'Leg rates', 'm/s', _of_legs(joints, RATES), '+ extends',
+             _bounds('velocity_max', p['limits.velocity_max'], both=True)),
+        Plot('powers', '', 'Mechanical power of the legs', 'W', _of_legs(joints, POWERS),
+             'demanded force times rate; + drives, − brakes', spikes=True)]
+    return [
+        Plot('position', '12', 'Inputs: position of the platform', 'm',
+             _of_axes(POSITION, 'X', 'Y', 'Z'), 'of its origin, base axes'),
+        Plot('angles', '12', 'Inputs: orientation of the platform', 'deg',
+             _of_axes(ANGLES, 'alpha', 'beta', 'gamma'), 'R = Rz(gamma) Ry(beta) Rx(alpha)'),
+        *(of_motion if velocities_known else ()),
+        Plot('lengths', '15', 'Leg lengths', 'm', _of_legs(joints, LENGTHS),
+             'between the joint centers', [
+                 *_bounds('length_min', p['limits.length_min']),
+                 *_bounds('length_max', p['limits.length_max'])]),
+        *(_of_joints(p, limit) for limit in OF_JOINTS if p[limit] is not None),
+        Plot('determinant', '17', 'det(J)', 'm³',
+             {'': [Curve('det(J)', COLORS[0], DETERMINANT)]},
+             'zero at a singularity', [Bound(0.0, 'singular', '#c00000')],
+             spikes=True),
+        Plot('condition', '17', 'Condition number of J_inv', '–',
+             {'': [Curve('condition', COLORS[1], CONDITION)]}, 'dimensionless; 1 is best', [
+                 Bound(p['singularity.warn_condition'], 'warn', '#b36b00'),
+                 Bound(p['singularity.stop_condition'], 'stop', '#c00000')], log=True),
+        Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, FORCES),
+             'demanded by the motion, + pushes',
+             _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
+        *(of_rates if velocities_known else ()),
+        Plot('force_breakdown', '', 'Leg force by source', 'N', {
+            leg: [Curve('sum', '#a3abb6', FORCES.start + n, width=4.5),
+                  *(Curve(source, _SOURCE_COLORS[source], BREAKDOWN.start + 6 * k + n)
+                    for k, source in enumerate(sources_of(p)))]
+            for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
+
+
+def _of_joints(p: Parameters, limit: str) -> Plot:
+    name = limit.removeprefix('limits.')
+    which, first = ANGLES_OF[limit], joint_angles_of(p).start
+    joint = 'base' if limit == BASE_ANGLE_MAX else 'platform'
+    return Plot(
+        name.removesuffix('_max'), '', f'Angles of the {joint} joints', 'deg',
+        _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
+        f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
+        _bounds(name, np.degrees(p[limit])))
+
+
+def base_wrench_plots() -> list[Plot]:
+    """Return the plots of the base wrench over time."""
+    return [
+        Plot('base_force', '', 'Force on the base', 'N',
+             _all_or_one(_of_axes(_first(BASE_WRENCH), 'F x', 'F y', 'F z')),
+             'of the whole hexapod, base axes', spikes=True, section=BASE_SECTION),
+        Plot('base_moment', '', 'Moment on the base', 'N m',
+             _all_or_one(_of_axes(_last(BASE_WRENCH), 'M x', 'M y', 'M z')),
+             "about the base's origin, base axes", spikes=True, section=BASE_SECTION)]
+
+
+def spectrum_plots(density: Density, first: int) -> list[Plot]:
+    """Return the plots of the spectra of the base wrench, whose curves begin at a number."""
+    wrench = slice(first, first + 6)
+    note = (f'amplitude spectral density up to the Nyquist rate; {density.segments} Hann '
+            f'{"window" if density.segments == 1 else "windows"} of {density.seconds:.3g} s, '
+            'without their means')
+    if density.uneven:
+        note += (f'; {100.0 * density.uneven:.2g} % of the steps in time are uneven, values are '
+                 'interpolated: the upper half of the frequencies may be too low')
+    return [
+        Plot('base_force_spectrum', '', 'Spectrum of the force on the base', 'N/√Hz',
+             _of_axes(_first(wrench), 'F x', 'F y', 'F z'), note, log=True,
+             section=BASE_SECTION, spectrum=True),
+        Plot('base_moment_spectrum', '', 'Spectrum of the moment on the base', 'N m/√Hz',
+             _of_axes(_last(wrench), 'M x', 'M y', 'M z'), note, log=True,
+             section=BASE_SECTION, spectrum=True)]
+
+
+def _first(wrench: slice) -> slice:
+    return slice(wrench.start, wrench.start + 3)
+
+
+def _last(wrench: slice) -> slice:
+    return slice(wrench.start + 3, wrench.stop)
+
+
+def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
+    """Return the plots of a comparison, whose channels begin at a number."""
+    joints = parameters['joints']
+    measured, computed, residual, wrench = (
+        slice(first + each.start, first + each.stop)
+        for each in (MEASURED, COMPUTED, RESIDUAL, WRENCH))
+    return [
+        Plot('measured', '', 'Measured and computed leg force', 'N', {
+            leg: [Curve('measured', _BLACK, measured.start + n),
+                  Curve('computed', COLORS[n], computed.start + n),
+                  Curve('residual', '#888888', residual.start + n, 'dot')]
+            for n, leg in enumerate(joints)}, 'residual: measured less computed',
+            contacts=True, spikes=True),
+        Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(joints, residual),
+             'measured less computed force', contacts=True, spikes=True),
+        Plot('external_force', '', 'External force', 'N', _of_axes(wrench, 'F x', 'F y', 'F z'),
+             'J_inv^T (computed − measured): the load that the model does not include, base axes',
+             contacts=True, spikes=True),
+        Plot('external_moment', '', 'External moment', 'N m',
+             _of_axes(_last(wrench), 'M x', 'M y', 'M z'),
+             "about the platform's origin, base axes", contacts=True, spikes=True)]
+
+
+def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:
+    return {'': [Curve(leg, color, channels.start + n) for n, (leg, color) in
+                 enumerate(zip(joints, COLORS, strict=True))]}
+
+
+def _of_axes(channels: slice, *names: str) -> dict[str, list[Curve]]:
+    return {'': [Curve(name, color, channels.start + n) for n, (name, color) in
+                 enumerate(zip(names, _AXIS_COLORS, strict=True))]}
+
+
+def _all_or_one(variants: Mapping[str, list[Curve]]) -> dict[str, list[Curve]]:
+    """Return all curves as one variant, and each as one: the weight hides the others."""
+    curves = variants['']
+    return {'all': curves, **{curve.name: [curve] for curve in curves}}
+
+
+def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:
+    """Return one line if the bound is the same for all legs, or one per leg in its color."""
+    if values is None:
+        return []
+    alike = bool(np.all(values == values[0]))
+    return [Bound(sign * float(value), name if alike else '', _BLACK if alike else color)
+            for sign in ((1.0, -1.0) if both else (1.0,))
+            for value, color in list(zip(values, COLORS, strict=True))[:1 if alike else 6]]

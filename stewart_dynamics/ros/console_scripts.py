@@ -1,0 +1,105 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The console scripts of the nodes: what needs no ROS is answered before rclpy is imported.
+
+``--help``, a parameter file that breaks a rule, and that ROS is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+import sys
+from typing import Any, NoReturn, TYPE_CHECKING
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.ros.signals import SIGNALS
+
+if TYPE_CHECKING:
+    from stewart_dynamics.parameters.parameter_set import ParameterSet
+    from stewart_dynamics.parameters.rules import Parameter
+
+
+def dynamics() -> int:
+    """Run the node stewart_dynamics, or compile all; return the exit code."""
+    if '--compile' in sys.argv[1:]:
+        SIGNALS.watch(end_at_once=True)
+        return int(_imported('compile_all').compile_all())
+    return _run('parameters.table', 'Parameters', 'node.node')
+
+
+def simulator() -> int:
+    """Run the node stewart_simulator; return its exit code."""
+    return _run('simulator.parameters', 'SimulatorParameters', 'simulator.node')
+
+
+def trajectory() -> int:
+    """Run the node stewart_trajectory; return its exit code."""
+    return _run('reference_motion.parameters', 'ReferenceMotionParameters',
+                'reference_motion.node')
+
+
+def usage(kind: type[ParameterSet]) -> str:
+    """Return what ``--help`` prints."""
+    compiles = kind.node == 'stewart_dynamics'
+    return '\n'.join([
+        f'usage: {kind.node} --ros-args --params-file FILE [-p NAME:=VALUE] [-r FROM:=TO]',
+        *(['       stewart_dynamics --compile    compile all machine code now, and end']
+          if compiles else []), '', 'parameters:',
+        *(_described(each) for each in kind.table.values() if each.name not in kind.unused),
+        *(['', 'accepted, so that programs can share a file, and not used:',
+           f'  {", ".join(name for name in kind.table if name in kind.unused)}']
+          if kind.unused else [])])
+
+
+def _described(parameter: Parameter) -> str:
+    default = parameter.default
+    if isinstance(default, tuple):
+        default = ', '.join(map(str, default))
+    elif isinstance(default, bool):
+        default = 'true' if default else 'false'
+    notes = [parameter.ros_type, parameter.unit, 'required' if parameter.required else '',
+             '' if default in (None, '') else f'default {default}']
+    return f'  {parameter.name} ({", ".join(filter(None, notes))}): {parameter.text}'
+
+
+def _run(module: str, name: str, node: str) -> int:
+    """Run the node of a module, with the parameters of another one; return its exit code."""
+    SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
+    check_arguments = _imported('ros.arguments').check_arguments
+    kind: type[ParameterSet] = getattr(_imported(module), name)
+    if {'-h', '--help'} & set(sys.argv[1:]):
+        print(usage(kind))
+        return 0
+    try:
+        check_arguments(sys.argv, kind)
+        program = _imported(node)
+    except ParameterError as exc:
+        print(f'{kind.node}: {exc}', file=sys.stderr)
+        return 1
+    except ImportError as exc:
+        if (exc.name or '').startswith('stewart_dynamics'):
+            raise
+        reason = ' '.join(str(exc).split())
+        print(f'{kind.node}: needs ROS 2: {reason}: source its setup file, or pip install '
+              '"stewart_dynamics[ros]"', file=sys.stderr)
+        return 1
+    end_process: Callable[[int], NoReturn] = _imported('ros.rclpy_workarounds').end_process
+    end_process(program.main())
+
+
+def _imported(module: str) -> Any:
+    return import_module(f'stewart_dynamics.{module}')

@@ -1,0 +1,251 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The motion of the base as its topics give it: the row that holds at a setpoint's stamp.
+
+Base samples come at their own rate. Of those that have come, a setpoint takes the newest one that
+is not newer than the setpoint by more than the time from the sample before it, and goes from it
+along the straight line through both, forward by at most that time again: between two samples that
+is linear interpolation, behind the last one linear extrapolation, each number of the row by
+itself. A sample older than ``base.timeout`` is not used, nor a line from it to one that is newer
+than the setpoint: the base's motion is not known then.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Integers, Stamps
+from stewart_dynamics.mechanics.frames.base_motion import row_of_imu, row_of_motion, row_of_pose
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
+from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.batch_joining import Joined
+from stewart_dynamics.setpoints.rejections import Rejections
+from stewart_dynamics.setpoints.sample_joining import SampleJoining
+from stewart_dynamics.setpoints.topics import BASE_SOURCES
+
+# So many samples are kept, for setpoints that have waited.
+_KEPT = 1000
+
+_Row = tuple[float, ...]
+
+_NOTHING = Joined(
+    np.empty(0, dtype=np.int64), np.empty((0, 0)), np.empty(0, dtype=np.int64), {}, {})
+
+
+class BaseInput:
+    """
+    Follows the topics of the base.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Where the base's motion comes from, frames, timeout, gravity and the mounting of the IMU.
+    rejections : Rejections
+        Counts what is rejected.
+    noticed : callable
+        Called with texts for the log.
+
+    """
+
+    def __init__(self, parameters: Parameters, rejections: Rejections,
+                 noticed: Callable[[str], object]) -> None:
+        source = parameters['base.source']
+        self.topics = BASE_SOURCES[source]
+        """Which topics; none where the base is still."""
+        self._joining = SampleJoining(
+            self.topics, None if source == 'imu' else parameters['world_frame'],
+            parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
+            lambda text: noticed(f'base: {text}'))
+        self._timeout = round(parameters['base.timeout'] * 1e9)
+        self._restart = round(parameters['setpoint.timeout'] * 1e9)
+        self._row_of: Callable[[int, _Row], _Row] = (
+            _OfImu(parameters) if source == 'imu' else
+            _OfMotion(parameters) if source == 'motion' else _OfPose(parameters))
+        self._samples: deque[tuple[int, _Row]] = deque(maxlen=_KEPT)
+
+    @property
+    def last(self) -> tuple[int, _Row] | None:
+        """Return stamp [ns] and row (BASE,) of the last sample."""
+        return self._samples[-1] if self._samples else None
+
+    def at_rest(self, known: bool) -> Array | None:
+        """Return the row (BASE,) at rest under the last gravity, nan if not known; None: still."""
+        if not self.topics:
+            return None
+        row = np.zeros(BASE)
+        row[GRAVITY] = self._samples[-1][1][GRAVITY] if self._samples and known else np.nan
+        return row
+
+    def take(self, topic: str, data: bytes, now: Callable[[], int]) -> bool:
+        """Use a message, see ``Setpoints.take``; return whether it completes a sample."""
+        sample = self._joining.take(topic, data, now)
+        if sample is None:
+            return False
+        if sample.restart or (self._samples and sample.stamp <= self._samples[-1][0]):
+            self._samples.clear()
+        self._samples.append((sample.stamp, self._row_of(sample.stamp, sample.values)))
+        return True
+
+    def at(self, stamp: int) -> _Row | None:
+        """Return the row (BASE,) at a stamp [ns]; nan where it is not known; None: still."""
+        if not self.topics:
+            return None
+        samples = self._samples
+        n = len(samples) - 1
+        while n > 0 and samples[n - 1][0] > stamp:
+            n -= 1
+        if n < 0:
+            return NO_BASE
+        at, row = samples[n]
+        if stamp - at > self._timeout:
+            return NO_BASE
+        if n == 0:
+            return row if at <= stamp else NO_BASE
+        before, row_before = samples[n - 1]
+        if at > stamp and stamp - before > self._timeout:
+            return NO_BASE
+        part = min(float(stamp - at) / float(at - before), 1.0)
+        return tuple([now + (now - then) * part
+                      for now, then in zip(row, row_before, strict=True)])
+
+    def restarted(self, stamp: int) -> None:
+        """Forget samples of the future of a setpoint [ns] before which time has jumped back."""
+        if self._samples and self._samples[-1][0] > stamp + self._restart:
+            self._samples.clear()
+            self._joining.restart('before setpoints restarted')
+
+    def forget_layouts(self) -> None:
+        """Take the layout of the next sound message of each topic."""
+        self._joining.forget_layouts()
+
+    def end(self, why: str) -> None:
+        """Drop and count what still waits: no more messages come."""
+        self._joining.end(why)
+
+    def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
+        """Join messages, see ``SampleJoining.join_many``."""
+        return self._joining.join_many(messages, places) if self.topics else _NOTHING
+
+    def accept(self, joined: Joined, places: Mapping[str, Integers], stamps: Stamps,
+               completed: Integers) -> Array | None:
+        """
+        Go on behind the samples that ``join_many`` has joined.
+
+        Parameters
+        ----------
+        joined : Joined
+            The samples.
+        places : mapping of topic to (K,)
+            As for ``join_many``.
+        stamps, completed : (N,)
+            Stamps of setpoints [ns], and where in the order of all messages they were complete.
+
+        Returns
+        -------
+        (N, BASE) or None
+            The rows at the setpoints, see ``at``.
+
+        """
+        if not self.topics:
+            return None
+        self._joining.accept(joined, places)
+        old = len(self._samples)
+        new = [(stamp, self._row_of(stamp, tuple(values))) for stamp, values in zip(
+            joined.stamps.tolist(), joined.motions.tolist(), strict=True)]
+        kept = [*self._samples, *new]
+        self._samples.extend(new)
+        rows = np.full((len(stamps), BASE), np.nan)
+        if not kept:
+            return rows
+        at, values = np.array([stamp for stamp, _ in kept]), np.array([row for _, row in kept])
+        # How many samples had come, the newest that may be used, and the oldest that was kept.
+        come = old + np.searchsorted(joined.places, completed)
+        newest = np.minimum(come - 1, np.searchsorted(at, stamps, side='right'))
+        oldest = np.maximum(come - _KEPT, 0)
+        newest = np.maximum(newest, oldest)
+        known = (come > 0) & (stamps - at[newest] <= self._timeout) & (
+            (newest > oldest) | (at[newest] <= stamps))
+        before = np.maximum(newest - 1, oldest)
+        known &= (at[newest] <= stamps) | (stamps - at[before] <= self._timeout)
+        sample, before = newest[known], before[known]
+        step = (at[sample] - at[before]).astype(float)
+        part = np.minimum(np.divide(
+            (stamps[known] - at[sample]).astype(float), step, out=np.zeros(len(step)),
+            where=step > 0.0), 1.0)
+        now, then = values[sample], values[before]
+        rows[known] = np.where(step[:, None] > 0.0, now + (now - then) * part[:, None], now)
+        return rows
+
+
+class _OfPose:
+    """From values of a pose to rows of a base at rest that is tilted so."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._gravity: Any = tuple(parameters['gravity'].tolist())
+
+    def __call__(self, stamp: int, values: Any) -> _Row:
+        return row_of_pose(values[3:12], self._gravity)
+
+
+class _OfMotion(_OfPose):
+    """From values of pose, twist and acceleration in the world."""
+
+    def __call__(self, stamp: int, values: Any) -> _Row:
+        return row_of_motion(values[3:12], values[18:21], values[15:18], values[21:24],
+                             self._gravity)
+
+
+class _OfImu:
+    """
+    From readings of an IMU.
+
+    The angular acceleration is the difference quotient of two angular velocities, through a
+    low-pass filter of the first order, solved exactly for the time dt between them:
+    ``k = 1 - exp(-2 pi cutoff dt)``. Slow changes come late by ``dt (1 / k - 1 / 2)``,
+    for short dt ``1 / (2 pi cutoff)``; white noise of deviation s in the angular velocity becomes
+    ``s k / dt sqrt(2 / (2 - k))``.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._position: Any = tuple(parameters['base.imu.position'].tolist())
+        x, y, z, w = parameters['base.imu.orientation'].tolist()
+        length = math.sqrt(x * x + y * y + z * z + w * w)
+        self._rotation = from_quaternion(x / length, y / length, z / length, w / length)
+        self._rate = 2.0 * math.pi * parameters['base.imu.cutoff']
+        self._timeout = round(parameters['base.timeout'] * 1e9)
+        self._last: tuple[int, Any] | None = None
+        self._filtered = 0.0, 0.0, 0.0
+
+    def __call__(self, stamp: int, values: Any) -> _Row:
+        spin, force = values[:3], values[3:6]
+        interval = 0 if self._last is None else stamp - self._last[0]
+        if self._last is None or not 0 < interval <= self._timeout:
+            self._filtered = 0.0, 0.0, 0.0
+        else:
+            dt = interval * 1e-9
+            gain = -math.expm1(-self._rate * dt)
+            x, y, z = (old + gain * ((now - then) / dt - old) for old, now, then in zip(
+                self._filtered, spin, self._last[1], strict=True))
+            self._filtered = x, y, z
+        self._last = stamp, spin
+        return row_of_imu(force, spin, self._filtered, self._position, self._rotation)

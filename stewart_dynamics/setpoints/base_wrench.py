@@ -1,0 +1,95 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The base wrench of setpoints: what the hexapod puts on its base.
+
+It is no part of the step: the node computes it only while somebody subscribes. It gives the same
+bits whether setpoints come one at a time or by the thousand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+import math
+from struct import Struct
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Six
+from stewart_dynamics.mechanics.dynamics import base_wrench
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.rows import BASE, consecutive, MOTION, WRENCH
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.step import Batch, Setpoint
+
+# Under the node's name.
+BASE_WRENCH = 'base_wrench'
+
+# One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
+_MOTION, _WRENCH, _BASE, _RESULT = consecutive(MOTION, WRENCH, BASE, WRENCH)
+_GIVEN = Struct(f'{_RESULT.start}d')
+_GIVES = Struct(f'{WRENCH}d')
+
+# The machine code that it needs.
+FUNCTIONS = (base_wrench.base_wrenches,)
+
+
+class BaseWrench:
+    """
+    The base wrench of setpoints, for a hexapod with given parameters.
+
+    Force [N] and moment [N m] on the base at its origin, base axes; see
+    ``mechanics.dynamics.base_wrench``.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        They hold for every call; another set of them makes another one. One thread at a time may
+        call it: a call for one setpoint works in memory that is its own.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._platform = StewartPlatform(parameters)
+        self._still = tuple(BaseMotion(parameters['gravity']).rows.tolist())
+        self._numbers = np.zeros(_RESULT.stop)
+        self._memory = self._numbers.data  # the same as bytes
+
+    def __call__(self, setpoint: Setpoint) -> Six | None:
+        """Return it; None where the base's motion is not known or numbers overflow."""
+        base = setpoint.base
+        _GIVEN.pack_into(self._memory, 0, *setpoint.motion, *setpoint.wrench,
+                         *(self._still if base is None else base))
+        self._bound()
+        wrench: Six = _GIVES.unpack_from(self._memory, 8 * _RESULT.start)
+        return wrench if all(map(math.isfinite, wrench)) else None
+
+    def many(self, setpoints: Batch) -> Array:
+        """Return those of setpoints (N, 6); rows of nan where the call for one gives None."""
+        wrenches = self._platform.base_wrenches(
+            setpoints.motions, setpoints.wrenches, setpoints.bases)
+        finite = np.isfinite(wrenches)
+        if not finite.all():
+            wrenches[~finite.all(axis=1)] = np.nan
+        return wrenches
+
+    @cached_property
+    def _bound(self) -> Callable[[], object]:
+        motion, wrench, base, result = (
+            self._numbers[part][None] for part in (_MOTION, _WRENCH, _BASE, _RESULT))
+        return base_wrench.base_wrenches.bound(
+            self._platform.constants, motion, wrench, base, result)

@@ -1,0 +1,204 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From messages of an input topic to checked samples, one message at a time or many at once.
+
+A sample is a stamp and the message's numbers, the quaternion of a pose replaced by the rotation
+matrix. Node and replay check alike, and get the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion, is_unit, quaternion_length
+from stewart_dynamics.messages.cdr import finite, MalformedError, Stamped
+from stewart_dynamics.messages.layout import Layout
+from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
+from stewart_dynamics.setpoints.rejections import (
+    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
+    Rejections, WRONG_FRAME)
+from stewart_dynamics.setpoints.topics import (
+    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST, COMBINED, POSE, TWIST, WRENCH)
+
+_READERS: dict[str, Callable[[bytes], Stamped]] = {
+    POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench,
+    BASE_POSE: pose, BASE_TWIST: twist, BASE_ACCEL: twist, BASE_IMU: imu}
+
+# Of the values of an IMU: angular velocity, specific force, and the first entries of their
+# covariances, which are -1 where a quantity is not measured. Its orientation is not used.
+_OF_IMU = (13, 14, 15, 25, 26, 27)
+_COVARIANCES = {16: 'angular_velocity_covariance', 28: 'linear_acceleration_covariance'}
+# Larger numbers are no motion of a base [SI units]: a filter would keep what they leave for long.
+LARGEST = 1e9
+
+
+class SampleReader:
+    """
+    Reads the messages of one topic.
+
+    Most messages have the layout of the first sound one, and are read by it.
+
+    Parameters
+    ----------
+    topic : str
+        One of ``input_topics``.
+    frame : str or None
+        The frame that messages must have, or none; None: that of the first message with one.
+    rejections : Rejections
+        Counts what is rejected.
+
+    """
+
+    def __init__(self, topic: str, frame: str | None, rejections: Rejections) -> None:
+        self._topic = topic
+        self._reader = _READERS[topic]
+        self._has_pose = topic in (POSE, COMBINED, BASE_POSE)
+        self._bounded = topic in (BASE_POSE, BASE_TWIST, BASE_ACCEL, BASE_IMU)
+        self._frame = None if frame is None else frame.encode()
+        self._rejections = rejections
+        self._layout: Layout | None = None
+        self._frame_of_layout = b''
+
+    def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
+        """Return a message's stamp [ns] and values, or reject it."""
+        read = self._layout.read_one(data) if self._layout else None
+        frame = None
+        if read is None:
+            try:
+                stamp, frame, values = self._reader(data)
+            except MalformedError as exc:
+                self._rejections.reject(self._topic, MALFORMED, str(exc))
+                return None
+            if self._is_other(frame):
+                self._rejections.reject(
+                    self._topic, WRONG_FRAME, frame_details(frame, self._frame or b''))
+                return None
+        else:
+            stamp, values = read
+        if self._topic == BASE_IMU:
+            for at, name in _COVARIANCES.items():
+                if values[at] == -1.0:
+                    self._rejections.reject(self._topic, NOT_MEASURED, f'{name}[0] is -1')
+                    return None
+            values = tuple([values[at] for at in _OF_IMU])
+        if not finite(values):
+            self._rejections.reject(self._topic, NOT_FINITE, str(values))
+            return None
+        if self._bounded and max(map(abs, values)) > LARGEST:
+            self._rejections.reject(
+                self._topic, OUT_OF_RANGE, f'{values}: must be at most {LARGEST:g}')
+            return None
+        if self._has_pose:
+            x, y, z, w = values[3:7]
+            length = quaternion_length(x, y, z, w)
+            if not is_unit(length):
+                self._rejections.reject(self._topic, NOT_UNIT, length_details(length))
+                return None
+            values = values[:3] + from_quaternion(
+                x / length, y / length, z / length, w / length) + values[7:]
+        if frame is not None:
+            if self._layout is None:
+                self._layout, self._frame_of_layout = layout_of(self._reader, data), frame
+            self._keep_frame(frame)
+        return stamp, values
+
+    def read_many(self, data: Bytes, starts: Integers, sizes: Integers,
+                  ) -> tuple[Stamps, Array] | None:
+        """
+        Return stamps (N,) [ns] and values (N, ...) of messages that are all sound.
+
+        None where one is not, or has another layout: read them one by one then.
+
+        Parameters
+        ----------
+        data : (M,)
+            Bytes that have all the messages in them.
+        starts, sizes : (N,)
+            Where each begins, and its length in bytes; at least one.
+
+        """
+        if self._layout is None:
+            self._learn(data[starts[0]:starts[0] + sizes[0]].tobytes())
+        if self._layout is None or np.any(sizes != self._layout.size):
+            return None
+        alike, stamps, values = self._layout.read(data, starts)
+        if self._topic == BASE_IMU:
+            if (values[:, list(_COVARIANCES)] == -1.0).any():
+                return None
+            values = np.ascontiguousarray(values[:, _OF_IMU])
+        if not alike.all() or not np.isfinite(values).all() or (
+                self._bounded and np.max(np.abs(values)) > LARGEST):
+            return None
+        if self._has_pose:
+            quaternions, _, unit = unit_quaternions(values[:, 3:7])
+            if not unit.all():
+                return None
+            values = np.column_stack(
+                [values[:, :3], *from_quaternion(*quaternions), values[:, 7:]])
+        self._keep_frame(self._frame_of_layout)
+        return stamps, values
+
+    def forget_layout(self) -> None:
+        """Take the layout of the next sound message."""
+        self._layout = None
+
+    def _keep_frame(self, frame: bytes) -> None:
+        """Expect the frame of this sound message from now on, if none was given."""
+        if self._frame is None:
+            self._frame = frame or None
+
+    def _learn(self, data: bytes) -> None:
+        """Take the layout of a message if it can be read and its frame is right."""
+        try:
+            frame = self._reader(data).frame
+        except MalformedError:
+            return
+        if not self._is_other(frame):
+            self._layout, self._frame_of_layout = layout_of(self._reader, data), frame
+
+    def _is_other(self, frame: bytes) -> bool:
+        """Return whether a message has a frame that it must not have."""
+        return bool(frame) and self._frame is not None and frame != self._frame
+
+
+def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
+    """
+    Return quaternions divided by their length, and which of them may be used.
+
+    Parameters
+    ----------
+    quaternions : (N, 4)
+        Finite numbers x y z w.
+
+    Returns
+    -------
+    quaternions : (4, N)
+        Of unit length, number by number.
+    lengths : (N,)
+        As they were.
+    unit : (N,)
+        Which lengths are 1 within QUATERNION_TOLERANCE.
+
+    """
+    # Number by number, as for one sample: the bits are the same.
+    x, y, z, w = quaternions.T
+    with np.errstate(over='ignore', divide='ignore', invalid='ignore'):
+        lengths = quaternion_length(x, y, z, w)
+        return (np.stack([x / lengths, y / lengths, z / lengths, w / lengths]), lengths,
+                is_unit(lengths))

@@ -1,0 +1,180 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From messages on the setpoint topics to joined setpoints; what is rejected is counted.
+
+Node and replay feed it the same bytes in the same order, so both reject and join alike: the node
+one message at a time, the replay many at once. ``take`` handles one message;
+``take_many`` does the same for many of which none is out of the ordinary, and calls ``take`` for
+each of them where one is. The wrench and the base's motion come on topics of their own: a setpoint
+has those that hold when it is complete.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from stewart_dynamics.arrays import Six
+from stewart_dynamics.mechanics.rows import BASE, MOTION
+from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.batch_joining import Samples
+from stewart_dynamics.setpoints.rejections import Rejection, Rejections
+from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
+from stewart_dynamics.setpoints.step import Batch, Setpoint
+from stewart_dynamics.setpoints.topics import SOURCES, WRENCH
+from stewart_dynamics.setpoints.wrench import WrenchInput
+
+_STANDSTILL = (0.0,) * 6
+
+
+class Setpoints:
+    """
+    Joins the topics' samples by stamp.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Which topics, frame, tolerance and timeout.
+    rejected : callable
+        Called with each rejection and its details; they are counted as well.
+    noticed : callable
+        Called with texts for the log: a restart, stamps that are all zero.
+
+    """
+
+    def __init__(
+            self, parameters: Parameters, rejected: Callable[[Rejection, str], None],
+            noticed: Callable[[str], object]) -> None:
+        self.topics = SOURCES[parameters['setpoint.source']]
+        self._rejections = Rejections(rejected)
+        self._wrench_input = WrenchInput(parameters, self._rejections)
+        self.base = BaseInput(parameters, self._rejections, noticed)
+        """The motion of the base."""
+        self._joining = SampleJoining(
+            self.topics, parameters['base_frame'], parameters['setpoint.sync_tolerance'],
+            parameters['setpoint.timeout'], self._rejections, noticed)
+        self.recorded: int | None = None
+        """When the message at work was recorded [ns], if it is one of ``take_many``."""
+
+    @property
+    def counts(self) -> Counter[Rejection]:
+        """Return what was rejected so far, and how often."""
+        return self._rejections.counts
+
+    @property
+    def wrench(self) -> Six:
+        """Return the known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
+        return self._wrench_input.wrench
+
+    def take_wrench(self, data: bytes) -> None:
+        """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
+        self._wrench_input.take(data)
+
+    def take(self, topic: str, data: bytes, now: Callable[[], int]) -> Setpoint | None:
+        """
+        Return the setpoint that this message completes, if it does; without the base's motion.
+
+        Parameters
+        ----------
+        topic : str
+            One of ``topics``.
+        data : bytes
+            The message as it came, CDR.
+        now : callable
+            The clock [ns]; asked where a setpoint's own stamps are zero.
+
+        """
+        sample = self._joining.take(topic, data, now)
+        if sample is None:
+            return None
+        stamp, values, restart = sample
+        # Zeros for what the topics do not give.
+        motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
+        if restart:
+            self.base.restarted(stamp)
+        return Setpoint(stamp, motion, self.wrench, restart)
+
+    def on_base(self, setpoint: Setpoint) -> Setpoint:
+        """Return the setpoint with the base's motion at its stamp."""
+        row = self.base.at(setpoint.stamp)
+        return setpoint if row is None else setpoint._replace(base=row)
+
+    def take_many(self, messages: Messages) -> Batch:
+        """Return the setpoints that these messages complete."""
+        joined = self._take_ordinary(messages)
+        if joined is not None:
+            return joined
+        self._wrench_input.reader.forget_layout()
+        self._joining.forget_layouts()
+        self.base.forget_layouts()
+        setpoints = []
+        times = []
+        for topic, time, data in messages.each():
+            self.recorded = time
+            if topic == WRENCH:
+                self.take_wrench(data)
+                continue
+            clock = partial(int, time)
+            if topic in self.base.topics:
+                self.base.take(topic, data, clock)
+                continue
+            setpoint = self.take(topic, data, clock)
+            if setpoint is not None:
+                setpoints.append(self.on_base(setpoint))
+                times.append(time)
+        return Batch(
+            np.array([each.stamp for each in setpoints], dtype=np.int64),
+            np.array([each.motion for each in setpoints], dtype=float).reshape(-1, MOTION),
+            np.array([each.wrench for each in setpoints], dtype=float).reshape(-1, 6),
+            np.array([each.restart for each in setpoints], dtype=bool),
+            np.array(times, dtype=np.int64),
+            np.array([each.base for each in setpoints], dtype=float).reshape(-1, BASE)
+            if self.base.topics else None)
+
+    def end(self, why: str) -> None:
+        """Drop and count what still waits: no more messages come."""
+        self._joining.end(why)
+        self.base.end(why)
+
+    def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
+        """Count and report what is not used."""
+        self._rejections.reject(topic, reason, details, number)
+
+    def _take_ordinary(self, messages: Messages) -> Batch | None:
+        """Do what ``take_many`` does; None, and nothing done, if a message is unusual."""
+        places = messages.places()
+        wrenches = NO_SAMPLES
+        if WRENCH in places:
+            which = places[WRENCH]
+            read = self._wrench_input.reader.read_many(
+                messages.data, messages.starts[which], messages.sizes[which])
+            if read is None:
+                return None
+            wrenches = Samples(*read, which)
+        joined = self._joining.join_many(messages, places)
+        base = self.base.join_many(messages, places)
+        if joined is None or base is None:
+            return None
+        self._joining.accept(joined, places)
+        return Batch(
+            joined.stamps, joined.motions, self._wrench_input.at(wrenches, joined.places),
+            np.zeros(len(joined.stamps), dtype=bool), messages.times[joined.places],
+            self.base.accept(base, places, joined.stamps, joined.places))

@@ -1,0 +1,118 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The messages to publish or write for what step, external wrench and base wrench give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from operator import sub
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six, Stamps
+from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.setpoint import layout_of, StampedWriter, wrench
+from stewart_dynamics.messages.standard import (
+    boolean, FLOAT64, float64, FLOAT64_ARRAY, float64_array)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.step import Output, Outputs
+
+# Under the node's name, in the order in which they are published for a setpoint.
+OUTPUT_TYPES = {
+    'leg_states': 'sensor_msgs/msg/JointState',
+    'leg_lengths': 'std_msgs/msg/Float64MultiArray',
+    'leg_forces': 'std_msgs/msg/Float64MultiArray',
+    'jacobian_determinant': 'std_msgs/msg/Float64',
+    'singularity_warning': 'std_msgs/msg/Bool',
+    BASE_WRENCH: 'geometry_msgs/msg/WrenchStamped',
+}
+# Messages of a topic: which of the outputs have one, and their messages.
+Written = tuple[str, Stamps, NDArray[np.void]]
+
+
+class OutputMessages:
+    """
+    Writes the messages.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names and zero lengths of the legs, and the base frame.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._zero_lengths = parameters['geometry.zero_length'].tolist()
+        self._joint_state = JointStateWriter(parameters['joints'])
+        self._with_effort, self._without_effort = (
+            self._joint_state.layout(effort) for effort in (True, False))
+        self._wrench = StampedWriter(parameters['base_frame'], 6)
+        self._wrenches = layout_of(wrench, self._wrench.write(0, NO_WRENCH))
+
+    def of_output(self, output: Output) -> Iterator[tuple[str, bytes]]:
+        """Yield topics (keys of OUTPUT_TYPES) and messages for an output; see of_wrench."""
+        yield 'leg_states', self._joint_state.write(
+            output.stamp, map(sub, output.lengths, self._zero_lengths), output.rates,
+            output.forces)
+        yield 'leg_lengths', float64_array(output.lengths)
+        if output.forces is not None:
+            yield 'leg_forces', float64_array(output.forces)
+        yield 'jacobian_determinant', float64(output.determinant)
+        if output.warning_changed:
+            yield 'singularity_warning', boolean(output.singularity.warning)
+
+    def of_outputs(self, outputs: Outputs) -> list[Written]:
+        """
+        Return the same messages as ``of_output``, of many outputs.
+
+        Returns
+        -------
+        list of (topic, which, messages)
+            In the order in which they are published for one output; ``which`` (K,) outputs have
+            such a message, and the messages (K,) as entries of their length. A topic may come
+            twice, for its messages with and without forces.
+
+        """
+        positions = outputs.lengths - self._zero_lengths
+        solved = np.isfinite(outputs.forces[:, 0])
+        having, lacking = np.flatnonzero(solved), np.flatnonzero(~solved)
+        stamps, rates, forces = outputs.stamps, outputs.rates, outputs.forces
+        messages = [
+            ('leg_states', having, self._with_effort.write(
+                stamps[having], positions[having], rates[having], forces[having])),
+            ('leg_states', lacking, self._without_effort.write(
+                stamps[lacking], positions[lacking], rates[lacking])),
+            ('leg_lengths', np.arange(len(stamps)), FLOAT64_ARRAY.write(
+                None, outputs.lengths)),
+            ('leg_forces', having, FLOAT64_ARRAY.write(None, forces[having])),
+            ('jacobian_determinant', np.arange(len(stamps)), FLOAT64.write(
+                None, outputs.determinants[:, None])),
+        ]
+        changed = np.flatnonzero(outputs.changed)
+        warnings = [boolean(on) for on in outputs.warnings[changed].tolist()]
+        messages.append(('singularity_warning', changed, np.frombuffer(
+            b''.join(warnings), dtype=f'V{len(boolean(True))}')))
+        return messages
+
+    def of_wrench(self, stamp: int, wrench: Six) -> bytes:
+        """Return the geometry_msgs/WrenchStamped of a wrench in base axes."""
+        return self._wrench.write(stamp, wrench)
+
+    def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> Written:
+        """Return the same of setpoints (N,) [ns] and rows (N, 6); a row of nan has no message."""
+        known = np.flatnonzero(~np.isnan(base_wrenches[:, 0]))
+        return BASE_WRENCH, known, self._wrenches.write(stamps[known], base_wrenches[known])

@@ -1,0 +1,86 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Why messages are rejected or dropped: the reasons, their texts, and the counts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import NamedTuple
+
+from stewart_dynamics.mechanics.frames.rotation import QUATERNION_TOLERANCE
+from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
+
+__all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'length_details', 'MALFORMED',
+           'NOT_EXCLUSIVE', 'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT',
+           'OUT_OF_RANGE', 'Rejection', 'Rejections', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
+
+BASE_NOT_KNOWN = "the base's motion is not known"
+NOT_UNIT = 'quaternion not of unit length'
+NOT_MEASURED = 'not measured'
+WRONG_FRAME = 'wrong frame_id'
+TOO_OLD = 'older than the last used'
+TWICE = 'same stamp twice'
+OUT_OF_RANGE = 'out of range: numbers overflow'
+NOT_EXCLUSIVE = 'more than one writer'
+# Of sound messages that are not used.
+_DROPPED = 'dropped: '
+NOT_JOINED = f'{_DROPPED}not all topics had its stamp'
+DROPPED = f'{_DROPPED}more came at once than can be answered'
+
+
+class Rejection(NamedTuple):
+    """On which topic messages are not used, and why."""
+
+    topic: str
+    reason: str
+
+    def words(self, details: str) -> str:
+        """Return the log line for a message."""
+        how = '' if self.reason.startswith(_DROPPED) else 'rejected: '
+        return f'{self.topic} {how}{self.reason}: {details}'
+
+
+class Rejections:
+    """
+    Counts what is rejected.
+
+    Parameters
+    ----------
+    rejected : callable
+        Called with each rejection and the details of the message.
+
+    """
+
+    def __init__(self, rejected: Callable[[Rejection, str], None]) -> None:
+        self.counts: Counter[Rejection] = Counter()
+        self._rejected = rejected
+
+    def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
+        """Count and report messages."""
+        rejection = Rejection(topic, reason)
+        self.counts[rejection] += number
+        self._rejected(rejection, details)
+
+
+def frame_details(frame: bytes, wanted: bytes) -> str:
+    """Return the details of a WRONG_FRAME."""
+    given, must = (each[:60].decode(errors='replace') for each in (frame, wanted))
+    return f'{given!r}, must be {must!r} or empty'
+
+
+def length_details(length: float) -> str:
+    """Return the details of a quaternion that is NOT_UNIT."""
+    return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'

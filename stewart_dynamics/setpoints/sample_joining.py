@@ -1,0 +1,276 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Samples of several topics joined by stamp; what is rejected is counted.
+
+``take`` handles one message; ``join_many`` does the same for many of which none is out of the
+ordinary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Integers
+from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.setpoints.batch_joining import join_many, Joined, Samples, WAITING, Waiting
+from stewart_dynamics.setpoints.inputs import SampleReader
+from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejections, TOO_OLD, TWICE
+
+_NOWHERE = np.empty(0, dtype=np.int64)
+NO_SAMPLES = Samples(_NOWHERE, np.empty((0, 0)), _NOWHERE)
+
+
+class JoinedSample(NamedTuple):
+    """Samples of one time, one of each topic."""
+
+    stamp: int
+    """Of the first topic [ns]."""
+    values: tuple[float, ...]
+    """Topic by topic, in the order of topics."""
+    restart: bool
+    """Time has jumped back before it."""
+
+
+class SampleJoining:
+    """
+    Joins the topics' samples by stamp.
+
+    Parameters
+    ----------
+    topics : sequence of str
+        Which topics, in the order in which their values are joined.
+    frame : str or None
+        The frame that their messages must have, or none; None: that of the first message.
+    tolerance, timeout : float
+        How far the stamps of joined samples may differ, and a longer jump back in time is a
+        restart [s].
+    rejections : Rejections
+        Counts what is rejected.
+    noticed : callable
+        Called with texts for the log: a restart, stamps that are all zero.
+
+    """
+
+    def __init__(self, topics: Sequence[str], frame: str | None, tolerance: float, timeout: float,
+                 rejections: Rejections, noticed: Callable[[str], object]) -> None:
+        self.topics = tuple(topics)
+        self._reject = rejections.reject
+        self._readers = {topic: SampleReader(topic, frame, rejections) for topic in self.topics}
+        self._tolerance = round(tolerance * 1e9)
+        self._timeout = round(timeout * 1e9)
+        self._noticed = noticed
+        self._last: dict[str, int] = {}
+        self._waiting: dict[str, Waiting] = {topic: {} for topic in self.topics}
+        self._unstamped: dict[str, tuple[float, ...] | None] = {}
+        self._unstamped_logged = False
+        self._unstamped_first = ''
+        self._stamped: set[str] = set()
+
+    def take(self, topic: str, data: bytes, now: Callable[[], int]) -> JoinedSample | None:
+        """
+        Return the joined sample that this message completes, if it does.
+
+        Parameters
+        ----------
+        topic : str
+            One of ``topics``.
+        data : bytes
+            The message as it came, CDR.
+        now : callable
+            The clock [ns]; asked where the stamps of samples are zero.
+
+        """
+        sample = self._readers[topic].read(data)
+        if sample is None:
+            if self._unstamped_logged and topic not in self._stamped:
+                self._join_unstamped(topic, None, now)  # it keeps its place in the order
+            return None
+        stamp, values = sample
+        if topic not in self._stamped:
+            if stamp == 0:
+                return self._join_unstamped(topic, values, now)
+            # From now on zero is a time as others are.
+            self._stamped.add(topic)
+            if self._unstamped.pop(topic, None):
+                self._reject(topic, NOT_JOINED, 'stamp 0')
+        if not self._in_time(topic, stamp):
+            return None
+        waiting = self._waiting[topic]
+        waiting[stamp] = values
+        if len(waiting) > WAITING:
+            oldest = next(iter(waiting))
+            del waiting[oldest]
+            self._reject(topic, NOT_JOINED, f'stamp {oldest} ns')
+        return self._join(stamp)
+
+    def forget_layouts(self) -> None:
+        """Take the layout of the next sound message of each topic."""
+        for reader in self._readers.values():
+            reader.forget_layout()
+
+    def end(self, why: str) -> None:
+        """Drop and count what still waits: no more messages come."""
+        for topic, waiting in self._waiting.items():
+            for stamp in waiting:
+                self._reject(topic, NOT_JOINED, f'stamp {stamp} ns: {why}')
+            waiting.clear()
+        self._drop_unstamped()
+
+    def restart(self, why: str) -> None:
+        """Take samples of any time from now on; drop and count what waits."""
+        self.end(why)
+        self._last = {}
+
+    def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
+        """
+        Join messages of which none is out of the ordinary; None if one is. Nothing is changed.
+
+        Ordinary are sound messages of one layout for each topic, whose stamps only rise.
+
+        Parameters
+        ----------
+        messages : Messages
+            Of these topics and others.
+        places : mapping of topic to (K,)
+            Where the messages of topics are among them; no topic, no message.
+
+        """
+        if self._tolerance or self._unstamped_logged:
+            return None
+        samples = dict.fromkeys(self.topics, NO_SAMPLES)
+        for topic in self.topics:
+            if topic in places:
+                which = places[topic]
+                read = self._readers[topic].read_many(
+                    messages.data, messages.starts[which], messages.sizes[which])
+                if read is None:
+                    return None
+                samples[topic] = Samples(*read, which)
+        return join_many(samples, self._waiting, self._last)
+
+    def accept(self, joined: Joined, places: Mapping[str, Integers]) -> None:
+        """Go on behind what ``join_many`` has joined."""
+        self._stamped |= {topic for topic in self.topics if topic in places}
+        self._waiting = joined.waiting
+        if len(joined.stamps):
+            self._last = dict.fromkeys(self.topics, int(joined.stamps[-1]))
+        for topic, dropped in joined.dropped.items():
+            for stamp in dropped:
+                self._reject(topic, NOT_JOINED, f'stamp {stamp} ns')
+
+    def _in_time(self, topic: str, stamp: int) -> bool:
+        """Return whether a sample may still be used, or reject it."""
+        if stamp in self._waiting[topic]:
+            self._reject(topic, TWICE, f'stamp {stamp} ns')
+            return False
+        last = self._last.get(topic)
+        if last is None or not 0 <= last - stamp <= self._timeout:
+            return True
+        if stamp == last:
+            self._reject(topic, TWICE, f'stamp {stamp} ns')
+        else:
+            self._reject(topic, TOO_OLD, f'stamp {stamp} ns is {(last - stamp) / 1e9:g} s '
+                         f'older than the last used')
+        return False
+
+    def _join(self, stamp: int) -> JoinedSample | None:
+        """Return what a sample completes, all its stamps within the tolerance."""
+        if self._tolerance:
+            stamps = self._nearest(stamp)
+        elif all(stamp in waiting for waiting in self._waiting.values()):
+            stamps = dict.fromkeys(self.topics, stamp)
+        else:
+            return None
+        if not stamps:
+            return None
+        restart = self._drop_passed(stamps)
+        values = [self._waiting[other].pop(at) for other, at in stamps.items()]
+        return JoinedSample(stamps[self.topics[0]], sum(values, ()), restart)
+
+    def _nearest(self, stamp: int) -> dict[str, int]:
+        """Return the stamps that belong to one, none if they are not all within the tolerance."""
+        stamps = {}
+        # It has the stamp of the first topic: what is nearest to it belongs to it.
+        at = stamp
+        for other, waiting in self._waiting.items():
+            if at not in waiting:
+                if not waiting:
+                    return {}
+                at = min(waiting, key=lambda candidate: abs(candidate - at))
+            stamps[other] = at
+            at = stamps[self.topics[0]]
+        return stamps if max(stamps.values()) - min(stamps.values()) <= self._tolerance else {}
+
+    def _drop_passed(self, stamps: dict[str, int]) -> bool:
+        """
+        Drop and count what waits and can no longer be used once these stamps are.
+
+        Return whether time has jumped back.
+        """
+        first = self.topics[0]
+        jump: int = self._last[first] - stamps[first] if self._last else 0
+        if jump > self._timeout:
+            self._noticed(f'stamps jumped back by {jump / 1e9:g} s: followed as a restart')
+        for topic, stamp in stamps.items():
+            waiting = self._waiting[topic]
+            if len(waiting) > 1:
+                # After a restart, what is left of the time before it lies in the future.
+                future = (self._last[topic] - self._timeout if jump > self._timeout
+                          else math.inf)
+                for other in [other for other in waiting if other != stamp and (
+                        other < stamp or other > future)]:
+                    del waiting[other]
+                    self._reject(topic, NOT_JOINED, f'stamp {other} ns')
+        self._last = stamps
+        return bool(jump > self._timeout)
+
+    def _join_unstamped(
+            self, topic: str, values: tuple[float, ...] | None, now: Callable[[], int],
+    ) -> JoinedSample | None:
+        """
+        Join samples without a stamp in their order of arrival; one without values was rejected.
+
+        A joined sample begins with the topic that began the first one, and has one of each.
+        What is incomplete when the next one begins is dropped, all of it: else a lost sample
+        would join the following ones wrongly for ever.
+        """
+        if not self._unstamped_logged:
+            self._unstamped_logged = True
+            self._noticed(f'{topic}: header stamps are zero: such samples are joined in order '
+                          'of arrival and stamped with the clock')
+        if topic in self._unstamped or topic == self._unstamped_first:
+            self._drop_unstamped()
+        self._unstamped[topic] = values
+        if len(self._unstamped) < len(self.topics):
+            return None
+        in_order = [self._unstamped[other] for other in self.topics]
+        sound = [each for each in in_order if each is not None]
+        if len(sound) < len(in_order):
+            self._drop_unstamped()
+            return None
+        self._unstamped_first = self._unstamped_first or next(iter(self._unstamped))
+        self._unstamped.clear()
+        return JoinedSample(now(), sum(sound, ()), False)
+
+    def _drop_unstamped(self) -> None:
+        for topic, values in self._unstamped.items():
+            if values is not None:
+                self._reject(topic, NOT_JOINED, 'stamp 0')
+        self._unstamped.clear()

@@ -1,0 +1,362 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The one step from a setpoint to legs, forces and the warning; node and replay both take it.
+
+It uses neither messages nor bags, keeps no state, and gives the same bits for the same input,
+whether setpoints come one at a time or by the thousand.
+"""
+
+from __future__ import annotations
+
+import math
+from struct import Struct
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
+from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
+from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.limits import ANGLES, any_exceeded, Exceedance, Limits, OF_RESULTS
+from stewart_dynamics.mechanics.rows import (
+    BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
+    RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
+from stewart_dynamics.mechanics.singularity import (
+    advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
+    UNSOLVABLE_CONDITION)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages.cdr import STAMPS_END
+from stewart_dynamics.parameters.table import Parameters
+
+
+class Setpoint(NamedTuple):
+    """Pose, twist and acceleration at one time."""
+
+    stamp: int
+    """[ns]"""
+    motion: tuple[float, ...]
+    """A row of motion, laid out as for ``inverse_dynamics``."""
+    wrench: Six = NO_WRENCH
+    """Load on the platform at its origin, base axes [N, N m]."""
+    restart: bool = False
+    """Time has jumped back before it: earlier setpoints do not matter for it."""
+    base: tuple[float, ...] | None = None
+    """A row of the base's motion; one of nan: it is not known. None: the base is still."""
+
+    @property
+    def base_known(self) -> bool:
+        """Return whether the base is still, or its motion is known."""
+        return self.base is None or self.base[0] == self.base[0]
+
+
+class Output(NamedTuple):
+    """What one setpoint gives."""
+
+    stamp: int
+    lengths: Six
+    rates: Six
+    demanded_forces: Six | None
+    """As the dynamics have them; none where J_inv cannot be solved or the base is not known."""
+    forces: Six | None
+    """As published: clipped to limits.force_max; none where suppressed or none are demanded."""
+    unit_load_forces: Six
+    determinant: float
+    determinant_rate: float
+    condition: float
+    singularity: Singularity
+    warning_changed: bool
+    exceedances: tuple[Exceedance, ...]
+    joint_angles: tuple[float, ...] = ()
+    """A row of joint angles [rad], nan those without a limit; empty where none has one."""
+
+    @property
+    def solvable(self) -> bool:
+        """Return whether J_inv can be solved."""
+        return self.condition < UNSOLVABLE_CONDITION
+
+
+class Batch(NamedTuple):
+    """Setpoints one after the other, N of them."""
+
+    stamps: Stamps
+    """(N,) [ns]"""
+    motions: Array
+    """Rows of motion (N, 24), laid out as for ``inverse_dynamics``."""
+    wrenches: Array
+    """(N, 6) [N, N m], or one row for all."""
+    restarts: Flags
+    """(N,): time has jumped back before it."""
+    times: Stamps
+    """When the message that completed each came (N,) [ns]."""
+    bases: Array | None = None
+    """Rows of the base's motion (N, 12); one of nan: it is not known. None: the base is still."""
+
+    @property
+    def base_known(self) -> Flags:
+        """(N,): the base is still, or its motion is known."""
+        if self.bases is None:
+            return np.ones(len(self.stamps), dtype=bool)
+        return ~np.isnan(self.bases[:, 0])
+
+    def chosen(self, which: Any) -> Batch:
+        """Return some of them: a slice, or an index or a mask (N,)."""
+        return Batch._make(None if part is None else part[which] for part in self)
+
+
+class Outputs(NamedTuple):
+    """What a batch gives: of those setpoints that could be answered, N of them."""
+
+    answered: Flags
+    """Which setpoints of the batch these are; of the others numbers overflow."""
+    stamps: Stamps
+    """(N,) [ns]"""
+    results: Array
+    """Rows of results (N, 27), laid out as for ``inverse_dynamics``; no forces are nan."""
+    forces: Array
+    """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
+    states: Array
+    """Rows of Singularity (N, STATE)."""
+    changed: Flags
+    """(N,): the singularity warning is another than before."""
+    exceeding: Flags
+    """(N,): a limit is exceeded."""
+    joint_angles: Array
+    """Rows of joint angles (N, 12) [rad], or (N, 0), as in Output."""
+
+    @property
+    def lengths(self) -> Array:
+        """(N, 6) [m]."""
+        return self.results[:, LENGTHS]
+
+    @property
+    def rates(self) -> Array:
+        """(N, 6) [m/s]."""
+        return self.results[:, RATES]
+
+    @property
+    def demanded_forces(self) -> Array:
+        """As the dynamics have them (N, 6) [N]; nan where they are not known, as in Output."""
+        return self.results[:, FORCES]
+
+    @property
+    def unit_load_forces(self) -> Array:
+        """(N, 6)."""
+        return self.results[:, UNIT_LOAD_FORCES]
+
+    @property
+    def determinants(self) -> Array:
+        """(N,) [m^3]."""
+        return self.results[:, DETERMINANT]
+
+    @property
+    def determinant_rates(self) -> Array:
+        """(N,) [m^3/s]."""
+        return self.results[:, DETERMINANT_RATE]
+
+    @property
+    def conditions(self) -> Array:
+        """(N,)."""
+        return self.results[:, CONDITION]
+
+    @property
+    def times_to_crossing(self) -> Array:
+        """(N,) [s]; inf where det(J) does not go toward zero."""
+        return self.states[:, TIME]
+
+    @property
+    def warnings(self) -> Flags:
+        """(N,): the singularity warning is on."""
+        return self.states[:, CAUSE] > 0.0
+
+    @property
+    def stopped(self) -> Flags:
+        """(N,): inside stop_condition."""
+        return self.states[:, STOPPED] > 0.0
+
+    def singularity(self, n: int = -1) -> Singularity:
+        """Return the state after one of them."""
+        return Singularity.of(self.states[n].tolist())
+
+
+# The settings as numbers, those of the warning first; whether to suppress, the thresholds of the
+# limits, what forces are clipped to.
+_THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
+
+# One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
+_RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING = consecutive(RESULT, 6, STATE, 1, 1)
+(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _RESTART, _IS_STAMP, _BASE_KNOWN,
+ _WRITTEN, _TILE) = consecutive(CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 1, 1, 1,
+                                _EXCEEDING.stop, inverse_dynamics.TILE)
+_GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
+_GIVES = Struct(f'{_EXCEEDING.stop}d')
+
+
+@inlined
+def _watch(settings: Array, limits: Array, is_stamp: bool, base_known: bool, state: Array,
+           restart: bool, result: Array, forces: Array) -> tuple[bool, bool]:
+    """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
+    finite = is_stamp
+    for k in range(RESULT):
+        finite = finite and math.isfinite(result[k])
+    if not finite:
+        return False, False
+    if restart:
+        forget(state)
+    condition = result[CONDITION]
+    advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
+            condition)
+    solved = condition < UNSOLVABLE_CONDITION and base_known
+    published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
+    for leg in range(6):
+        if not solved:
+            result[FORCES.start + leg] = np.nan
+        force, most = result[FORCES.start + leg], settings[_FORCE_MAX.start + leg]
+        forces[leg] = min(max(force, -most), most) if published else np.nan
+    return True, any_exceeded(limits, result)
+
+
+@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'b1[::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]',
+             'f8[:,::1]', 'b1[::1]', 'b1[::1]')
+def _watch_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: Flags,
+                state: Array, results: Array, forces: Array, states: Array, answered: Flags,
+                exceeding: Flags) -> None:
+    """Go through results in their order and write what becomes of them, see Outputs."""
+    limits = settings[_LIMITS]
+    restart = False
+    for n in range(len(results)):
+        # Where this one cannot be answered, the next one is the restart.
+        restart = restart or restarts[n]
+        is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
+        answered[n], exceeding[n] = _watch(
+            settings, limits, is_stamp, bases_known[n], state, restart, results[n], forces[n])
+        restart = restart and not answered[n]
+        for k in range(STATE):
+            states[n, k] = state[k]
+
+
+@entry_point('f8[::1]')
+def _one(numbers: Array) -> None:
+    """Do with one setpoint what solve and watch do with many."""
+    settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
+    state, result = written[_AFTER], written[_RESULT]
+    for n in range(STATE):
+        state[n] = numbers[_BEFORE.start + n]
+    inverse_dynamics.solve_one(
+        numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], numbers[_BASE], result,
+        numbers[_TILE])
+    written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
+        settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0,
+        numbers[_BASE_KNOWN.start] > 0.0, state, numbers[_RESTART.start] > 0.0, result,
+        written[_FORCES])
+
+
+# The machine code that a batch needs.
+FUNCTIONS = inverse_dynamics.solve, _watch_many
+
+_FIRST = Singularity()
+
+
+class Step:
+    """
+    The step, for a hexapod with given parameters.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        They hold for every call; another set of them makes another step. One thread at a time
+        may call it: a call for one setpoint works in memory that is the step's own.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self._platform = StewartPlatform(parameters)
+        self._limits = Limits(parameters)
+        self._numbers = np.zeros(_TILE.stop)
+        self._memory = self._numbers.data  # the same as bytes
+        self._numbers[_PLATFORM] = self._platform.constants
+        self._settings = settings = self._numbers[_SETTINGS]
+        settings[_THRESHOLDS] = thresholds(parameters)
+        settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
+        settings[_LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
+        settings[_FORCE_MAX] = self._limits.force_max
+        self._solve = _one.bound(self._numbers)
+        self._angles = angles_to_check(parameters, self._limits.of_joints)
+        self._angles_of_one = (
+            None if self._angles is None else self._angles.of_one(self._numbers[_MOTION]))
+
+    def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
+        """
+        Return the output, or None where numbers overflow, the stamp's own among them.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            A finite one, its rotation a rotation.
+        before : Singularity, optional
+            The output's before this one; none for the first.
+
+        """
+        stamp = setpoint.stamp
+        _GIVEN.pack_into(
+            self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
+            *(setpoint.base or NO_BASE), *(before or _FIRST).numbers, setpoint.restart,
+            -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
+        self._solve()
+        written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
+        if not written[_ANSWERED.start]:
+            return None
+        lengths, rates, demanded = written[LENGTHS], written[RATES], written[FORCES]
+        forces = written[_FORCES]
+        singularity = Singularity.of(written[_AFTER])
+        solved = demanded[0] == demanded[0]
+        exceedances = self._limits.exceeded(
+            lengths, rates, demanded if solved else None) if written[_EXCEEDING.start] else ()
+        angles: tuple[float, ...] = ()
+        if self._angles_of_one is not None:
+            angles = self._angles_of_one()
+            exceedances += self._limits.exceeded_angles(angles)
+        return Output(
+            stamp, lengths, rates, demanded if solved else None,
+            forces if forces[0] == forces[0] else None, written[UNIT_LOAD_FORCES],
+            written[DETERMINANT], written[DETERMINANT_RATE], written[CONDITION], singularity,
+            before is None or singularity.warning != before.warning, exceedances, angles)
+
+    def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
+        """Return what setpoints give one after the other; see the call for one."""
+        results = self._platform.solve(
+            setpoints.motions, setpoints.wrenches, setpoints.bases)
+        many = len(results)
+        state = np.array((before or _FIRST).numbers)
+        forces, states = np.empty((many, 6)), np.empty((many, STATE))
+        answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
+        _watch_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
+                    state, results, forces, states, answered, exceeding)
+        stamps, motions = setpoints.stamps, setpoints.motions
+        if not answered.all():
+            stamps, motions, results, forces = (
+                stamps[answered], motions[answered], results[answered], forces[answered])
+            states, exceeding = states[answered], exceeding[answered]
+        warnings = states[:, CAUSE] > 0.0
+        changed = np.empty(len(states), dtype=bool)
+        changed[:1] = before is None or warnings[:1] != before.warning
+        changed[1:] = warnings[1:] != warnings[:-1]
+        angles = np.empty((len(states), 0)) if self._angles is None else self._angles(motions)
+        for name in self._limits.of_joints:
+            exceeding |= self._limits.exceeds(name, angles[:, ANGLES[name]]).any(axis=1)
+        return Outputs(answered, stamps, results, forces, states, changed, exceeding, angles)

@@ -1,0 +1,74 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The IMU of the simulated base: what an IMU fixed to a moving base reads."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.dynamics.base_load import carried
+from stewart_dynamics.mechanics.frames.pose import matrix_of_quaternion
+from stewart_dynamics.mechanics.rows import (
+    BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
+from stewart_dynamics.mechanics.vectors import add, subtract, Vector3
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+
+
+class SimulatedImu:
+    """
+    An IMU mounted as ``base.imu`` says, with bias and noise.
+
+    Parameters
+    ----------
+    parameters : SimulatorParameters
+        The mounting, ``imu.*`` and the seed of the noise.
+
+    """
+
+    def __init__(self, parameters: SimulatorParameters) -> None:
+        self._position = _vector(parameters['base.imu.position'])
+        self._to_imu = matrix_of_quaternion(parameters['base.imu.orientation']).T
+        self._bias = np.concatenate([parameters['imu.bias.angular_velocity'],
+                                     parameters['imu.bias.specific_force']])
+        self._deviations = np.repeat([parameters['imu.noise.angular_velocity'],
+                                      parameters['imu.noise.specific_force']], 3)
+        seed = int(np.float64(parameters['noise.seed']).view(np.uint64))
+        # Not the numbers of the noise of the legs, which has the same seed.
+        self._noise = np.random.default_rng([seed, 1])
+
+    def read(self, row: Array) -> list[float]:
+        """
+        Return angular velocity [rad/s] and specific force [m/s^2], IMU axes; the noise is new.
+
+        Parameters
+        ----------
+        row : (BASE,)
+            The motion of the base.
+
+        """
+        spin, spin_rate = (_vector(row[part]) for part in (
+            BASE_ANGULAR_VELOCITY, BASE_ANGULAR_ACCELERATION))
+        force = add(subtract(_vector(row[BASE_ACCELERATION]), _vector(row[GRAVITY])),
+                    carried(spin, spin_rate, self._position))
+        true = np.concatenate([self._to_imu @ spin, self._to_imu @ force])
+        readings: list[float] = (
+            true + self._bias + self._deviations * self._noise.standard_normal(6)).tolist()
+        return readings
+
+
+def _vector(three: Array) -> Vector3:
+    x, y, z = three.tolist()
+    return x, y, z

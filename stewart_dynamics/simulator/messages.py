@@ -1,0 +1,104 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The messages of the simulator: what it publishes for states of the plant and of its base."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from operator import sub
+
+from stewart_dynamics.messages.joint_state import JointStateWriter
+from stewart_dynamics.messages.setpoint import StampedWriter
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints import topics as inputs
+from stewart_dynamics.simulator.base import BasePeriod
+from stewart_dynamics.simulator.imu import SimulatedImu
+from stewart_dynamics.simulator.imu_message import ImuWriter
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import State
+
+# Under the node's name; those that it publishes in their order.
+INPUT_TYPES = {
+    'commands': 'std_msgs/msg/Float64MultiArray',
+    'wrench': 'geometry_msgs/msg/WrenchStamped',
+}
+OUTPUT_TYPES = {
+    'leg_states': 'sensor_msgs/msg/JointState',
+    'pose': 'geometry_msgs/msg/PoseStamped',
+    'twist': 'geometry_msgs/msg/TwistStamped',
+    'accel': 'geometry_msgs/msg/AccelStamped',
+}
+# Those of the base: published where its motion is generated, subscribed where it comes by topics.
+BASE_TYPES = {topic: inputs.INPUT_TYPES[topic] for topic in inputs.BASE_SOURCES['motion']}
+IMU = 'imu'
+IMU_TYPE = inputs.INPUT_TYPES[inputs.BASE_IMU]
+
+
+class StateMessages:
+    """
+    Writes the messages of states.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Names of joints and base frame, and zero lengths.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._zero_lengths = parameters['geometry.zero_length'].tolist()
+        self._joint_state = JointStateWriter(parameters['joints'])
+        frame = parameters['base_frame']
+        self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
+
+    def write(self, stamp: int, state: State) -> Iterator[tuple[str, bytes]]:
+        """Yield topics, keys of OUTPUT_TYPES, and messages of a state at a time [ns]."""
+        yield 'leg_states', self._joint_state.write(
+            stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)
+        yield 'pose', self._pose.write(stamp, state.pose)
+        yield 'twist', self._six.write(stamp, state.twist)
+        yield 'accel', self._six.write(stamp, state.acceleration)
+
+
+class BaseMessages:
+    """
+    Writes the messages of a base that moves.
+
+    Parameters
+    ----------
+    parameters : SimulatorParameters
+        The world frame and the IMU.
+
+    """
+
+    def __init__(self, parameters: SimulatorParameters) -> None:
+        frame = parameters['world_frame']
+        self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
+        self._imu = SimulatedImu(parameters)
+        self._imu_writer = ImuWriter(IMU, parameters['imu.noise.angular_velocity'],
+                                     parameters['imu.noise.specific_force'])
+        self._imu_periods = round(parameters['rate'] / parameters['imu.rate'])
+
+    def write(self, stamp: int, index: int, period: BasePeriod) -> Iterator[tuple[str, bytes]]:
+        """Yield topics and messages for the end of a period: its time [ns] and its number."""
+        # The IMU first: who answers the motion of the base with a setpoint may be faster than what
+        # is published behind it, and the node then has no reading of the setpoint's time.
+        if index % self._imu_periods == 0:
+            readings = self._imu.read(period.rows[-1])
+            yield IMU, self._imu_writer.write(stamp, readings[:3], readings[3:])
+        if period.pose:
+            yield inputs.BASE_POSE, self._pose.write(stamp, period.pose)
+            yield inputs.BASE_TWIST, self._six.write(stamp, period.twist)
+            yield inputs.BASE_ACCEL, self._six.write(stamp, period.acceleration)

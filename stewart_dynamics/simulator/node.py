@@ -1,0 +1,278 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator node: plant and base in real time, or one period for each command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from functools import partial
+import gc
+import math
+import time
+from typing import Any, ClassVar
+
+from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray
+
+from stewart_dynamics.arrays import Six
+from stewart_dynamics.compilation import machine_code
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.messages.cdr import finite, MalformedError
+from stewart_dynamics.messages.standard import clock, float64_values
+from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.repeated_events import Series
+from stewart_dynamics.ros.run import run
+from stewart_dynamics.ros.signals import SIGNALS
+from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
+from stewart_dynamics.setpoints.wrench import WrenchInput
+from stewart_dynamics.simulator.base import BaseOfTopics, BasePeriod, GeneratedBase
+from stewart_dynamics.simulator.messages import (
+    BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
+
+_TYPES: dict[str, Any] = {
+    'geometry_msgs/msg/PoseStamped': PoseStamped,
+    'geometry_msgs/msg/TwistStamped': TwistStamped,
+    'geometry_msgs/msg/AccelStamped': AccelStamped,
+    'geometry_msgs/msg/WrenchStamped': WrenchStamped,
+    'sensor_msgs/msg/Imu': Imu,
+    'sensor_msgs/msg/JointState': JointState,
+    'std_msgs/msg/Float64MultiArray': Float64MultiArray,
+}
+
+_QUEUE = 1000
+# Simulated time begins here [ns]: zero is no stamp.
+_BEGIN = 1_000_000_000
+_ANNOUNCE_SECONDS = 0.1
+_BACKLOG = 100_000_000  # [ns]
+_WATCH_SECONDS = 1.0
+
+NOT_SIX = 'not six numbers'
+
+
+class SimulatorNode(Node):
+    """
+    Moves the hexapod under the commanded forces, and publishes its state.
+
+    Brakes hold it until the first command, and when none comes for ``command_timeout``. A base
+    whose motion is generated is at rest until the first command, and then goes on.
+
+    In real time it takes the periods that are due by a steady clock, several where it is late;
+    what is later than 0.1 s is skipped. With ``use_sim_time`` each command is one period, and
+    nothing else advances time.
+
+    Raises ParameterError where the parameters break a rule.
+    """
+
+    plant: ClassVar[Callable[[SimulatorParameters], Any]] = Plant
+
+    def __init__(self) -> None:
+        super().__init__(
+            'stewart_simulator', automatically_declare_parameters_from_overrides=True,
+            allow_undeclared_parameters=True)
+        self._settings = declare_parameters(self, SimulatorParameters)
+        self._stepped = bool(self.get_parameter('use_sim_time').value)
+        self._series = Series()
+        if machine_code.HINT:
+            self.get_logger().warning(machine_code.HINT)
+        begun = time.monotonic()
+        self._plant = SIGNALS.interruptible(partial(type(self).plant, self._settings))
+        self._state_messages = StateMessages(self._settings)
+        for mistake in likely_mistakes(self._settings):
+            self.get_logger().warning(mistake)
+        self._rejections = Rejections(self._on_rejection)
+        self._wrench_input = WrenchInput(self._settings, self._rejections)
+        source = self._settings['base_motion.source']
+        self._base: GeneratedBase | BaseOfTopics | None = (
+            None if source == 'fixed' else GeneratedBase(self._settings) if source != 'topics'
+            else BaseOfTopics(self._settings, self._rejections, self.get_logger().warning))
+        self._base_messages = BaseMessages(self._settings)
+        self._base_now: BasePeriod | None = None
+        self._commands: Six | None = None
+        self._stamp = _BEGIN
+        self._index = 0
+        self._braked = False
+        self._commanded = 0  # the index at the last command
+        self._begun = 0  # the index at the first one
+        timeout = self._settings['command_timeout']
+        self._patience = math.inf if timeout is None else timeout * self._settings['rate']
+        self._rate: float = self._settings['rate']
+        qos = QoSProfile(depth=_QUEUE)
+        self._outputs = {topic: self.create_publisher(_TYPES[kind], f'~/{topic}', qos)
+                         for topic, kind in self._output_types().items()}
+        inputs: dict[str, Callable[[bytes], None]] = {
+            'commands': self._on_commands, 'wrench': self._wrench_input.take}
+        if isinstance(self._base, BaseOfTopics):
+            inputs.update({topic: partial(self._on_base, self._base, topic)
+                           for topic in BASE_TYPES})
+        for topic, take in inputs.items():
+            self.create_subscription(
+                _TYPES[{**INPUT_TYPES, **BASE_TYPES}[topic]], f'~/{topic}', take, qos, raw=True)
+        self.get_logger().info(
+            f'dynamics ready after {time.monotonic() - begun:.1f} s; ' + (
+                'one period for each command' if self._stepped else 'in real time')
+            + f', {self._rate:g} periods per second of {self._plant.steps} steps each')
+        if self._stepped:
+            self._clock_output = self.create_publisher(Clock, '/clock', qos)
+            self._move_base()
+            self._messages = self._messages_now()
+            self._announcing = self._timer(_ANNOUNCE_SECONDS, self._announce)
+        else:
+            self._start: int | None = None
+            self._timer(1.0 / self._rate, self._on_time)
+        self._timer(_WATCH_SECONDS, self._on_watch)
+        # What exists now stays: see DynamicsNode.
+        gc.collect()
+        gc.freeze()
+
+    def _output_types(self) -> dict[str, str]:
+        if self._base is None:
+            return OUTPUT_TYPES
+        generated = {} if isinstance(self._base, BaseOfTopics) else BASE_TYPES
+        return {**OUTPUT_TYPES, **generated, IMU: IMU_TYPE}
+
+    def _timer(self, seconds: float, callback: Any) -> Any:
+        # ROS time stands still until it is advanced here, or jumps.
+        steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        return self.create_timer(seconds, callback, clock=steady)
+
+    def _on_commands(self, data: bytes) -> None:
+        try:
+            values = float64_values(data)
+        except MalformedError as exc:
+            self._rejections.reject('commands', MALFORMED, str(exc))
+            return
+        if len(values) != 6:
+            self._rejections.reject('commands', NOT_SIX, f'{len(values)} numbers')
+            return
+        if not finite(values):
+            self._rejections.reject('commands', NOT_FINITE, str(values))
+            return
+        first, second, third, fourth, fifth, sixth = values
+        if self._commands is None:
+            self._begun = self._index
+        if self._braked:
+            self.get_logger().info('a command came: brakes released')
+            self._braked = False
+        self._commands = first, second, third, fourth, fifth, sixth
+        self._commanded = self._index
+        if self._stepped:
+            self._announcing.reset()
+            self._advance()
+
+    def _on_base(self, base: BaseOfTopics, topic: str, data: bytes) -> None:
+        base.input.take(topic, data, lambda: self._stamp + self._time_of(self._index))
+
+    def _on_time(self) -> None:
+        """Take the periods that are due."""
+        now = time.monotonic_ns()
+        if self._start is None:
+            self._start, self._stamp = now, self.get_clock().now().nanoseconds
+        late = now - self._start - self._time_of(self._index + 1)
+        if late > _BACKLOG:
+            # Stamps go on with the clock, the motion where it was.
+            self._start += late
+            self._stamp += late
+            self._say('late', f'fell behind by {late / 1e9:.3f} s: that time is skipped')
+        while self._time_of(self._index + 1) <= now - self._start:
+            self._advance()
+
+    def _time_of(self, index: int) -> int:
+        """Return the time of a period's end since the start [ns]; rounding does not add up."""
+        return round(index * 1e9 / self._rate)
+
+    def _advance(self) -> None:
+        """Take one period, with the brakes on until there is a command, and when they stop."""
+        self._index += 1
+        self._move_base()
+        if self._commands is not None and self._index - self._commanded > self._patience:
+            self._brake()
+        if self._commands is not None and not self._plant.fault and not self._braked:
+            state = self._plant.advance(self._commands, self._wrench_input.wrench,
+                                        self._base_now and self._base_now.rows)
+            if self._plant.fault:
+                self.get_logger().error(self._plant.fault)
+            elif state.forces != self._commands:
+                self._log_saturated(self._commands, state.forces)
+        self._messages = self._messages_now()
+        self._publish()
+
+    def _brake(self) -> None:
+        if not self._braked:
+            self._braked = True
+            self._plant.brake()
+            self.get_logger().warning(
+                f'no command for {self._settings["command_timeout"]:g} s: brakes engaged')
+
+    def _move_base(self) -> None:
+        """Move the base, if it moves, on to the end of the present period."""
+        if self._base is not None:
+            moved = 0 if self._commands is None else self._index - self._begun
+            self._base_now = self._base.period(moved, self._stamp + self._time_of(self._index))
+
+    def _messages_now(self) -> list[tuple[str, bytes]]:
+        stamp = self._stamp + self._time_of(self._index)
+        # The base first: who answers a state with a command has its motion, too.
+        return [*(() if self._base_now is None else self._base_messages.write(
+            stamp, self._index, self._base_now)),
+            *self._state_messages.write(stamp, self._plant.measured())]
+
+    def _announce(self) -> None:
+        """Publish again what is not answered: all messages until the first command."""
+        if self._commands is None:
+            self._publish()
+        else:
+            self._publish_clock()  # its subscribers are best effort and may have lost it
+
+    def _publish(self) -> None:
+        for topic, message in self._messages:
+            self._outputs[topic].publish(message)
+        if self._stepped:
+            self._publish_clock()
+
+    def _publish_clock(self) -> None:
+        self._clock_output.publish(clock(self._stamp + self._time_of(self._index)))
+
+    # -- logging --------------------------------------------------------------------------
+
+    def _log_saturated(self, commands: Six, forces: Six) -> None:
+        joint, command, force = max(
+            zip(self._settings['joints'], commands, forces, strict=True),
+            key=lambda leg: abs(leg[1] - leg[2]))
+        self._say('saturated', f'commands: {joint}: {command:.6g} N exceeds limits.force_max, '
+                  f'clipped to {force:.6g} N')
+
+    def _on_rejection(self, rejection: Rejection, details: str) -> None:
+        self._say(rejection, rejection.words(details))
+
+    def _say(self, kind: Hashable, text: str) -> None:
+        if (line := self._series.add(kind, text, time.monotonic())) is not None:
+            self.get_logger().warning(line)
+
+    def _on_watch(self) -> None:
+        for line in self._series.over(time.monotonic()):
+            self.get_logger().warning(line)
+
+
+def main() -> int:
+    """Run the node; exit code 0, or 1 where its parameters break a rule."""
+    return run(SimulatorNode, SimulatorParameters)

@@ -1,0 +1,126 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The parameters of the simulator: those of the hexapod, and its own.
+
+Apart from the plant itself, so that ``--help`` and the check of a file need no compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from types import MappingProxyType
+
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.table import PARAMETERS, Parameters
+
+_POSE = 'X Y Z alpha beta gamma'
+
+_OWN = (
+    Parameter('initial_pose', 'double', 'X Y Z alpha beta gamma, where the brakes hold the '
+              'platform until the first command', 'm, rad', required=True, sizes=(6,)),
+    Parameter('step', 'double', 'step of the integration; smaller where friction or end stops '
+              'need it', 's', 1e-3, minimum=1e-5, maximum=1e-3),
+    Parameter('rate', 'double', 'rate of the published states; a period is a whole number of '
+              'steps. With use_sim_time each command advances time by one period', 'Hz', 500.0,
+              minimum=1.0, maximum=1e4),
+    Parameter('command_timeout', 'double', 'time without a command after which the brakes engage, '
+              'as those of a drive; they release with the next command; none: the last command is '
+              'held', 's', minimum=0.0, maximum=1e6, above=True),
+    Parameter('end_stops.frequency', 'double', 'natural frequency of the mass of a leg on its end '
+              'stop: its reflected mass and a sixth of platform and pistons', 'Hz', 30.0,
+              minimum=0.0, above=True),
+    Parameter('end_stops.damping_ratio', 'double', 'damping ratio of the same; 1: no rebound',
+              '', 0.5, minimum=0.0),
+    Parameter('noise.length', 'double', 'standard deviation of the measured lengths', 'm', 0.0,
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.rate', 'double', 'standard deviation of the measured rates', 'm/s', 0.0,
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.force', 'double', 'standard deviation of the measured forces', 'N', 0.0,
+              minimum=0.0, maximum=1e9),
+    Parameter('noise.seed', 'double', 'seed of the noise: equal seeds give equal noise', '', 0.0),
+    Parameter('base_motion.source', 'string', 'how the base moves: not at all, as ~/base/pose, '
+              'twist and accel give it, by a sine on each axis, or as a ship in a seaway', '',
+              'fixed', choices=('fixed', 'topics', 'sine', 'sea')),
+    Parameter('base_motion.center', 'double', f'{_POSE} in the world at rest, about which sine '
+              'and sea move', 'm, rad', (0.0,) * 6, sizes=(6,), minimum=-1e6, maximum=1e6),
+    Parameter('base_motion.lever_arm', 'double', 'position of the base frame from the point that '
+              'sine or sea move, as the center of gravity of a ship; base axes', 'm',
+              (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
+    Parameter('base_motion.ramp', 'double', 'time in which sine and sea grow from rest, from the '
+              'first command on', 's', 5.0, minimum=0.0, maximum=1e6),
+    Parameter('base_motion.amplitude', 'double', f'of {_POSE}: surge, sway, heave, roll, pitch, '
+              'yaw; sine only', 'm, rad', (0.0,) * 6, sizes=(6,), minimum=-1e4, maximum=1e4),
+    Parameter('base_motion.frequency', 'double', f'of {_POSE}, or one for all; sine only', 'Hz',
+              (0.1,), sizes=(1, 6), minimum=0.0, maximum=100.0),
+    Parameter('base_motion.phase', 'double', f'of {_POSE}; sea: relative to the wave', 'rad',
+              (0.0,) * 6, sizes=(6,), minimum=-1e3, maximum=1e3),
+    Parameter('base_motion.sea.wave_height', 'double', 'significant wave height of the '
+              'Bretschneider spectrum', 'm', 2.0, minimum=0.0, maximum=100.0),
+    Parameter('base_motion.sea.peak_period', 'double', 'period of its peak', 's', 10.0,
+              minimum=0.1, maximum=1e3),
+    Parameter('base_motion.sea.response', 'double', f'amplitude of {_POSE} for a wave of '
+              'amplitude 1 m', 'm/m, rad/m', (0.0,) * 6, sizes=(6,), minimum=-1e3, maximum=1e3),
+    Parameter('base_motion.sea.seed', 'double', 'seed of the waves: equal seeds give equal '
+              'motion', '', 0.0),
+    Parameter('imu.rate', 'double', 'rate of ~/imu where the base moves; rate is a whole multiple '
+              'of it. The IMU is mounted as base.imu.position and .orientation say', 'Hz', 250.0,
+              minimum=0.0, above=True, maximum=1e4),
+    Parameter('imu.noise.specific_force', 'double', 'standard deviation of each reading', 'm/s^2',
+              0.0, minimum=0.0, maximum=1e6),
+    Parameter('imu.noise.angular_velocity', 'double', 'standard deviation of each reading',
+              'rad/s', 0.0, minimum=0.0, maximum=1e6),
+    Parameter('imu.bias.specific_force', 'double', 'constant error of the readings, IMU axes',
+              'm/s^2', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
+    Parameter('imu.bias.angular_velocity', 'double', 'constant error of the readings, IMU axes',
+              'rad/s', (0.0, 0.0, 0.0), sizes=(3,), minimum=-1e6, maximum=1e6),
+)
+
+# Beginnings of names.
+_OF_THE_NODE = ('autostart', 'external_wrench.', 'geometry.base_joint_axes',
+                'geometry.platform_joint_axes', 'joint_states.', 'limits.base_joint_angle_max',
+                'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
+                'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
+                'visualization_rate')
+
+SIMULATOR_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({
+    # The node has no lifecycle: none of the hexapod's may change while it runs either.
+    **{name: known._replace(while_active=False) for name, known in PARAMETERS.items()},
+    **{own.name: own for own in _OWN}})
+
+
+class SimulatorParameters(Parameters):
+    """The parameters of the simulated hexapod, and of the simulation."""
+
+    table = SIMULATOR_PARAMETERS
+    node = 'stewart_simulator'
+    unused = frozenset(name for name in PARAMETERS if name.startswith(_OF_THE_NODE))
+
+    def _check_together(self, source: str) -> None:
+        """Check what one parameter demands of another."""
+        super()._check_together(source)
+        steps = 1.0 / (self['rate'] * self['step'])
+        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
+            raise ParameterError(
+                f'{source}: rate: {self["rate"]} Hz: a period must be a whole number of steps of '
+                f'{self["step"]:g} s, not {steps:.6g}')
+        periods = self['rate'] / self['imu.rate']
+        if self['base_motion.source'] != 'fixed' and (
+                round(periods) < 1 or not math.isclose(periods, round(periods), rel_tol=1e-9)):
+            raise ParameterError(
+                f'{source}: imu.rate: {self["imu.rate"]} Hz: rate, {self["rate"]:g} Hz, must be a '
+                f'whole multiple of it, not {periods:.6g}')

@@ -1,0 +1,182 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The plant: the hexapod as it moves under leg forces.
+
+Gravity, friction, end stops, actuators that saturate: what ``stewart_simulator`` puts in the
+place of hardware. Equal commands give equal bits. See ``simulator.plant_dynamics`` for the
+integration, ``simulator.end_stops`` and ``simulator.step_size``.
+"""
+
+from __future__ import annotations
+
+import math
+from struct import Struct
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.dynamics.forward_dynamics import WORK
+from stewart_dynamics.mechanics.frames.rotation import from_euler, to_quaternion
+from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.mechanics.rows import NO_BASE
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.simulator.end_stops import stops_of
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant_dynamics import (
+    advance, BASE_BEGIN, LARGEST_MOVE, RESULT, RESULT_ACCELERATION, RESULT_FORCES, RESULT_LENGTHS,
+    RESULT_RATES, RESULT_SOUND, SCRATCH, STATE, STATE_POSITION, STATE_QUATERNION, STATE_TWIST)
+from stewart_dynamics.simulator.step_size import substeps
+
+_NUMBERS = Struct(f'{STATE + RESULT}d')
+
+
+class State(NamedTuple):
+    """The hexapod at the end of a period."""
+
+    lengths: Six
+    """[m]"""
+    rates: Six
+    """[m/s]"""
+    forces: Six
+    """Of the actuators in the period: the commands as they saturated, without end stops [N]."""
+    pose: tuple[float, ...]
+    """Position and quaternion x y z w of the platform frame in the base frame."""
+    twist: Six
+    """Base axes [m/s, rad/s]."""
+    acceleration: Six
+    """Base axes [m/s^2, rad/s^2]."""
+
+
+class Plant:
+    """
+    The hexapod of given parameters, in motion from its initial pose; brakes hold it there first.
+
+    Where a step cannot be computed, because numbers overflow or a leg is so short that one step
+    could reverse it, the hexapod is held at rest in the last pose that could be, permanently:
+    ``fault`` states it.
+
+    Parameters
+    ----------
+    parameters : SimulatorParameters
+        The hexapod and the simulation.
+
+    Raises
+    ------
+    ParameterError
+        The initial pose exceeds a limit of length, or friction or end stops would need too short
+        steps.
+
+    """
+
+    def __init__(self, parameters: SimulatorParameters) -> None:
+        self.parameters = parameters
+        self.substeps = substeps(parameters)
+        """Steps that are taken within one of the parameter's length."""
+        self.fault = ''
+        """Why it is held at rest permanently; empty while it is not."""
+        period = 1.0 / parameters['rate']
+        self.steps = round(period / parameters['step']) * self.substeps
+        """Steps in a period."""
+        self._step = period / self.steps
+        self._limits = Limits(parameters)
+        self._loads = np.array(NO_WRENCH + NO_WRENCH + 3 * NO_BASE)
+        numbers = np.zeros(STATE + RESULT)
+        self._memory = numbers.data  # the same as bytes
+        self._state, self._result = numbers[:STATE], numbers[STATE:]
+        pose = parameters['initial_pose']
+        self._state[STATE_POSITION] = pose[:3]
+        self._state[STATE_QUATERNION] = to_quaternion(from_euler(pose[3:]))
+        self._take_none, self._take_steps = (advance.bound(
+            StewartPlatform(parameters).constants, stops_of(parameters), self._limits.force_max,
+            self._loads, self._state, self._result, steps, self._step, np.empty(SCRATCH),
+            np.empty(WORK)) for steps in (0, self.steps))
+        self.state = self._run(0)._replace(acceleration=NO_WRENCH)
+        """The present one."""
+        self._check_lengths()
+        self._deviations = np.repeat([
+            parameters['noise.length'], parameters['noise.rate'], parameters['noise.force']], 6)
+        self._noise = np.random.default_rng(np.float64(parameters['noise.seed']).view(np.uint64))
+
+    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> State:
+        """
+        Return the state one period later.
+
+        Parameters
+        ----------
+        commands : (6,)
+            Forces of the actuators [N], + pushes; they saturate at limits.force_max.
+        wrench : (6,)
+            External wrench on the platform at its origin, base axes [N, N m].
+        base : (3, BASE), optional
+            How the base moves at begin, middle and end of the period, see ``mechanics.rows``;
+            not at all by default.
+
+        """
+        if not self.fault:
+            self._loads[:BASE_BEGIN.start] = commands + wrench
+            self._loads[BASE_BEGIN.start:] = math.nan if base is None else base.ravel()
+            self.state = self._run(self.steps)
+        return self.state
+
+    def brake(self) -> State:
+        """Return the state at rest in the present pose: the brakes take all speed at once."""
+        if not self.fault:
+            self._state[STATE_TWIST] = 0.0
+            self._loads[:] = NO_WRENCH + NO_WRENCH + 3 * NO_BASE
+            self.state = self._run(0)._replace(acceleration=NO_WRENCH)
+        return self.state
+
+    def measured(self) -> State:
+        """
+        Return the present state as it is measured: noise on lengths, rates and forces.
+
+        The noise is another in each call; pose, twist and acceleration are true.
+        """
+        state = self.state
+        if not self._deviations.any():
+            return state
+        numbers: Any = tuple((
+            state.lengths + state.rates + state.forces
+            + self._deviations * self._noise.standard_normal(18)).tolist())
+        return state._replace(lengths=numbers[RESULT_LENGTHS], rates=numbers[RESULT_RATES],
+                              forces=numbers[RESULT_FORCES])
+
+    def _run(self, steps: int) -> State:
+        (self._take_steps if steps else self._take_none)()
+        numbers = _NUMBERS.unpack_from(self._memory)
+        state, result = numbers[:STATE], numbers[STATE:]
+        lengths = result[RESULT_LENGTHS]
+        if not result[RESULT_SOUND]:
+            self.fault = (
+                f'held at rest permanently: after position {list(state[STATE_POSITION])} m the '
+                'motion cannot be computed: numbers overflow, or within a step of '
+                f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
+                'joint moves by more than that part of its leg; shortest leg '
+                f'{min(lengths):.3g} m')
+        return State(lengths, result[RESULT_RATES], result[RESULT_FORCES],
+                     state[:STATE_TWIST.start], state[STATE_TWIST], result[RESULT_ACCELERATION])
+
+    def _check_lengths(self) -> None:
+        """Raise ParameterError where the hexapod does not fit between its end stops."""
+        pose = self.parameters['initial_pose'].tolist()
+        if self.fault:
+            raise ParameterError(
+                f'initial_pose: {pose}: a leg would have no length, or one that overflows')
+        for exceedance in self._limits.exceeded(self.state.lengths, NO_WRENCH, None):
+            raise ParameterError(
+                f'initial_pose: {pose}: {exceedance.words(self.parameters["joints"])}')

@@ -1,0 +1,240 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The motion of the platform under leg forces, integrated at a fixed step; compiled.
+
+The method is the classical Runge-Kutta method of fourth order, on position, quaternion and twist.
+After every step the quaternion is divided by its length, which keeps the order (Hairer, Lubich,
+Wanner, Geometric Numerical Integration, 2nd ed., IV.4, doi:10.1007/3-540-30666-8). Forces and
+wrench are constant within a call, so that the work of a leg force is the force times the change
+of its leg's length, exactly, and an energy balance shows the error of the method alone. The
+motion of the base is given at begin, middle and end of a call, which are the stages of the method
+where a call is one step; with more steps it is the parabola through them.
+"""
+
+from __future__ import annotations
+
+import math
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.dynamics.base_load import moves
+from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.forward_dynamics import acceleration
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.mechanics.rows import (
+    ACCELERATION, BASE, consecutive, MOTION, POSITION, ROTATION, TWIST)
+from stewart_dynamics.mechanics.vectors import add, cross, dot, Matrix3, read3, scale, Vector3
+from stewart_dynamics.simulator.end_stops import stop_force
+
+# The state: position, quaternion x y z w, linear and angular velocity, base axes.
+STATE_POSITION, STATE_QUATERNION, STATE_TWIST = consecutive(3, 4, 6)
+STATE = STATE_TWIST.stop
+_LINEAR, _ANGULAR = STATE_TWIST.start, STATE_TWIST.start + 3
+# The result: lengths, rates, forces of the actuators, acceleration, and whether all steps could be
+# computed.
+RESULT_LENGTHS, RESULT_RATES, RESULT_FORCES, RESULT_ACCELERATION = consecutive(6, 6, 6, 6)
+RESULT_SOUND = RESULT_ACCELERATION.stop
+RESULT = RESULT_SOUND + 1
+# Six commands, the wrench on the platform, and rows of the base's motion at begin, middle and end.
+COMMANDS, WRENCH, BASE_BEGIN, BASE_MIDDLE, BASE_END = consecutive(6, 6, BASE, BASE, BASE)
+LOADS = BASE_END.stop
+# Scratch memory.
+_MOTION, _FORCES, _AFTER, _SLOPE, _MEAN, _BASE = consecutive(
+    MOTION, 6, STATE, STATE, STATE, BASE)
+SCRATCH = _BASE.stop
+
+# In one step the platform may turn by at most this [rad], and a platform joint move by at most
+# this part of its leg's length: a larger move would not be resolved.
+LARGEST_MOVE = 0.5
+
+_matrix = inlined(from_quaternion)
+
+
+@inlined
+def _rotation(state: Array) -> Matrix3:
+    """Return R of the quaternion, which within a step is not of unit length."""
+    at = STATE_QUATERNION.start
+    x, y, z, w = state[at], state[at + 1], state[at + 2], state[at + 3]
+    k = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    return _matrix(k * x, k * y, k * z, k * w)
+
+
+@inlined
+def _twist(state: Array) -> tuple[Vector3, Vector3]:
+    return read3(state, _LINEAR), read3(state, _ANGULAR)
+
+
+@inlined
+def _move_base(loads: Array, part: float, base: Array) -> None:
+    """Write the base's motion after a part of the call, between 0 and 1."""
+    if not moves(loads[BASE_BEGIN]):
+        return
+    begin, middle, end = ((1.0 - part) * (1.0 - 2.0 * part), 4.0 * part * (1.0 - part),
+                          part * (2.0 * part - 1.0))
+    for n in range(BASE):
+        base[n] = (begin * loads[BASE_BEGIN.start + n] + middle * loads[BASE_MIDDLE.start + n]
+                   + end * loads[BASE_END.start + n])
+
+
+@compiled
+def _slope(constants: Array, stops: Array, state: Array, loads: Array, base: Array,
+           motion: Array, forces: Array, work: Array, slope: Array) -> None:
+    """
+    Write a state's time derivative under its loads and a motion of the base.
+
+    motion, forces, work: scratch memory.
+    """
+    position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
+    velocity, omega = _twist(state)
+    for n in range(3):
+        motion[POSITION.start + n] = position[n]
+    for n in range(9):
+        motion[ROTATION.start + n] = rotation[n]
+    for n in range(6):
+        motion[TWIST.start + n] = state[STATE_TWIST.start + n]
+    for leg in range(6):
+        a, length, _, s = leg_line(constants, leg, position, rotation)
+        rate = dot(s, add(velocity, cross(omega, a)))
+        forces[leg] = loads[COMMANDS.start + leg] + stop_force(stops, leg, length, rate)
+    acceleration(constants, motion, forces, loads[WRENCH], base, work)
+    at = STATE_QUATERNION.start
+    vector, scalar = read3(state, at), state[at + 3]
+    turning = add(scale(scalar, omega), cross(omega, vector))
+    for n in range(3):
+        slope[STATE_POSITION.start + n] = velocity[n]
+        slope[at + n] = 0.5 * turning[n]
+    slope[at + 3] = -0.5 * dot(omega, vector)
+    for n in range(6):
+        slope[STATE_TWIST.start + n] = motion[ACCELERATION.start + n]
+
+
+@compiled
+def _write_legs(constants: Array, state: Array, result: Array) -> float:
+    """
+    Write lengths and rates of the legs.
+
+    Return the largest of the angular speed and the speeds of the platform joints relative to
+    their legs' lengths [1/s]; infinite where a leg has no length.
+    """
+    position, rotation = read3(state, STATE_POSITION.start), _rotation(state)
+    velocity, omega = _twist(state)
+    fastest = math.sqrt(dot(omega, omega))
+    for leg in range(6):
+        a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
+        joint_velocity = add(velocity, cross(omega, a))
+        moving = inverse_length * math.sqrt(dot(joint_velocity, joint_velocity))
+        result[RESULT_LENGTHS.start + leg] = length
+        result[RESULT_RATES.start + leg] = dot(s, joint_velocity)
+        fastest = max(fastest, moving) if 0.0 < length < math.inf else math.inf
+    return fastest
+
+
+@compiled
+def _next_state(constants: Array, stops: Array, loads: Array, state: Array, step: int, steps: int,
+                h: float, base: Array, motion: Array, forces: Array, work: Array, slope: Array,
+                mean: Array, after: Array) -> bool:
+    """
+    Write the state after a step of a call; return whether it is finite.
+
+    base is the motion of the base at its begin, and becomes that at its end; the rest: scratch
+    memory.
+    """
+    _slope(constants, stops, state, loads, base, motion, forces, work, slope)
+    for n in range(STATE):
+        mean[n] = slope[n]
+        after[n] = state[n] + 0.5 * h * slope[n]
+    _move_base(loads, (step + 0.5) / steps, base)
+    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
+    for n in range(STATE):
+        mean[n] += 2.0 * slope[n]
+        after[n] = state[n] + 0.5 * h * slope[n]
+    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
+    for n in range(STATE):
+        mean[n] += 2.0 * slope[n]
+        after[n] = state[n] + h * slope[n]
+    _move_base(loads, (step + 1.0) / steps, base)
+    _slope(constants, stops, after, loads, base, motion, forces, work, slope)
+    finite = True
+    square = 0.0
+    for n in range(STATE):
+        after[n] = state[n] + h / 6.0 * (mean[n] + slope[n])
+        finite = finite and math.isfinite(after[n])
+        square += (after[n] * after[n]
+                   if STATE_QUATERNION.start <= n < STATE_QUATERNION.stop else 0.0)
+    for n in range(STATE_QUATERNION.start, STATE_QUATERNION.stop):
+        after[n] /= math.sqrt(square)
+    return finite
+
+
+@entry_point('f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'i8', 'f8',
+             'f8[::1]', 'f8[:,::1]')
+def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array, state: Array,
+            result: Array, steps: int, h: float, scratch: Array, work: Array) -> None:
+    """
+    Take steps of h [s] and write the state and the result.
+
+    Parameters
+    ----------
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
+    stops : (STOPS,)
+        The end stops, see ``end_stops``.
+    largest_forces : (6,)
+        To which the commands are clipped [N].
+    loads : (LOADS,)
+        Commands [N], force and moment on the platform [N, N m], rows of the base's motion at
+        begin, middle and end of the call, of nan where it is still; commands are clipped in
+        place.
+    state : (STATE,)
+        The initial state, overwritten with the final one. Where a step cannot be computed: the
+        last state that could be, at rest.
+    result : (RESULT,)
+        Written.
+    steps, h
+        How many, and how long.
+    scratch, work : (SCRATCH,), forward_dynamics.WORK
+        Scratch memory.
+
+    """
+    motion, forces, after = scratch[_MOTION], scratch[_FORCES], scratch[_AFTER]
+    slope, mean, base = scratch[_SLOPE], scratch[_MEAN], scratch[_BASE]
+    for n in range(BASE):
+        base[n] = loads[BASE_BEGIN.start + n]
+    for leg in range(6):
+        most = largest_forces[leg]
+        force = min(max(loads[COMMANDS.start + leg], -most), most)
+        loads[COMMANDS.start + leg] = result[RESULT_FORCES.start + leg] = force
+    sound = h * _write_legs(constants, state, result) <= LARGEST_MOVE
+    for step in range(steps):
+        finite = _next_state(constants, stops, loads, state, step, steps, h, base, motion,
+                             forces, work, slope, mean, after)
+        sound = (sound and finite
+                 and h * _write_legs(constants, after, result) <= LARGEST_MOVE)
+        if not sound:
+            break
+        for n in range(STATE):
+            state[n] = after[n]
+    _slope(constants, stops, state, loads, base, motion, forces, work, slope)
+    for n in range(6):
+        sound = sound and math.isfinite(slope[STATE_TWIST.start + n])
+    for n in range(6):
+        if not sound:
+            state[STATE_TWIST.start + n] = 0.0
+            result[RESULT_FORCES.start + n] = 0.0
+        result[RESULT_ACCELERATION.start + n] = (
+            slope[STATE_TWIST.start + n] if sound else 0.0)
+    _write_legs(constants, state, result)
+    result[RESULT_SOUND] = 1.0 if sound else 0.0
