@@ -83,12 +83,16 @@ def visit_displaymath(translator: Any, node: nodes.math_block) -> None:
 def lead_to_pages(*arguments: Any) -> None:
     """Replace links to README files in the text of a page, or of a file that it includes."""
     content = arguments[-1]
+    if (ROOT / 'docs' / arguments[1]).resolve() == ROOT / 'README.md':
+        content[0] = content[0].replace('[Contributing](CONTRIBUTING.md)', '`CONTRIBUTING.md`')
+        content[0] = re.sub(r'\]\((?!docs/|\w+:)', '](../', content[0])
+        content[0] = content[0].replace('](docs/', '](')
     content[0] = re.sub(r'\]\(\.\./benchmarks/README\.md', '](performance.md', content[0])
     content[0] = re.sub(r'\]\(\.\./security/README\.md', '](security.md', content[0])
 
 
 def setup(app: Sphinx) -> None:
-    """Register what is above."""
+    """Register the formulas and the rewriting of links."""
     app.connect('source-read', lead_to_pages)
     app.connect('include-read', lead_to_pages)
     app.add_html_math_renderer('mathml', (visit_math, None), (visit_displaymath, None))

@@ -81,6 +81,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
             if '_static' not in path.parts}
 
 
+def test_the_first_page_is_the_readme(site: dict[str, Page]) -> None:
+    headings = re.findall(r'^## (.*)$', (ROOT / 'README.md').read_text(encoding='utf-8'), re.M)
+    assert {'Install', 'Quick start', 'Safety'} <= set(headings)
+    anchors = {heading.lower().replace(' ', '-') for heading in headings}
+    assert anchors <= site['index.html'].anchors
+
+
 @pytest.mark.slow
 def test_every_page_is_on_the_site(site: dict[str, Page]) -> None:
     pages = {path.stem for path in [*ROOT.glob('docs/*.md'), *ROOT.glob('docs/*.rst')]}

@@ -163,16 +163,29 @@ def test_the_readme_is_short() -> None:
     assert README.count('\n') <= 220
 
 
+def test_libraries_to_install_by_pip_or_rosdep_are_those_of_the_package() -> None:
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    needed = set(re.findall(
+        r"^    '(\w+)", setup.partition('install_requires = [')[2].partition(']\n')[0], re.M))
+    by_pip = set(re.findall(r'^    pip install (\w[\w ]+)$', README, re.M)[0].split())
+    packages = (ROOT / 'package.xml').read_text(encoding='utf-8').replace('python3-yaml', 'pyyaml')
+    assert by_pip <= needed
+    assert all(name in by_pip or f'>{name}<' in packages or f'>python3-{name}<' in packages
+               or name == 'llvmlite' for name in needed)  # numba brings llvmlite
+
+
 @pytest.mark.parametrize('page', [
     'README.md', 'docs/from_cad_to_controller.md', 'docs/simulator.md',
     'docs/planned_trajectories.md', 'docs/replay.md', 'docs/development.md', 'docs/node.md'])
 def test_files_in_commands_exist(page: str) -> None:
-    folders = '|'.join(('bags', 'config', 'demo', 'docs', 'examples', 'mechanics', 'messages',
-                        'nodes', 'replay', 'runtime', 'security'))
+    folders = '|'.join([*(path.name for path in ROOT.iterdir() if path.is_dir()
+                          and not path.name.startswith('.') and path.name != 'test'),
+                        *(path.name for path in (ROOT / 'stewart_dynamics').iterdir()
+                          if (path / '__init__.py').is_file())])
     named = re.findall(rf'(?<![\w./-])(?:{folders})/[\w./]*\w', TEXTS[page])
     assert named
     for path in named:
-        made = path.startswith(('docs/_build', 'docs/<'))
+        made = path.startswith(('docs/_build', 'docs/<', 'install/', 'env/', 'build/'))
         assert made or (ROOT / path).exists() or (ROOT / 'stewart_dynamics' / path).exists(), path
 
 
