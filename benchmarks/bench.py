@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What ``make bench`` runs: the library's calls and the starts, then all figures with their targets.
+Run ``make bench``: the library's calls and the starts, then all figures with their targets.
 
-README.md beside this file says what is compared and how.
+see README.md beside this file.
 """
 
 from __future__ import annotations

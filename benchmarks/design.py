@@ -15,7 +15,7 @@
 """
 Predicted intervals of a designed motion and of a sine sweep of the same length and limits.
 
-Run by hand; README.md beside this file says what is compared and how.
+Run by hand; see README.md beside this file.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@
 """
 The way back, forces to accelerations and lengths to poses: how fast, and from how far away.
 
-Run by hand, ``make bench``; README.md beside this file says what is compared and how.
+Run by hand, ``make bench``; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def steps_table(platform: StewartPlatform) -> list[str]:
 
 
 def contestants(platform: StewartPlatform) -> tuple[list[Contestant], ...]:
-    """Return what is measured: forward dynamics, in batches as well, and forward kinematics."""
+    """Return the contestants: forward dynamics, single and in batches, and forward kinematics."""
     motion = random_motions(SAMPLES)
     forces = platform.solve(motion.rows)[:, FORCES].copy()
     one = Motion(motion.position[0], motion.rotation[0], motion.linear_velocity[0],

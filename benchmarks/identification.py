@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-How near the truth an identification comes, how often its intervals hold, and what it costs.
+Accuracy, coverage of the intervals, and cost of an identification.
 
 Forces are those of Pinocchio, noise is added. Run by hand on Linux, ``make bench-identify``;
-README.md beside this file says what is compared and how.
+see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ TRUE = GIVEN.replaced({
 RATE = 1000.0
 SECONDS = 60.0
 SEED = 3
-# The largest error of each kind that is allowed, and by what it is divided.
+# Largest error allowed of each kind, and its unit.
 TARGETS = {
     'platform.mass': (0.2, '% of it'), 'platform.center_of_mass': (1.0, 'mm'),
     'platform.inertia': (2.0, '% of the largest'), 'actuator.viscous_friction': (3.0, '% of it'),
@@ -193,7 +193,7 @@ def states(result: Mapping[str, Any], state: str) -> str:
 
 
 def not_told(folder: Path) -> list[str]:
-    """Return the lines of what bags at rest and about one axis tell."""
+    """Return the lines on identifiable parameters of bags at rest and about one axis."""
     lines = []
     for name, motion in (('at rest', at_rest), ('about x', about([1.0, 0.0, 0.0])),
                          ('about (1, 1, 0)', about([1.0, 1.0, 0.0]))):
@@ -204,7 +204,7 @@ def not_told(folder: Path) -> list[str]:
         sums = '; '.join(f'`{each["words"]}`' for each in found['combinations'])
         lines.append(f'- {name}, 20 s: identified are {states(found, "identified")}'
                      + (f'; in combinations {sums}' if sums else '')
-                     + f'; not told are {states(found, "not_told")}.')
+                     + f'; not identifiable are {states(found, "not_told")}.')
     return lines
 
 
@@ -260,7 +260,7 @@ def volume(folder: Path) -> list[str]:
 
 
 def cost() -> list[str]:
-    """Return the lines of what the regressor costs beside the inverse dynamics."""
+    """Return the lines that compare the cost of regressor and inverse dynamics."""
     p = random_parameters(rng(1))
     platform, motion = StewartPlatform(p), random_motion(p, rng(2), 4000)
     calls = {'`inverse_dynamics(motion)`': lambda: platform.inverse_dynamics(motion),

@@ -15,7 +15,7 @@
 """
 The runtime path beside Pinocchio and beside plain C, measured in turns in one run.
 
-Run by hand, ``make bench``; README.md beside this file says what is compared and how.
+Run by hand, ``make bench``; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ ACTUATORS = {
 
 
 class Contestant(NamedTuple):
-    """What is measured against another: ``run`` takes one turn and returns s per sample."""
+    """A program that is compared: ``run`` takes one turn and returns s per sample."""
 
     name: str
     run: Callable[[], float]
@@ -75,7 +75,7 @@ class Contestant(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """What a contestant took in each round."""
+    """Seconds of a contestant in each round."""
 
     seconds: list[float]
     cores: list[float]
@@ -243,7 +243,7 @@ def check(name: str, found: Array, wanted: Array) -> None:
 
 
 def repeated(call: str, **names: Any) -> Callable[[], float]:
-    """Return a turn of so many calls that it takes about SINGLE_CALLS_SECONDS."""
+    """Return a turn whose number of calls takes about SINGLE_CALLS_SECONDS."""
     timer = timeit.Timer(call, globals=names)
     timer.timeit(10)
     many = max(10, int(SINGLE_CALLS_SECONDS / (timer.timeit(100) / 100)))
@@ -269,7 +269,7 @@ PLAIN_C = 'plain C, one core'
 
 
 def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
-    """Return what is measured in single calls and in batches, after checking that all agree."""
+    """Return the contestants of single calls and of batches, after checking that all agree."""
     parameters = example_hexapod()
     hexapod = StewartPlatform(parameters)
     numbers = hexapod.constants

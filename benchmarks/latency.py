@@ -214,16 +214,16 @@ def view(name: str) -> None:
 
 def plan(path: Path, name: str, points: int) -> None:
     """
-    Send a planned trajectory each second, so many for each number on stdin; note their times.
+    Send planned trajectories, one a second: as many as each number on stdin; note their times.
 
     Parameters
     ----------
     path : Path
         Gets when each begins to be published, when it is, and when its answer is here [ns].
     name : str
-        Of the node.
+        Name of the node.
     points : int
-        Of each motion, over ten seconds.
+        Number of points of each motion, over ten seconds.
 
     """
     node = rclpy.create_node('planner')
@@ -256,7 +256,7 @@ def plan(path: Path, name: str, points: int) -> None:
 
 
 def trajectory(points: int) -> bytes:
-    """Return a MultiDOFJointTrajectory of so many points of the motion, over ten seconds."""
+    """Return a MultiDOFJointTrajectory of the motion over ten seconds, with a number of points."""
     seconds = np.linspace(0.0, 10.0, points)
     motion = motion_at(ReferenceMotionParameters(MOTION), seconds)
     rows = np.column_stack([motion.position, to_quaternion(motion.rotation),

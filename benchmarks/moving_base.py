@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What a moving base costs, and what the straight line through two of its samples gains.
+Cost of a moving base, and gain of the straight line through two of its samples.
 
-Run by hand, ``make bench``; README.md beside this file says what is compared and how.
+Run by hand, ``make bench``; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ CALL, BATCH = '`inverse_dynamics(motion)`', '`inverse_dynamics.solve`, a sample,
 WAY_BACK = '`forward_dynamics(motion, forces)`'
 MOVING = ' on a moving base'
 
-# Of a base that sways, heaves and rolls: frequency [Hz], amplitudes [m, rad].
+# A base that sways, heaves and rolls: frequency [Hz], amplitudes [m, rad].
 MOTIONS = {'ship': (0.12, 1.5, 0.25), 'vehicle': (1.5, 0.05, 0.05)}
 RATES = (50, 200, 1000)
 SECONDS = 20.0

@@ -15,8 +15,7 @@
 """
 The node at 1 kHz beside nodes that compute nothing, in turns in one run.
 
-Run by hand, ``make bench-node``, on Linux; README.md beside this file says what is compared
-and how.
+Run by hand, ``make bench-node``, on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -68,7 +67,7 @@ ROUNDS = 6
 SECONDS = 5
 MINUTES = 10
 RATE = 1_000_000_000 // PERIOD
-SETTLE = 0.5  # [s] between turns: what is under way arrives
+SETTLE = 0.5  # [s] between turns: messages under way arrive
 TICKS = os.sysconf('SC_CLK_TCK')
 EACH = [50.0, 99.0, 99.9, 100.0]
 HEADER: tuple[str, ...] = (
@@ -109,7 +108,7 @@ PROFILE = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT', 'SKIP_DEFAULT_XML_
 
 
 class Transport(NamedTuple):
-    """How processes talk: the environments that tell Fast DDS."""
+    """Transport between processes: environments that select it in Fast DDS."""
 
     source: Mapping[str, str]
     node: Mapping[str, str]
@@ -140,7 +139,7 @@ def tls(folder: Path) -> Transport:
 
 
 class Turn(NamedTuple):
-    """What one turn of a contestant gave."""
+    """Measurements of one turn of a contestant."""
 
     latencies: Array
     """From the last message of a setpoint to its leg states, of those that came [us]."""
@@ -176,7 +175,7 @@ class Process:
         self.process.stdin.flush()
 
     def stop(self) -> str:
-        """End it by a signal and return what it said last."""
+        """End the process by a signal and return its last line."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         return self.process.communicate(timeout=60)[0]
@@ -189,7 +188,7 @@ class Process:
 
     @property
     def memory(self) -> float:
-        """Return what it has in memory [kB]."""
+        """Return the resident memory of the process [kB]."""
         lines = Path(f'/proc/{self.process.pid}/status').read_text().splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith('VmRSS'))
 
@@ -201,7 +200,7 @@ def role(*arguments: str) -> list[str]:
 
 class Measurement:
     """
-    Contestants, a source and a listener, and what comes of each turn.
+    Contestants, a source, a listener, and the measurements of each turn.
 
     Parameters
     ----------
@@ -340,8 +339,8 @@ def long_rows(turn: Turn, memory: list[float], minutes: int) -> list[tuple[str, 
 
 
 def stall_rows(folder: Path) -> list[tuple[str, ...]]:
-    """Return the table of what could make a setpoint wait."""
-    rows = [('what could make a setpoint wait (ms)', 'before', 'as it is')]
+    """Return the table of events that could make a setpoint wait."""
+    rows = [('events that could make a setpoint wait (ms)', 'before', 'as it is')]
     measured = subprocess.run(
         [sys.executable, str(HERE / 'stalls.py'), str(PARAMETERS)], check=True, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={

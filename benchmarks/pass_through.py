@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What the node is measured beside: a node that takes and publishes the same and computes nothing.
+The node to compare with: it takes and publishes the same messages and computes nothing.
 
-``typed`` is what is written without further thought, and well: rclpy's own messages, made once
-and used again. ``serialized`` is the least that can be done from Python: bytes in, bytes out.
+``typed`` is the usual way: rclpy's own messages, made once and used again. ``serialized`` is the
+least possible from Python: bytes in, bytes out.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class PassThrough(Node):
     Parameters
     ----------
     name : str
-        Of the node.
+        Name of the node.
     source : str
         ``separate`` or ``combined``.
     serialized : bool

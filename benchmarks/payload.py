@@ -15,7 +15,7 @@
 """
 The payload of the node: what setpoints pay for it, and how often its intervals hold.
 
-Run by hand on Linux; README.md beside this file says what is compared and how.
+Run by hand on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def latency(rounds: int, seconds: int, folder: Path) -> list[str]:
     for n, row in enumerate(latency_rows('', nodes, turns, beside=1)):
         cells.append((labels[n], *row[1:-2]))
     history = measured(NOISES['1 mm/s, 5 N'])(1)
-    # What a piece takes at all, and not what else the computer did then.
+    # The minimum is the time of a piece itself, without other work of the computer.
     least = np.min([outcome_of(history)[1] for _ in range(9)], axis=0)
     return ['', *markdown(cells), '', (
         f'The work on {WINDOW:.0f} s at 1 kHz takes {least.sum():.0f} ms of the processor, in '

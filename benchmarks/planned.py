@@ -13,10 +13,9 @@
 # limitations under the License.
 
 """
-Planned trajectories: how long the node takes to check one, and what its setpoints pay for it.
+Planned trajectories: time of the node to check one, and latency of setpoints meanwhile.
 
-Run by hand, ``make bench-planned``, on Linux; README.md beside this file says what is compared
-and how.
+Run by hand, ``make bench-planned``, on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -117,7 +116,7 @@ def pieces() -> tuple[float, int]:
             outcome = next(work)
             took.append((time.thread_time_ns() - begin) * 1e-6)
         of_runs.append(took)
-    # What a piece takes at all, and not what else the computer did then.
+    # The minimum is the time of a piece itself, without other work of the computer.
     least = np.min(of_runs[1:], axis=0)
     return float(least.max()), len(least)
 

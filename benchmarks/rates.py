@@ -15,7 +15,7 @@
 """
 Where the node ends: setpoints at 1 to 8 kHz, and for three nodes on one computer.
 
-Run by hand, ``make bench-node``, on Linux; README.md beside this file says what is measured.
+Run by hand, ``make bench-node``, on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations

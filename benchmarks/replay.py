@@ -15,8 +15,7 @@
 """
 The whole replay of a large bag beside what rosbags alone needs to read it, in turns in one run.
 
-Run by hand, ``make bench-replay``, on Linux; README.md beside this file says what is compared
-and how.
+Run by hand, ``make bench-replay``, on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -75,8 +74,8 @@ MOTION = {
     'motion.frequency': (0.231, 0.317, 0.173, 0.409, 0.271, 0.137),
     'motion.phase': (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)}
 
-# Each contestant is a program of its own, told a bag, and a folder for its results. What it
-# prints: how many messages or setpoints there were, and the most memory that it had.
+# Each contestant is a program of its own; its arguments are a bag and a folder for results. It
+# prints the number of messages or setpoints, and its peak memory.
 ROSBAGS = """
 from pathlib import Path
 import sys
@@ -144,7 +143,7 @@ CONTESTANTS = (ALONE, READ, WITHOUT_REPORT, PARQUET, WITH_REPORT)
 
 
 class Turn(NamedTuple):
-    """What one run of a contestant took."""
+    """Time and memory of one run of a contestant."""
 
     seconds: float
     """The whole program."""
@@ -407,7 +406,7 @@ def main() -> None:
         make_bag(single, 1)
         make_bag(bag, options.setpoints)
         size = bag.stat().st_size / MEGA
-        for one in CONTESTANTS:  # what is kept on disk for the next start
+        for one in CONTESTANTS:  # fills the caches on disk
             take_turn(one, single, 1)
         rounds = measure(bag, options.setpoints, single, options.rounds)
         longest = {name: max((each.whole for each in turns), key=lambda turn: turn.peak)

@@ -15,8 +15,7 @@
 """
 The simulator: the time of a period, its share of a processor, its balance of energy.
 
-Run by hand, ``make bench-loop``, on Linux; README.md beside this file says what is measured
-and how.
+Run by hand, ``make bench-loop``, on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -72,7 +71,7 @@ SECONDS = 10
 MINUTE = 60
 RATE = 1000.0
 STEPS = (1e-3, 5e-4, 2.5e-4, 1.25e-4)
-# What lets the hexapod move for good, without loss and without an end stop.
+# The hexapod moves forever: no loss, no end stop.
 IDEAL = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0, **dict.fromkeys(
     ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max'))}
 
@@ -97,7 +96,7 @@ def timed(call: Callable[[], Any]) -> float:
 
 
 def period_rows(rounds: int) -> list[tuple[str, ...]]:
-    """Return the table of what a period takes."""
+    """Return the table of the time of a period."""
     rows = [('a period of 1 ms', 'us', 'min .. max', 'simulated s in 1 s')]
     stiff = {'actuator.reflected_mass': 0.0}  # its friction has less mass to work on
     for changes in ({}, stiff):
@@ -212,7 +211,7 @@ def energy_of(plant: Plant) -> float:
 
 
 def balance_of_a_minute(step: float) -> float:
-    """Return the part by which work is not the change of energy, of what is exchanged."""
+    """Return work minus change of energy, relative to the energy exchanged."""
     plant = Plant(SimulatorParameters({**GIVEN, **IDEAL, 'rate': RATE, 'step': step}))
     p = plant.parameters
     times = np.arange(MINUTE * round(RATE)) / RATE

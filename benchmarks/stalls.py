@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What could make a setpoint wait in the node now and then, and what is done about it.
+Events that could make a setpoint wait in the node, with and without the measure against each.
 
-Each is measured in a process of its own, in the way that it was or could be, and as it is.
+Each is measured in a process of its own.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def milliseconds(call: Callable[[], object], repeated: int = REPEATED) -> float:
 
 
 def main() -> None:
-    """Print what it is, how long without and how long with what is done about it [ms]."""
+    """Print each event and its duration without and with the measure against it [ms]."""
     sys.argv[1:] = ['--ros-args', '--params-file', sys.argv[1]]
     rclpy.init()
-    node = DynamicsNode()  # freezes what is there
+    node = DynamicsNode()  # freezes the objects that exist
     frozen = milliseconds(gc.collect)
     gc.unfreeze()
     rows = [('a full garbage collection', milliseconds(gc.collect), frozen)]

@@ -15,7 +15,7 @@
 """
 How long programs take to start: for the first time on a computer, and each time after that.
 
-Run by hand, ``make bench``, on Linux; README.md beside this file says what is compared and how.
+Run by hand, ``make bench``, on Linux; see README.md beside this file.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from stewart_dynamics import Motion, StewartPlatform
 platform = StewartPlatform.from_yaml({PARAMETERS!r})
 platform.inverse_dynamics(Motion(np.array([0.0, 0.0, 1.1]), np.eye(3)))
 """]
-# What a node like ours cannot do without: rclpy, the types, and its publishers and subscriptions.
+# The least that a node like ours needs: rclpy, the types, its publishers and subscriptions.
 BARE_NODE = [sys.executable, '-c', """
 import numpy
 import rclpy
@@ -71,7 +71,7 @@ rclpy.spin(node)
 
 
 class Start(NamedTuple):
-    """What a start took."""
+    """Time of a start."""
 
     seconds: float
     """Until it was ready, or had ended."""
@@ -95,7 +95,7 @@ def until_ready(command: Sequence[str], environment: Mapping[str, str]) -> Start
 
 
 def until_ended(command: Sequence[str], environment: Mapping[str, str]) -> Start:
-    """Start a program and return what it took."""
+    """Start a program and return its time."""
     begun = time.perf_counter()
     program = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL,
                                stderr=subprocess.DEVNULL)

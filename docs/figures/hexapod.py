@@ -15,7 +15,7 @@
 """
 Draw docs/figures/mujoco.png: the MJCF of config/platform.yaml in MuJoCo, at two poses.
 
-``make docs`` runs it. MuJoCo needs OpenGL without a screen: EGL, or what MUJOCO_GL names.
+``make docs`` runs it. MuJoCo draws without a screen by EGL, or by MUJOCO_GL.
 """
 
 from __future__ import annotations

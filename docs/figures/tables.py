@@ -103,7 +103,7 @@ def ship(figures: Mapping[str, Any]) -> str:
              'platform in the world, urad | ratio to `fixed` |', '| --- | --- | --- | --- | --- |']
     runs = {run['base.source']: run for run in figures['runs']}
     for source, run in runs.items():
-        line = f'| `{source}` |' if source else '| none: PD only |'
+        line = f'| `{source}` |' if source else '| PD only |'
         for name in ('all legs', 'position', 'rotation'):
             line += f' {_digits(run["rms"][name])} ({_digits(run["peak"][name])}) |'
         ratio = runs['fixed']['rms']['position'] / run['rms']['position']
