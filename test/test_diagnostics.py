@@ -58,7 +58,7 @@ def answered(diagnostics: DynamicsDiagnostics, now: float, output: Output = CLEA
              topics: tuple[str, ...] = TOPICS, took: float = 1e-4) -> bool:
     """Let messages of some topics come, and a setpoint be answered."""
     for topic in topics:
-        diagnostics.setpoints.heard(topic, now)
+        diagnostics.setpoints.heard[topic] = now
     return diagnostics.answered(output, now - took, now)
 
 
@@ -104,7 +104,7 @@ def test_a_silent_topic_is_named_and_since_when(silent: str) -> None:
     for now in (BEGIN + 0.05, BEGIN + 1.5, BEGIN + 2.48):
         for topic in TOPICS:
             if topic != silent:
-                diagnostics.setpoints.heard(topic, now)
+                diagnostics.setpoints.heard[topic] = now
     of = status(diagnostics, 'setpoints', BEGIN + 2.5)
     assert of.level == STALE
     assert f'{silent} silent for 2.5 s' in of.message
@@ -116,7 +116,7 @@ def test_a_silent_topic_is_named_and_since_when(silent: str) -> None:
 def test_a_topic_that_never_came_is_named() -> None:
     diagnostics = begun()
     for topic in (POSE, TWIST):
-        diagnostics.setpoints.heard(topic, BEGIN + 1.0)
+        diagnostics.setpoints.heard[topic] = BEGIN + 1.0
     of = status(diagnostics, 'setpoints', BEGIN + 1.02)
     assert of.level == STALE
     assert f'{ACCEL} never came' in of.message
@@ -127,7 +127,7 @@ def test_a_topic_that_never_came_is_named() -> None:
 def test_topics_that_all_arrive_but_are_not_joined_are_stale() -> None:
     diagnostics = begun()
     for topic in TOPICS:
-        diagnostics.setpoints.heard(topic, BEGIN + 1.0)
+        diagnostics.setpoints.heard[topic] = BEGIN + 1.0
     of = status(diagnostics, 'setpoints', BEGIN + 1.02)
     assert (of.level, of.message) == (
         STALE, 'no setpoint: all topics arrive, but none is joined: '
@@ -182,7 +182,7 @@ def come(diagnostics: DynamicsDiagnostics, seconds: float, topics: tuple[str, ..
     for n in range(round(100 * seconds)):
         now = begin + 0.01 * n
         for topic in topics:
-            diagnostics.setpoints.heard(topic, now)
+            diagnostics.setpoints.heard[topic] = now
         if diagnostics.due_at_tick(now):
             lines += logged(diagnostics, now)
     assert all(level == WARN for level, _ in lines)
@@ -214,7 +214,7 @@ def test_nothing_is_logged_without_setpoints_or_when_all_are_answered() -> None:
     for n in range(100):  # a setpoint in a second, and reports in the middle of it
         now = BEGIN + 20.0 + n
         for topic in TOPICS[:2]:
-            diagnostics.setpoints.heard(topic, now)
+            diagnostics.setpoints.heard[topic] = now
         assert logged(diagnostics, now) == []
         answered(diagnostics, now + 0.001)
         assert logged(diagnostics, now + 0.5) == []
@@ -224,7 +224,7 @@ def test_rejections_are_not_logged_twice() -> None:
     diagnostics = begun()
     for n in range(100):
         now = BEGIN + 0.1 * n
-        diagnostics.setpoints.heard(POSE, now)
+        diagnostics.setpoints.heard[POSE] = now
         diagnostics.rejected(Rejection(POSE, NOT_FINITE), 'nan', now)
         assert logged(diagnostics, now) == []
 
@@ -292,7 +292,7 @@ def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
 def test_where_all_is_rejected_stamps_are_not_the_reason() -> None:
     diagnostics = begun()
     for topic in TOPICS:
-        diagnostics.setpoints.heard(topic, BEGIN)
+        diagnostics.setpoints.heard[topic] = BEGIN
     diagnostics.rejected(Rejection(POSE, NOT_FINITE), 'nan', BEGIN)
     of = status(diagnostics, 'setpoints', BEGIN + 0.01)
     assert (of.level, of.message) == (STALE, f'no setpoint: {POSE}: {NOT_FINITE} (nan)')

@@ -48,28 +48,31 @@ from stewart_dynamics.node.model_publisher import ModelPublisher
 from stewart_dynamics.node.payload_service import inertia_message, PayloadService
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.node.repeated_log import RepeatedLog
-from stewart_dynamics.node.setpoint_queue import SetpointQueue
-from stewart_dynamics.node.topics import LEG_TRAJECTORY, MARKERS, PAYLOAD, QUEUE, Topics
+from stewart_dynamics.node.topics import LEG_TRAJECTORY, MARKERS, PAYLOAD, Topics
 from stewart_dynamics.parameters.files import is_of_ros
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.rclpy_workarounds import (
-    answer_impossible_transitions, OneShotTimer, set_parameters_together, take_waiting_messages)
+    answer_impossible_transitions, OneShotTimer, set_parameters_together)
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints import base_wrench
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.outputs import OutputMessages
-from stewart_dynamics.setpoints.rejections import NOT_EXCLUSIVE, Rejection
+from stewart_dynamics.setpoints.rejections import (
+    DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from stewart_dynamics.setpoints.topics import WRENCH
 
 
-# A message that comes so long after the last one was handled [s] has not waited: the executor
-# takes less from one to the next. Else a task looks for messages behind those that wait, which
-# costs a tenth of the processor time.
+# When more setpoints wait, the node has fallen behind: only the newest is answered.
+BACKLOG = 100
+
+# A message that arrives later than this after the last one was handled [s] has not waited: the
+# executor takes less time from one to the next. A task that gathers waiting messages, which costs
+# a tenth of the processor time, is not needed then.
 _REST = 0.0003
 
 
@@ -149,9 +152,12 @@ class DynamicsNode(LifecycleNode):
             self._history)
         self._diagnostics = DynamicsDiagnostics(
             parameters, self._setpoints.topics, self._setpoints.base.topics, time.monotonic())
-        self._queue = SetpointQueue(
-            models.step, self._publish, self._setpoints.on_base, self._reject_joined,
-            self._take_waiting, self._on_answered)
+        self._heard = self._diagnostics.setpoints.heard
+        self._waiting: list[tuple[Setpoint, float]] = []  # joined setpoints, and when they came
+        self._gathering = False  # a task answers them, behind the messages that have come
+        self._last: Output | None = None
+        self._target: tuple[float, ...] | None = None  # motion of the last answered setpoint
+        self._restarting = False  # the last setpoint was a restart that could not be answered
         publishers = self._topics.publishers
         self._markers = MarkersPublisher(parameters, publishers.get(MARKERS))
         self._model = ModelPublisher(
@@ -213,49 +219,76 @@ class DynamicsNode(LifecycleNode):
         self._topics.destroy()
         self._payload.destroy()
 
-    # -- setpoints --------------------------------------------------------------------------
+    # -- setpoints: from the topic to the published answer ----------------------------------
 
     def _on_setpoint(self, topic: str, data: bytes) -> None:
         if not self._active:
             return
-        now = time.monotonic()
-        self._rested = self._rested or now - self._handled > _REST
-        self._diagnostics.setpoints.heard(topic, now)
-        if self._exclusive and self._has_writers(topic):
-            return
-        setpoint = self._setpoints.take(topic, data, self._ros_time)
-        if setpoint is not None:
-            self._queue.add(setpoint, now)
+        came = time.monotonic()
+        self._heard[topic] = came
+        self._rested = self._rested or came - self._handled > _REST
+        if not self._exclusive or self._is_only_writer(topic):
+            setpoint = self._setpoints.take(topic, data, self._ros_time)
+            if setpoint is not None:
+                self._waiting.append((setpoint, came))
+                if not self._gathering:
+                    self._answer_waiting()
         self._handled = time.monotonic()
 
-    def _has_writers(self, topic: str) -> bool:
-        """Return whether a topic has more than one writer, and reject a message on it."""
-        writers = self._topics.writers_of(topic)
-        self._diagnostics.setpoints.found_writers(topic, writers)
-        if writers > 1:
-            self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
-        return writers > 1
+    def _answer_waiting(self) -> None:
+        """
+        Answer the setpoints that wait, in their order; of a backlog the newest.
 
-    def _ros_time(self) -> int:
-        now: int = self.get_clock().now().nanoseconds
-        return now
+        Where they have waited, the next ones are gathered first: a node that has fallen behind
+        must not answer one after the other, however late.
+        """
+        self._gathering = False
+        if not self._active or not self._waiting:
+            return
+        waiting, self._waiting = self._waiting, []
+        for setpoint, came in waiting if len(waiting) <= BACKLOG else [self._newest(waiting)]:
+            self._answer(setpoint, came)
+        now = time.monotonic()
+        self._markers.publish_due(now)
+        self._model.publish_due(now)
+        rested, self._rested = self._rested, False
+        if not rested:
+            self._gathering = True
+            executor: Any = self.executor
+            executor.create_task(self._answer_waiting)
 
-    def _take_waiting(self) -> None:
-        executor, topics = self.executor, self._topics
-        # Where no setpoint has waited, the executor has taken the base's messages before it.
-        if take_waiting_messages(executor, topics.setpoints, self._on_setpoint, QUEUE):
-            take_waiting_messages(executor, topics.base, self._on_base, QUEUE)
+    def _newest(self, waiting: list[tuple[Setpoint, float]]) -> tuple[Setpoint, float]:
+        """Drop and count all setpoints but the newest, which is a restart if one of them is."""
+        *dropped, (newest, came) = waiting
+        for setpoint, _ in dropped:
+            self._setpoints.reject('setpoint', DROPPED, f'stamp {setpoint.stamp} ns')
+        restart = any(setpoint.restart for setpoint, _ in waiting)
+        return newest._replace(restart=restart), came
 
-    def _answer(self) -> None:
-        if self._active:
-            self._queue.answer()
-
-    def _publish(self, setpoint: Setpoint, output: Output, came: float) -> None:
+    def _answer(self, setpoint: Setpoint, came: float) -> None:
+        """Compute the answer to a setpoint, publish it, and note it."""
+        setpoint = self._setpoints.on_base(setpoint)
+        if self._restarting:
+            setpoint = setpoint._replace(restart=True)
+        output = self._models.step(setpoint, None if self._last is None
+                                   else self._last.singularity)
+        self._restarting = output is None and setpoint.restart
+        if output is None:
+            self._setpoints.reject('setpoint', OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
+            return
         publishers = self._topics.publishers
         for topic, message in self._messages.of_output(output):
             publishers[topic].publish(message)
+        self._last, self._target = output, setpoint.motion
+        self._note(setpoint, output, came)
+
+    def _note(self, setpoint: Setpoint, output: Output, came: float) -> None:
+        """Pass an answer on to what shows it: base wrench, markers, model, diagnostics."""
         if self._base_wrench_read:
-            self._publish_base_wrench(setpoint)
+            wrench = self._models.base_wrench(setpoint)
+            if wrench is not None:
+                self._topics.publishers[BASE_WRENCH].publish(
+                    self._messages.of_wrench(setpoint.stamp, wrench))
         self._markers.answered(setpoint, output)
         if not self._model_measured:
             self._model.moved(setpoint.stamp, setpoint.motion)
@@ -265,22 +298,17 @@ class DynamicsNode(LifecycleNode):
         if self._diagnostics.answered(output, came, now):
             self._report()
 
-    def _publish_base_wrench(self, setpoint: Setpoint) -> None:
-        wrench = self._models.base_wrench(setpoint)
-        if wrench is not None:
-            self._topics.publishers[BASE_WRENCH].publish(
-                self._messages.of_wrench(setpoint.stamp, wrench))
+    def _is_only_writer(self, topic: str) -> bool:
+        """Return whether a topic has one writer; else reject a message on it."""
+        writers = self._topics.writers_of(topic)
+        self._diagnostics.setpoints.found_writers(topic, writers)
+        if writers > 1:
+            self._setpoints.reject(topic, NOT_EXCLUSIVE, f'{writers} writers')
+        return writers <= 1
 
-    def _on_answered(self) -> bool:
-        now = time.monotonic()
-        self._markers.publish_due(now)
-        self._model.publish_due(now)
-        rested, self._rested = self._rested, False
-        if rested:  # nothing has waited for this answer
-            return False
-        executor: Any = self.executor
-        executor.create_task(self._answer)
-        return True
+    def _ros_time(self) -> int:
+        now: int = self.get_clock().now().nanoseconds
+        return now
 
     # -- base, wrench, measured legs, planned trajectories ----------------------------------
 
@@ -288,7 +316,7 @@ class DynamicsNode(LifecycleNode):
         if self._active:
             now = time.monotonic()
             self._diagnostics.base.heard(topic, now)
-            if self._exclusive and self._has_writers(topic):
+            if self._exclusive and not self._is_only_writer(topic):
                 return
             if self._setpoints.base.take(topic, data, self._ros_time):
                 self._diagnostics.base.sampled(self._setpoints.base, now)
@@ -305,7 +333,7 @@ class DynamicsNode(LifecycleNode):
             self._on_rejection(Rejection(MEASURED_LEGS, NOT_COMPILED), 'this takes seconds, once')
             return
         now = time.monotonic()
-        diagnostics, target = self._diagnostics.external_wrench, self._queue.target
+        diagnostics, target = self._diagnostics.external_wrench, self._target
         diagnostics.heard(now)
         estimate = self._measured_legs.take(
             data, self._setpoints.wrench, target, self._setpoints.base)
@@ -369,9 +397,6 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics.rejected(rejection, details, time.monotonic())
         self._log.write([LogLine(WARN, rejection.words(details), rejection)])
 
-    def _reject_joined(self, reason: str, details: str) -> None:
-        self._setpoints.reject('setpoint', reason, details)
-
     def _on_notice(self, text: str) -> None:
         # Two writers whose clocks differ restart with every setpoint.
         self._log.write([LogLine(WARN, text, text[:20])])
@@ -413,7 +438,6 @@ class DynamicsNode(LifecycleNode):
         self._log.write(parameter_changes.log_lines(self._settings, parameters))
         self._settings, self._models = parameters, models
         if self._active:
-            self._queue.step = models.step
             self._measured_legs.step = models.external_wrench
             self._diagnostics.singularity.parameters = parameters
             self._markers.use(parameters)

@@ -23,7 +23,7 @@ it passes without the workaround, the workaround can be removed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 import gc
 import os
@@ -35,7 +35,7 @@ import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -43,7 +43,7 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 from rclpy.time_source import TimeSource
 
-from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.yaml_file import read_value
 
 _PIECE, _LOOK = 10.0, 0.1  # [s]
@@ -235,47 +235,6 @@ def describe_by(
             service.callback = answer
 
 
-def take_waiting_messages(
-        executor: Executor | None, subscriptions: Mapping[str, Any],
-        take: Callable[[str, bytes], None], most: int) -> bool:
-    """
-    Take the messages that wait in the middleware, from each raw subscription in turn.
-
-    Return whether there were any.
-
-    The single-threaded executor runs a task before the messages that have come meanwhile
-    (rclpy/executors.py, ``_wait_for_ready_callbacks``): a node that has fallen behind would answer
-    one after the other, however late. The events executor takes them first; nothing is done then.
-    It can be removed when that executor is the only one
-    (https://github.com/ros2/rclpy/pull/1391, in Jazzy since 7.1.4).
-
-    Parameters
-    ----------
-    executor : Executor or None
-        What spins the node.
-    subscriptions : mapping of topic to Subscription
-        Raw ones.
-    take : callable
-        Called with topic and message.
-    most : int
-        So many messages at most are taken of each topic.
-
-    """
-    if not isinstance(executor, SingleThreadedExecutor):
-        return False
-    for n in range(most):
-        came = False
-        for topic, subscription in subscriptions.items():
-            with subscription.handle:
-                taken = subscription.handle.take_message(subscription.msg_type, True)
-            if taken is not None:
-                came = True
-                take(topic, taken[0])
-        if not came:
-            return n > 0
-    return True
-
-
 class OneShotTimer:
     """
     Calls back once after each start, no matter how late the executor is.
@@ -350,19 +309,18 @@ def reject_impossible_times() -> None:
 
 def make_executor() -> Executor:
     """
-    Return the events executor, or the single-threaded one where rclpy has no other.
+    Return the events executor.
 
     The single-threaded executor takes 2.5 times the processor time, most of it for building its
-    wait set anew for every message (https://github.com/ros2/rclpy/issues/1389). The events
-    executor is in Jazzy since rclpy 7.1.4.
+    wait set anew for every message (https://github.com/ros2/rclpy/issues/1389), and answers a
+    backlog one message after the other. Raises StewartError where rclpy has no events executor.
     """
     try:
         from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
-        get_logger('stewart_dynamics').warning(
-            'this rclpy has no events executor: the single-threaded one takes 2.5 times the '
-            'processor time')
-        return SingleThreadedExecutor()
+    except ImportError as exc:
+        raise StewartError(
+            'this rclpy has no events executor: rclpy 7.1.4 or later is needed (ROS 2 Jazzy of '
+            '2025 or later)') from exc
     return EventsExecutor()
 
 

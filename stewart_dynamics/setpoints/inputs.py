@@ -22,12 +22,13 @@ matrix. Node and replay check alike, and get the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, is_unit, quaternion_length
-from stewart_dynamics.messages.cdr import finite, MalformedError, Stamped
+from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
 from stewart_dynamics.setpoints.rejections import (
@@ -97,7 +98,7 @@ class SampleReader:
                     self._rejections.reject(self._topic, NOT_MEASURED, f'{name}[0] is -1')
                     return None
             values = tuple([values[at] for at in _OF_IMU])
-        if not finite(values):
+        if not all(map(math.isfinite, values)):
             self._rejections.reject(self._topic, NOT_FINITE, str(values))
             return None
         if self._bounded and max(map(abs, values)) > LARGEST:

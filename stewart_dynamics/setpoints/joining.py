@@ -114,8 +114,9 @@ class Setpoints:
 
     def on_base(self, setpoint: Setpoint) -> Setpoint:
         """Return the setpoint with the base's motion at its stamp."""
-        row = self.base.at(setpoint.stamp)
-        return setpoint if row is None else setpoint._replace(base=row)
+        if not self.base.topics:
+            return setpoint
+        return setpoint._replace(base=self.base.at(setpoint.stamp))
 
     def take_many(self, messages: Messages) -> Batch:
         """Return the setpoints that these messages complete."""

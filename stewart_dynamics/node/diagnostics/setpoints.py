@@ -88,7 +88,8 @@ class SetpointDiagnostics:
         self._timeout: float = parameters['setpoint.timeout']
         self._tolerance: float = parameters['setpoint.sync_tolerance']
         self._answers = answers
-        self._heard = dict.fromkeys(topics, _NEVER)
+        self.heard = dict.fromkeys(topics, _NEVER)
+        """When the last message came on each topic."""
         self._writers: dict[str, int] = {}
         self._readers: dict[str, int] = {}
         self._namesakes = '', 1
@@ -102,10 +103,6 @@ class SetpointDiagnostics:
         self._warned_at = _NEVER
         # When the last windows of a second began, and how many answers there were.
         self._windows = [(now, 0), (now, 0)]
-
-    def heard(self, topic: str, now: float) -> None:
-        """Note that a message came on a setpoint topic."""
-        self._heard[topic] = now
 
     def found(self, writers: Mapping[str, int], readers: Mapping[str, int], name: str,
               namesakes: int) -> None:
@@ -166,7 +163,7 @@ class SetpointDiagnostics:
         if answers.number:
             values.append(('age of the last (s)', f'{now - answers.at:.3f}'))
         values += [(f'{topic}: last heard (s ago)', 'never' if at == _NEVER
-                    else f'{now - at:.3f}') for topic, at in self._heard.items()]
+                    else f'{now - at:.3f}') for topic, at in self.heard.items()]
         values += [(f'{topic}: writers', str(n)) for topic, n in self._writers.items()]
         values += [(f'{topic}: readers', str(n)) for topic, n in self._readers.items()]
         values += [(f'rejected, {topic}: {reason}', str(n))
@@ -181,7 +178,7 @@ class SetpointDiagnostics:
         fault.
         """
         lines, self._lines = self._lines, []
-        last = max(self._heard.values())
+        last = max(self.heard.values())
         if last <= self._answers.at:
             self._incomplete_since = math.inf
             return lines
@@ -205,7 +202,7 @@ class SetpointDiagnostics:
         """Return why there is no setpoint: silence, rejections or stamps."""
         silent = ', '.join(
             f'{topic} never came' if at == _NEVER else f'{topic} silent for {now - at:.1f} s'
-            for topic, at in self._heard.items() if now - at > self._timeout)
+            for topic, at in self.heard.items() if now - at > self._timeout)
         return 'no setpoint: ' + (silent or self._rejected.at(now).message or (
             'all topics arrive, but none is joined: their stamps differ by more than '
             f'setpoint.sync_tolerance, {self._tolerance:g} s'))
