@@ -260,7 +260,7 @@ def test_no_corrupted_message_raises_anything_else(kind: str, data: st.DataObjec
 
 
 def test_huge_counts_cost_no_time() -> None:
-    begun = time.perf_counter()
+    begun = time.process_time()
     kind = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
     data = valid(kind)
     for at in range(4, len(data) - 4, 4):
@@ -272,7 +272,7 @@ def test_huge_counts_cost_no_time() -> None:
     names = struct.pack('<iIIII', 0, 0, 0, 250_000, 0)
     with pytest.raises(MalformedError):
         combined(b'\0\1\0\0' + names + bytes(1_000_000))
-    assert time.perf_counter() - begun < 5.0
+    assert time.process_time() - begun < 5.0
 
 
 def test_many_entries_are_rejected_before_they_are_read() -> None:

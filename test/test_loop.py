@@ -31,11 +31,16 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message
-from running import assert_only_log_lines, executable, own_domain, Peer, PLATFORM, Program, ROOT
+from running import (
+    assert_only_log_lines, nanoseconds, own_domain, Peer, PLATFORM, Program, ROOT)
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
+from stewart_dynamics.arrays import NO_WRENCH
+from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.simulator.plant import Plant
 
 SECONDS = 0.5
 MOTION = ROOT / 'config' / 'trajectory_loop.yaml'
@@ -96,8 +101,10 @@ def test_a_program_that_ends_early_ends_the_demo(domain: int, tmp_path: Path) ->
     peer = Peer(domain)
     peer.watched = program
     try:
-        states = peer.listen('/stewart_dynamics/leg_states', JointState)
-        peer.until(lambda: len(states) > 100, 'the loop runs')
+        # Not the states of stewart_dynamics: the demo counts their readers to find the controller.
+        states = peer.listen('/stewart_simulator/leg_states', JointState)
+        peer.until(lambda: states and nanoseconds(deserialize_message(
+            states[-1], JointState).header.stamp) > 1_100_000_000, 'the loop runs')
         simulator, = (pid for pid in _children(program.process.pid)
                       if b'stewart_simulator' in Path(f'/proc/{pid}/cmdline').read_bytes())
         os.kill(simulator, signal.SIGKILL)
@@ -138,58 +145,64 @@ def test_what_cannot_be_run_is_reported_in_one_line(
     assert said in line
 
 
-@pytest.mark.slow
 def test_in_real_time_the_legs_follow_and_are_held_when_setpoints_stop(
         domain: int, tmp_path: Path) -> None:
-    simulator = ROOT / 'config' / 'simulator.yaml'
+    """The plant waits for each command, so that the result is that of a fast computer."""
+    plant = Plant(SimulatorParameters({
+        **read_yaml(PLATFORM, 'stewart_simulator'),
+        **read_yaml(ROOT / 'config' / 'simulator.yaml', 'stewart_simulator')}))
+    joints, zero = plant.parameters['joints'], plant.parameters['geometry.zero_length']
+    start = np.array(plant.state.lengths) - zero
+    moving = JointState(name=joints, position=start + 5e-3, velocity=[0.01] * 6,
+                        effort=np.arange(6.0))
+    # The forces at rest carry the weight.
+    platform = StewartPlatform.from_yaml(PLATFORM)
+    pose = platform.forward_kinematics(start + 5e-3 + zero, platform.home_pose())
+    weight = platform.inverse_dynamics(Motion.from_pose(pose)).forces
+    held = JointState(name=joints, position=moving.position, velocity=[0.0] * 6, effort=weight)
+    program = Program([sys.executable, CONTROLLER, '--ros-args', '-p', 'timeout:=1.0', '-p',
+                       f'params_file:={PLATFORM}'], domain, tmp_path)
     peer = Peer(domain)
-    measured, desired, commands = (peer.listen(topic, kind) for topic, kind in (
-        ('/stewart_simulator/leg_states', JointState),
-        ('/stewart_dynamics/leg_states', JointState),
-        ('/stewart_simulator/commands', Float64MultiArray)))
-    programs = [Program([*command, '--ros-args', *arguments], domain, tmp_path / str(n))
-                for n, (command, arguments) in enumerate((
-                    ([executable('stewart_simulator')],
-                     ['--params-file', PLATFORM, '--params-file', simulator]),
-                    ([executable('stewart_dynamics')], ['--params-file', PLATFORM]),
-                    # A loaded computer may be late.
-                    ([sys.executable, CONTROLLER],
-                     ['-p', 'timeout:=1.0', '-p', f'params_file:={PLATFORM}']),
-                    ([executable('stewart_trajectory')],
-                     ['--params-file', MOTION, '-p', 'start_timeout:=1000.0'])))]
+    peer.watched = program
+    commands = peer.listen('/stewart_simulator/commands', Float64MultiArray)
+    measured, desired = (peer.writer(f'/{node}/leg_states', JointState)
+                         for node in ('stewart_simulator', 'stewart_dynamics'))
+
+    def commanded(target: JointState) -> Any:
+        """Return the command to the present state once it is the one for a desired state."""
+        state = plant.state
+        expected = (4e5 * (np.subtract(target.position, state.lengths) + zero)
+                    + 1.6e4 * np.subtract(target.velocity, state.rates) + target.effort)
+
+        def came() -> bool:
+            if target is moving:
+                desired.publish(moving)
+            measured.publish(JointState(name=joints, position=np.subtract(state.lengths, zero),
+                                        velocity=state.rates))
+            count = len(commands)
+            peer.spin()
+            return len(commands) > count and np.allclose(
+                deserialize_message(commands[-1], Float64MultiArray).data, expected,
+                rtol=1e-12, atol=1e-6)
+
+        peer.until(came, 'the command comes')
+        return tuple(expected.tolist())
+
     try:
-        peer.until(lambda: min(map(len, (measured, desired, commands))) > 300, 'the loop runs')
-        first, last = (np.array(deserialize_message(data, JointState).position)
-                       for data in (measured[0], measured[-1]))
-        wanted = [np.array(deserialize_message(data, JointState).position) for data in desired]
-        # It has gone a way, and is near where it was to be at some time.
-        assert np.abs(last - first).max() > 5e-3
-        assert min(np.abs(last - each).max() for each in wanted) < 5e-3
-        assert programs[-1].stop() == 0, programs[-1].stderr
-        peer.until(lambda: 'the last position is held' in programs[2].stderr, 'it holds')
-        held = np.array(deserialize_message(desired[-1], JointState).position)
-
-        def errors() -> Any:
-            state = deserialize_message(measured[-1], JointState)
-            return np.abs([state.position - held, state.velocity]).max(axis=1)
-
+        for _ in range(3):
+            plant.advance(commanded(moving), NO_WRENCH)
+        for _ in range(120):  # 0.24 s
+            command = commanded(held)
+            plant.advance(command, NO_WRENCH)
+        assert 'the last position is held' in program.stderr
         # Friction may stop it at a distance of friction / gain.
-        peer.until(lambda: (errors() < [5e-4, 1e-3]).all(), 'it comes to rest there')
-        many = len(commands)
-        peer.until(lambda: len(commands) > many + 500, 'commands go on')
-        assert (errors() < [5e-4, 1e-3]).all()
-        # The forces at rest, to what friction keeps of the position's error.
-        platform = StewartPlatform.from_yaml(PLATFORM)
-        pose = platform.forward_kinematics(held + 0.95, platform.home_pose())
-        forces = deserialize_message(commands[-1], Float64MultiArray).data
-        assert forces == pytest.approx(
-            platform.inverse_dynamics(Motion.from_pose(pose)).forces, abs=200.0)
-        for data in commands:
-            assert np.isfinite(deserialize_message(data, Float64MultiArray).data).all()
-        for program in reversed(programs[:-1]):
-            assert program.stop() == 0, program.stderr
-            assert_only_log_lines(program.stderr)
+        assert np.abs(plant.state.lengths - zero - moving.position).max() < 5e-4
+        assert np.abs(plant.state.rates).max() < 1e-3
+        assert command == pytest.approx(weight, abs=200.0)
+        commanded(moving)
+        assert 'desired states are back' in program.stderr
+        assert program.stop() == 0, program.stderr
+        assert_only_log_lines(program.stderr)
     finally:
-        for program in programs:
-            program.kill()
+        program.kill()
         peer.close()
