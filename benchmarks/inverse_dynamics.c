@@ -19,7 +19,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#define COULOMB_RATE 1e-3     // inverse_dynamics.COULOMB_RATE
 #define SMALLEST_PIVOT 1e-32  // matrix6.SMALLEST_PIVOT
 #define MOST_STEPS 64         // inverse_dynamics._MOST_STEPS
 
@@ -32,7 +31,7 @@ typedef struct { double x, y, z; } vector;
 typedef struct {
   vector base_joint, platform_joint;
   double piston_mass, piston_com, cylinder_moment, joint_inertia;
-  double reflected_mass, viscous, coulomb, cylinder_mass;
+  double reflected_mass, viscous, coulomb, coulomb_velocity, cylinder_mass;
 } leg;
 
 typedef struct {
@@ -56,7 +55,7 @@ typedef struct {
   double determinant, determinant_rate, condition;
 } result;
 
-_Static_assert(sizeof(machine) == (14 + 6 * 14) * sizeof(double), "MACHINE");
+_Static_assert(sizeof(machine) == (14 + 6 * 15) * sizeof(double), "MACHINE");
 _Static_assert(sizeof(motion) == 24 * sizeof(double), "MOTION");
 _Static_assert(sizeof(wrench) == 6 * sizeof(double), "WRENCH");
 _Static_assert(sizeof(result) == 27 * sizeof(double), "RESULT");
@@ -168,7 +167,7 @@ static inline leg_motion move_leg(
   force = add(force, scale(2.0 * coriolis_mass * rate * inverse_length, across));
   force = add(force, scale(along, s));
 
-  double slip = rate / COULOMB_RATE;
+  double slip = rate / l->coulomb_velocity;
   slip = slip < -1.0 ? -1.0 : slip > 1.0 ? 1.0 : slip;
   out.length = length;
   out.rate = rate;

@@ -39,7 +39,6 @@ import pinocchio as pin
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, lagrange
-from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import FORCES, NO_BASE, RESULT, WRENCH
 from stewart_dynamics.parameters.table import inertia_matrix
@@ -207,7 +206,7 @@ def _rod(mass: float, center_of_mass: float, inertia: float) -> Any:
 
 
 def _friction(parameters: Parameters, rates: Array) -> Array:
-    slip = np.clip(rates / COULOMB_RATE, -1.0, 1.0)
+    slip = np.clip(rates / parameters['actuator.coulomb_velocity'], -1.0, 1.0)
     force: Array = (parameters['actuator.viscous_friction'] * rates
                     + parameters['actuator.coulomb_friction'] * slip)
     return force

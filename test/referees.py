@@ -101,7 +101,8 @@ def random_parameters(random: np.random.Generator, actuators: bool = True) -> Pa
     if actuators:
         given |= {'actuator.reflected_mass': random.uniform(1.0, 50.0, 6),
                   'actuator.viscous_friction': random.uniform(10.0, 500.0, 6),
-                  'actuator.coulomb_friction': random.uniform(5.0, 100.0, 6)}
+                  'actuator.coulomb_friction': random.uniform(5.0, 100.0, 6),
+                  'actuator.coulomb_velocity': 10.0 ** random.uniform(-3.5, -1.5, 6)}
     return Parameters(given)
 
 
@@ -308,9 +309,10 @@ def assert_order(order: float, ends: Sequence[Array]) -> None:
 
 
 def friction(p: Parameters, rates: Array) -> Array:
-    """Return the friction of the actuators at their rates (..., 6) [N]: linear below 1 mm/s."""
+    """Return the friction of the actuators at their rates (..., 6) [N]."""
     f: Array = (p['actuator.viscous_friction'] * rates
-                + p['actuator.coulomb_friction'] * np.clip(rates / 1e-3, -1.0, 1.0))
+                + p['actuator.coulomb_friction'] * np.clip(
+                    rates / p['actuator.coulomb_velocity'], -1.0, 1.0))
     return f
 
 

@@ -51,6 +51,8 @@ def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
 
 @pytest.mark.parametrize(('changes', 'named'), [
     ({'actuator.coulomb_friction': 1e8}, 'actuator.coulomb_friction'),
+    ({'actuator.coulomb_velocity': 1e-12},
+     r'actuator.coulomb_friction: \[20.0, .* within actuator.coulomb_velocity \[1e-12, '),
     ({'actuator.viscous_friction': 1e12}, 'actuator.viscous_friction'),
     ({'actuator.viscous_friction': 1e308}, 'actuator.viscous_friction'),
     ({'end_stops.frequency': 1e6}, 'end_stops.frequency'),
@@ -58,5 +60,13 @@ def test_the_bound_of_stiffness_holds_in_every_pose(seed: int) -> None:
     ({'end_stops.damping_ratio': 1e7}, 'end_stops.damping_ratio')], ids=str)
 def test_what_would_need_too_short_steps_is_rejected_by_name(
         changes: dict[str, Any], named: str) -> None:
-    with pytest.raises(ParameterError, match=f'^{named}: .* too large for a platform of 150 kg'):
+    with pytest.raises(ParameterError, match=f'^{named}.* too large for a platform of 150 kg'):
         substeps(simulated(actuator__reflected_mass=0.0, **changes))
+
+
+def test_steps_are_in_proportion_to_the_velocity_of_coulomb_friction() -> None:
+    coarse, fine = (substeps(simulated(actuator__coulomb_velocity=velocity,
+                                       actuator__reflected_mass=0.0))
+                    for velocity in (1e-4, 1e-5))
+    assert coarse > 1
+    assert 9.5 < fine / coarse < 10.5

@@ -210,6 +210,24 @@ def test_at_rest_the_interval_has_what_coulomb_friction_can_hold() -> None:
     assert of_none.fitted.half_widths[0] < 0.01
 
 
+def test_legs_above_the_velocity_of_coulomb_friction_do_not_stick() -> None:
+    """Legs at 0.1 mm/s: what may hold a leg at rest adds to the interval of the mass, or not."""
+    def slow(seconds: Any) -> Motion:
+        motion = at_rest(seconds)
+        motion.rows[:, 2] += 1e-4 * np.asarray(seconds)
+        motion.rows[:, 14] = 1e-4
+        return motion
+
+    widths = []
+    for velocity in (1e-3, 1e-5):
+        changed = {'actuator.coulomb_velocity': velocity}
+        payload = payload_of(recorded(slow, noise=Noise(), true=LOADED.replaced(changed)),
+                             HEXAPOD.replaced(changed))
+        assert abs(errors(payload)[0]) < 1.0
+        widths.append(payload.fitted.half_widths[0])
+    assert widths[1] < 0.6 * widths[0]
+
+
 def test_a_wrong_friction_costs_width_and_no_error() -> None:
     true = LOADED.replaced({'actuator.coulomb_friction': 35.0,
                             'actuator.viscous_friction': 400.0})

@@ -40,7 +40,6 @@ from stewart_dynamics.external_wrench.body_fit import (
 from stewart_dynamics.external_wrench.history import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
-from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES
@@ -187,6 +186,7 @@ class _Windows:
         self._friction = np.column_stack([
             p['actuator.coulomb_friction'], p['actuator.viscous_friction'],
             _STATIC * p['actuator.coulomb_friction']])
+        self._coulomb_velocity = p['actuator.coulomb_velocity']
         self._noise, self._noises = np.zeros((6, 6)), 0
         self._middle: tuple[Array, Array] | None = None
         # Of the noise of an acceleration, by that of a twist: the window's slope.
@@ -266,7 +266,7 @@ class _Windows:
         self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
         friction = means[..., TEN:_COLUMNS]
         # Not a part of it: noise in the rates would vary the column, and seem to tell its size.
-        friction[..., 2] = np.abs(friction[..., 1]) < COULOMB_RATE
+        friction[..., 2] = np.abs(friction[..., 1]) < self._coulomb_velocity
         columns, model = self._by_acceleration(*self._middle)
         noise = self._noise_gain / (self._noises * _FOURTH_VARIANCE) * self._noise
         return Samples(means[..., :TEN], friction * self._friction, differences, noise, columns,

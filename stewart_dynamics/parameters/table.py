@@ -99,7 +99,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
           'kg', minimum=0.0),
     _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
     _legs('actuator.coulomb_friction',
-          'Coulomb friction along the leg; linear at rates below 1 mm/s', 'N', minimum=0.0),
+          'Coulomb friction along the leg', 'N', minimum=0.0),
+    _legs('actuator.coulomb_velocity', 'rate of the leg below which Coulomb friction is linear',
+          'm/s', (1e-3,), minimum=0.0, above=True),
     _legs('actuator.screw_lead', 'travel of a leg in one turn of its motor; used by '
           'stewart_identify alone, where efforts are torques', 'm', (), minimum=0.0, above=True),
     Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '

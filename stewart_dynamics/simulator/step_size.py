@@ -31,7 +31,6 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.dynamics.friction import coulomb_damping
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 from stewart_dynamics.simulator.end_stops import stiffness_and_damping
 
@@ -54,7 +53,7 @@ def substeps(parameters: Parameters) -> int:
     step = parameters['step']
     with np.errstate(all='ignore'):
         viscous = parameters['actuator.viscous_friction']
-        coulomb = coulomb_damping(parameters['actuator.coulomb_friction'])
+        coulomb = parameters['actuator.coulomb_friction'] / parameters['actuator.coulomb_velocity']
         stiffness, damping = stiffness_and_damping(parameters)
         fastest = max(largest_eigenvalue(parameters, viscous + coulomb + damping),
                       math.sqrt(largest_eigenvalue(parameters, stiffness)))
@@ -71,8 +70,12 @@ def substeps(parameters: Parameters) -> int:
                 largest_eigenvalue(parameters, damping)}
     name = max(of_each, key=lambda each: of_each[each])
     value = parameters[name]
+    text = str(value.tolist() if isinstance(value, np.ndarray) else value)
+    if name == 'actuator.coulomb_friction':
+        velocity = parameters['actuator.coulomb_velocity'].tolist()
+        text += f' N within actuator.coulomb_velocity {velocity} m/s'
     raise ParameterError(
-        f'{name}: {value.tolist() if isinstance(value, np.ndarray) else value}: too large for a '
+        f'{name}: {text}: too large for a '
         f'platform of {parameters["platform.mass"]:g} kg: the integration would need steps of '
         f'{_REACH / fastest:.2g} s, the shortest possible are {step / _MOST_SUBSTEPS:.2g} s')
 

@@ -113,7 +113,7 @@ def leg_dynamics(
 
     length_acc = along_acc + across_squared * inverse_length
     actuator = with_friction(own.reflected_mass * length_acc, rate, own.viscous_friction,
-                             own.coulomb_friction)
+                             own.coulomb_friction, own.coulomb_velocity)
 
     # (3): the row of J_inv and its rate
     s_rate = scale(inverse_length, across)

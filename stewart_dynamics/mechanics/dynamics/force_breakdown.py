@@ -104,8 +104,8 @@ class ForceBreakdownRows:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self._viscous = parameters['actuator.viscous_friction'].copy()
-        self._coulomb = parameters['actuator.coulomb_friction'].copy()
+        self._friction = tuple(parameters[f'actuator.{name}'].copy() for name in (
+            'viscous_friction', 'coulomb_friction', 'coulomb_velocity'))
         self._whole = hexapod_constants(parameters)
         self._weightless = hexapod_constants(
             parameters.replaced({**_NO_GRAVITY, **_NO_FRICTION}))
@@ -168,7 +168,7 @@ class ForceBreakdownRows:
         by.velocity[:] = results[:, FORCES]
         # By the friction law: as a difference it would lose its digits near a singularity.
         own = np.empty((len(rows), 6))
-        friction(results[:, RATES].copy(), self._viscous, self._coulomb, own)
+        friction(results[:, RATES].copy(), *self._friction, own)
         by.friction[:] = own
         by.base_motion[:] = 0.0 if bases is None else (
             batch.solve(self._weightless, rows, None, bases)[:, FORCES] - by.velocity)

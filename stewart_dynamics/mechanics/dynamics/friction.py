@@ -15,7 +15,7 @@
 """
 The friction of the actuators: viscous, and Coulomb friction that is linear near standstill.
 
-``f = viscous rate + coulomb sat(rate / COULOMB_RATE)``, sat limited to -1 .. 1: the force is
+``f = viscous rate + coulomb sat(rate / coulomb_velocity)``, sat limited to -1 .. 1: the force is
 a function of the rate alone, without a jump at standstill.
 """
 
@@ -24,25 +24,19 @@ from __future__ import annotations
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import entry_point, inlined
 
-# Coulomb friction grows linearly up to this rate [m/s] and is constant above it.
-COULOMB_RATE = 1e-3
-
 
 @inlined
-def with_friction(force: float, rate: float, viscous: float, coulomb: float) -> float:
+def with_friction(force: float, rate: float, viscous: float, coulomb: float,
+                  coulomb_velocity: float) -> float:
     """Return a force [N] plus the force that overcomes the friction at a rate [m/s]."""
-    slip = rate / COULOMB_RATE
+    slip = rate / coulomb_velocity
     return (force + viscous * rate
             + coulomb * (-1.0 if slip < -1.0 else 1.0 if slip > 1.0 else slip))
 
 
-def coulomb_damping(coulomb: Array) -> Array:
-    """Return the slope of Coulomb friction [N] at standstill, where it acts as damping [N s/m]."""
-    return coulomb / COULOMB_RATE
-
-
-@entry_point('f8[:,::1]', 'f8[::1]', 'f8[::1]', 'f8[:,::1]')
-def friction(rates: Array, viscous: Array, coulomb: Array, forces: Array) -> None:
+@entry_point('f8[:,::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[:,::1]')
+def friction(rates: Array, viscous: Array, coulomb: Array, coulomb_velocity: Array,
+             forces: Array) -> None:
     """
     Write the forces that overcome the friction.
 
@@ -50,12 +44,13 @@ def friction(rates: Array, viscous: Array, coulomb: Array, forces: Array) -> Non
     ----------
     rates : (N, 6)
         [m/s]
-    viscous, coulomb : (6,)
-        Coefficients [N s/m] and forces [N] of the legs.
+    viscous, coulomb, coulomb_velocity : (6,)
+        Coefficients [N s/m], forces [N] and rates below which the latter are linear [m/s].
     forces : (N, 6)
         Written [N].
 
     """
     for n in range(len(rates)):
         for leg in range(6):
-            forces[n, leg] = with_friction(0.0, rates[n, leg], viscous[leg], coulomb[leg])
+            forces[n, leg] = with_friction(
+                0.0, rates[n, leg], viscous[leg], coulomb[leg], coulomb_velocity[leg])

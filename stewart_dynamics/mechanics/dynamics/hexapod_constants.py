@@ -15,7 +15,7 @@
 """
 The constants of a hexapod as one array, for all compiled functions.
 
-First those of the platform, then 14 for each leg. Products of masses and distances of a leg that
+First those of the platform, then 15 for each leg. Products of masses and distances of a leg that
 do not change with its length are computed here.
 """
 
@@ -36,8 +36,9 @@ _FIRST_LEG = 14
 # Of a leg, from its first number on.
 _BASE_JOINT, _PLATFORM_JOINT = 0, 3
 _PISTON_MASS, _PISTON_CENTER, _CYLINDER_MOMENT, _JOINT_INERTIA = 6, 7, 8, 9
-_REFLECTED_MASS, _VISCOUS_FRICTION, _COULOMB_FRICTION, _CYLINDER_MASS = 10, 11, 12, 13
-_LEG = 14
+_REFLECTED_MASS, _VISCOUS_FRICTION, _COULOMB_FRICTION, _COULOMB_VELOCITY = 10, 11, 12, 13
+_CYLINDER_MASS = 14
+_LEG = 15
 
 CONSTANTS = _FIRST_LEG + 6 * _LEG
 
@@ -59,6 +60,8 @@ class Leg(NamedTuple):
     """[N s/m]"""
     coulomb_friction: float
     """[N]"""
+    coulomb_velocity: float
+    """Rate below which Coulomb friction is linear [m/s]."""
     cylinder_mass: float
     """[kg]"""
 
@@ -73,7 +76,7 @@ def hexapod_constants(p: Parameters) -> Array:
         cylinder_mass * cylinder_center ** 2 + p['legs.cylinder.inertia']
         + p['legs.piston.inertia'],
         p['actuator.reflected_mass'], p['actuator.viscous_friction'],
-        p['actuator.coulomb_friction'], cylinder_mass])
+        p['actuator.coulomb_friction'], p['actuator.coulomb_velocity'], cylinder_mass])
     return np.concatenate([
         p['gravity'], [p['singularity.characteristic_length'], p['platform.mass']],
         p['platform.center_of_mass'], p['platform.inertia'], legs.ravel()])
@@ -116,4 +119,12 @@ def leg_of(constants: Array, leg: int) -> Leg:
         constants[o + _PISTON_MASS], constants[o + _PISTON_CENTER],
         constants[o + _CYLINDER_MOMENT], constants[o + _JOINT_INERTIA],
         constants[o + _REFLECTED_MASS], constants[o + _VISCOUS_FRICTION],
-        constants[o + _COULOMB_FRICTION], constants[o + _CYLINDER_MASS])
+        constants[o + _COULOMB_FRICTION], constants[o + _COULOMB_VELOCITY],
+        constants[o + _CYLINDER_MASS])
+
+
+@inlined
+def coulomb_velocity_of(constants: Array, leg: int) -> float:
+    """Return the rate of a leg below which its Coulomb friction is linear [m/s]."""
+    velocity: float = constants[_FIRST_LEG + leg * _LEG + _COULOMB_VELOCITY]
+    return velocity

@@ -40,7 +40,7 @@ from stewart_dynamics.mechanics.dynamics.base_load import carried, carrying_matr
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.friction import with_friction
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
-    characteristic_length_of, gravity_of, joints_of)
+    characteristic_length_of, coulomb_velocity_of, gravity_of, joints_of)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT, INERTIA,
     LINEAR, MASS, OFFSET, PISTON_FIRST, PISTON_MASS, PISTON_SECOND, REFLECTED_MASS,
@@ -197,7 +197,8 @@ def _put_platform(of: _Moving, u: Vector3, h: Vector3, row: Array) -> None:
 
 
 @compiled
-def _put_row(of: _Moving, size: float, leg: int, work: Array, row: Array) -> None:
+def _put_row(of: _Moving, size: float, leg: int, coulomb_velocity: float, work: Array,
+             row: Array) -> None:
     """Write how the force of one leg depends on all parameters."""
     u = read3(work, leg * _LEG + _ROW)
     h = scale(1.0 / size, read3(work, leg * _LEG + _ROW + 3))
@@ -217,7 +218,7 @@ def _put_row(of: _Moving, size: float, leg: int, work: Array, row: Array) -> Non
     rate = work[leg * _LEG + _RATE]
     row[REFLECTED_MASS.start + leg] = work[leg * _LEG + _ACCELERATION]
     row[VISCOUS_FRICTION.start + leg] = rate
-    row[COULOMB_FRICTION.start + leg] = with_friction(0.0, rate, 0.0, 1.0)
+    row[COULOMB_FRICTION.start + leg] = with_friction(0.0, rate, 0.0, 1.0, coulomb_velocity)
     row[OFFSET.start + leg] = 1.0
 
 
@@ -230,7 +231,7 @@ def regressors(constants: Array, motions: Array, bases: Array, results: Array, w
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``; its masses and friction are not used.
+        Of the hexapod, see ``hexapod_constants``; its masses and friction forces are not used.
     motions : (N, MOTION)
         Rows of motion, SI units, base axes.
     bases : (N, BASE) or (1, BASE)
@@ -249,4 +250,5 @@ def regressors(constants: Array, motions: Array, bases: Array, results: Array, w
             _put_leg(constants, leg, of, work)
         _invert(work)
         for leg in range(6):
-            _put_row(of, size, leg, work, results[row, leg])
+            _put_row(of, size, leg, coulomb_velocity_of(constants, leg), work,
+                     results[row, leg])
