@@ -49,7 +49,7 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.standard import float64_array
-from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.messages import StateMessages
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant

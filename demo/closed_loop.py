@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+import io
 import os
 from pathlib import Path
 import struct
@@ -46,6 +47,7 @@ from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.messages.setpoint import pose
+from stewart_dynamics.whole_file import write_files
 from tqdm import tqdm
 import yaml
 
@@ -95,6 +97,13 @@ class Errors(NamedTuple):
     def _of_each(self, figure: Callable[[Array], Any]) -> dict[str, float]:
         series = [*self.legs.T, self.legs, self.position, self.rotation]
         return {name: float(figure(each)) for name, each in zip(UNITS, series, strict=True)}
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure as PNG, complete or not at all."""
+    png = io.BytesIO()
+    figure.savefig(png, dpi=110, metadata={'Software': None})
+    write_files({path: png.getvalue()})
 
 
 class Recorder(Node):

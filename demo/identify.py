@@ -33,7 +33,7 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, BEGIN, demonstration, Errors, Failure, PLOTS, progress_bar, Recorder, ROOT,
+    BANDWIDTH, BEGIN, demonstration, Errors, Failure, PLOTS, progress_bar, Recorder, ROOT, save,
     stamp_of, UNITS)
 from loop import Loop, RATE
 import matplotlib
@@ -43,6 +43,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.whole_file import write_json
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -154,7 +155,7 @@ def draw(path: Path, runs: Sequence[Run]) -> None:
     axes.set(xlabel='time  [s]', ylabel='error of the leg lengths, RMS of six  [µm]',
              yscale='log', xlim=(0.0, runs[0].errors.seconds[-1]))
     axes.legend(frameon=False, ncols=3, loc='lower center', bbox_to_anchor=(0.5, 1.0))
-    figure.savefig(path, dpi=110, metadata={'Software': None})
+    save(figure, path)
 
 
 def main() -> None:
@@ -210,11 +211,11 @@ def main() -> None:
         print(f'\n{many} measurements of the legs in {options.recorded:g} s, with noise of '
               f'{NOISE["noise.force"]:g} N; of six legs the worst\n\n{table(numbers, runs)}\n')
         draw(folder / 'identify.png', runs)
-        (folder / 'identify.json').write_text(json.dumps({
+        write_json(folder / 'identify.json', {
             'measurements': many, 'seconds': options.recorded, 'noise': NOISE, 'units': UNITS,
             'parameters': [each._asdict() for each in numbers],
             'runs': [{'name': run.name, 'rms': run.errors.rms, 'peak': run.errors.peak}
-                     for run in runs]}, indent=1) + '\n', encoding='utf-8')
+                     for run in runs]})
         print(f'{time.monotonic() - begun:.0f} s; {folder}: identify.png, identify.json, '
               'identified/report.html')
 

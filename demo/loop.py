@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-import json
 import math
 from pathlib import Path
 import sys
@@ -34,7 +33,7 @@ from typing import Any, NamedTuple
 
 from closed_loop import (
     BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, progress_bar, Recorder, ROOT,
-    simulate, UNITS)
+    save, simulate, UNITS)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +43,7 @@ from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.whole_file import write_json
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -205,7 +205,7 @@ def draw(path: Path, runs: Sequence[Run]) -> None:
                  xlim=(0.0, run.errors.seconds[-1]))
     panels[0].set_ylabel('error of the leg lengths, RMS of six  [µm]')
     panels[0].legend(frameon=False)
-    figure.savefig(path, dpi=110, metadata={'Software': None})
+    save(figure, path)
 
 
 def summary(loop: Loop, runs: Sequence[Run]) -> dict[str, Any]:
@@ -249,8 +249,7 @@ def main() -> None:
                                         - progress.n))))
         print(f'\n{table(runs, [payload_name(run.payload) for run in runs[::2]])}\n')
         draw(options.output / 'loop.png', runs)
-        (options.output / 'loop.json').write_text(
-            json.dumps(summary(loop, runs), indent=1) + '\n', encoding='utf-8')
+        write_json(options.output / 'loop.json', summary(loop, runs))
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: loop.png, loop.json')
 
 

@@ -24,7 +24,6 @@ does not know its equations.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 import sys
 import time
@@ -32,6 +31,7 @@ import time
 from closed_loop import BANDWIDTH, demonstration, progress_bar, ROOT
 from loop import Loop, Run, summary, table
 import rclpy
+from stewart_dynamics.whole_file import write_json
 
 PHYSICS: dict[str, list[str | Path]] = {
     'stewart_simulator': [], 'MuJoCo': [sys.executable, ROOT / 'demo' / 'mujoco_plant.py']}
@@ -63,9 +63,7 @@ def main() -> None:
                         progress.update(before + min(reached * 1e-9, options.seconds)
                                         - progress.n)), command))
         print(f'\n{table(runs, [*PHYSICS])}\n')
-        (options.output / 'mujoco.json').write_text(
-            json.dumps(summary(loop, runs) | {'physics': [*PHYSICS]}, indent=1) + '\n',
-            encoding='utf-8')
+        write_json(options.output / 'mujoco.json', summary(loop, runs) | {'physics': [*PHYSICS]})
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: mujoco.json')
 
 

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-import json
 from pathlib import Path
 import sys
 import time
@@ -33,16 +32,17 @@ from typing import Any, NamedTuple
 
 from closed_loop import (
     BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, progress_bar, Recorder, ROOT,
-    simulate, SIMULATOR, UNITS)
+    save, simulate, SIMULATOR, UNITS)
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 import rclpy
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
 from stewart_dynamics.executables import executable
-from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.base_motion import GeneratedBaseMotion
 from stewart_dynamics.simulator.parameters import SimulatorParameters
+from stewart_dynamics.whole_file import write_json
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402, I100, I202
@@ -206,7 +206,7 @@ def draw(path: Path, ship: Ship, runs: Sequence[Run]) -> None:
     below.set(xlabel='time  [s]', yscale='log', xlim=(0.0, seconds[-1]), ylim=(1e-2, 3e3),
               ylabel='error of the platform in the world  [µm]')
     below.legend(frameon=False, ncols=4, loc='lower center', bbox_to_anchor=(0.5, 1.0))
-    figure.savefig(path, dpi=110, metadata={'Software': None})
+    save(figure, path)
 
 
 def summary(ship: Ship, runs: Sequence[Run]) -> dict[str, Any]:
@@ -242,8 +242,7 @@ def main() -> None:
                     before + min(reached * 1e-9, options.seconds) - progress.n)))
         print(f'\n{table(runs)}\n')
         draw(options.output / 'ship.png', ship, runs)
-        (options.output / 'ship.json').write_text(
-            json.dumps(summary(ship, runs), indent=1) + '\n', encoding='utf-8')
+        write_json(options.output / 'ship.json', summary(ship, runs))
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: ship.png, ship.json')
 
 

@@ -20,8 +20,8 @@ from typing import Any
 
 from referees import random_parameters, rng, ROOT, size_of
 
-from stewart_dynamics.parameters.files import read_yaml
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 HEXAPOD = read_yaml(ROOT / 'config' / 'platform.yaml', 'stewart_simulator')

@@ -33,7 +33,7 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.errors import MotionError, PoseError, SingularityError
 from stewart_dynamics.external_wrench.estimate import (
     Estimate, external_wrenches, ExternalWrench, Measurement, Overload)
-from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
 

@@ -30,8 +30,7 @@ from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.rows import BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION
-from stewart_dynamics.parameters.files import flat
-from stewart_dynamics.parameters.yaml_file import read_document
+from stewart_dynamics.parameters.yaml_file import flat, read_document
 from stewart_dynamics.setpoints.base import BaseInput
 from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.setpoints.topics import BASE_IMU, BASE_SOURCES

@@ -28,9 +28,8 @@ import pytest
 from referees import ROOT
 from stewart_dynamics import (
     MotionError, ParameterError, Parameters, Pose, PoseError, StewartError, StewartPlatform)
-from stewart_dynamics.parameters.files import flat, other_nodes, read_yaml
 from stewart_dynamics.parameters.table import PARAMETERS
-from stewart_dynamics.parameters.yaml_file import read_document
+from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_document, read_yaml
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
@@ -55,6 +54,10 @@ GOOD = """\
     singularity: {warn_condition: 40.0, stop_condition: 400.0}
     visualization_rate: 25.0
 """
+
+GIVEN = {'geometry.base_joints': [0.1 * n for n in range(18)],
+         'geometry.platform_joints': [0.2 * n for n in range(18)],
+         'platform.mass': 1.0, 'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]}
 
 
 def written(path: Path, text: str) -> Path:
@@ -187,9 +190,6 @@ def test_the_hexapod_of_the_package_can_be_computed() -> None:
 
 BAD = {
     'missing required value': ('      mass: 150.0\n', '', ['platform.mass', 'missing']),
-    'missing required array': (
-        '      inertia: [20.0, 1.0, 2.0, 21.0, 3.0, 35.0]\n', '',
-        ['platform.inertia', 'missing']),
     'unknown name': ('visualization_rate', 'visualisation_rate', [
         'visualisation_rate', 'unknown parameter', 'do you mean visualization_rate?']),
     'unknown name in a group': ('warn_condition', 'warn_conditions', [
@@ -202,8 +202,6 @@ BAD = {
         'platform.inertia', ' 1:', 'is an integer', 'write 1.0']),
     'string for a number': ('mass: 150.0', "mass: '150.0'", [
         'platform.mass', "'150.0'", 'must be a double']),
-    'bool for a number': ('mass: 150.0', 'mass: true', [
-        'platform.mass', 'True', 'must be a double']),
     'number for a string': ('joints: [a,', 'joints: [1,', ['joints', '1', 'must be a string']),
     'a joint that no message can name': (
         'joints: [a,', 'joints: ["a\\e",', ['joints', 'printable']),
@@ -216,8 +214,6 @@ BAD = {
         'platform.center_of_mass', '0.1', 'must be an array of 3']),
     'wrong length': ('center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass: [0.01, 0.1]', [
         'platform.center_of_mass', '[0.01, 0.1]', 'must have 3 entries, has 2']),
-    'neither one nor six': ('6.4, 6.5]', '6.4]', [
-        'legs.piston.mass', '[6.0, 6.1, 6.2, 6.3, 6.4]', 'must have 1 or 6 entries, has 5']),
     'wrong length of joints': ('1.0, -0.4, 0.0]', '1.0, -0.4]', [
         'geometry.base_joints', 'must have 18 entries, has 17']),
     'empty array': ('[6.0, 6.1, 6.2, 6.3, 6.4, 6.5]', '[]', [
@@ -228,26 +224,10 @@ BAD = {
         'limits', 'unknown parameter']),
     'bad choice': ('warn_condition: 40.0', 'warn_condition: 40.0, action: stop', [
         'singularity.action', "'stop'", 'must be one of warn, suppress_forces']),
-    'negative mass': ('mass: 150.0', 'mass: -150.0', [
-        'platform.mass', '-150.0 kg', 'must be more than 0']),
-    'no mass': ('mass: 150.0', 'mass: 0.0', ['platform.mass', '0.0 kg', 'must be more than 0']),
-    'negative zero length': ('    limits:', '    geometry.zero_length: -0.9\n    limits:', [
-        'geometry.zero_length', '-0.9 m', 'must be at least 0']),
-    'negative length of a leg': ('length_min: 0.8', 'length_min: -0.8', [
-        'limits.length_min', '-0.8 m', 'must be at least 0']),
-    'longest leg without length': ('length_max: 1.4', 'length_max: 0.0', [
-        'limits.length_max', '0.0 m', 'must be more than 0']),
-    'negative inertia of a leg': ('inertia: 1e-3', 'inertia: -1e-3', [
-        'legs.piston.inertia', '-0.001 kg m^2', 'must be at least 0']),
-    'negative mass of a leg': ('6.3, 6.4', '6.3, -6.4', [
-        'legs.piston.mass', '-6.4 kg', 'must be at least 0']),
     'inertia of no body': (
         '[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', [
             'platform.inertia', '[20.0, 0.0, 0.0, 20.0, 0.0, -1.0]', 'positive definite',
             '-1 kg m^2', 'ixx ixy ixz iyy iyz izz']),
-    'inertia in another order': (
-        '[20.0, 1.0, 2.0, 21.0, 3.0, 35.0]', '[20.0, 20.0, 35.0, 0.0, 0.0, 0.0]', [
-            'platform.inertia', 'positive definite']),
     'shortest not below longest': ('length_max: 1.4', 'length_max: 0.8', [
         'limits.length_min', '0.8', 'must be less than limits.length_max', '0.8']),
     'one leg shortest above longest': (
@@ -256,17 +236,11 @@ BAD = {
     'stop before warn': ('stop_condition: 400.0', 'stop_condition: 39.0', [
         'singularity.stop_condition', '39.0', 'must be at least singularity.warn_condition',
         '40.0']),
-    'condition below one': ('warn_condition: 40.0', 'warn_condition: 0.5', [
-        'singularity.warn_condition', '0.5', 'must be at least 1']),
     'not a number': ('mass: 150.0', 'mass: .nan', ['platform.mass', 'nan kg', 'must be finite']),
-    'infinite': ('center_of_mass: [0.01,', 'center_of_mass: [-.inf,', [
-        'platform.center_of_mass', '-inf m', 'must be finite']),
     'too large to be finite': ('mass: 150.0', 'mass: 1.0e400', [
-        'platform.mass', "'1.0e400'", 'must be a double: it is out of range']),
+        'platform.mass', 'inf kg', 'must be finite']),
     'two legs of one name': ('[a, b, c, d, e, f]', '[a, b, c, d, e, a]', [
         'joints', "['a', 'b', 'c', 'd', 'e', 'a']", 'six different names']),
-    'a leg without a name': ('[a, b, c, d, e, f]', "[a, b, c, d, e, '']", [
-        'joints', 'six different names']),
     'a platform that is one point': (
         'platform_joints: [0.4, 0.4, 0.0,  0.2, 0.5, 0.0,  -0.6, 0.1, 0.0,\n'
         '                        -0.6, -0.1, 0.0,  0.2, -0.5, 0.0,  0.4, -0.4, 0.0]',
@@ -279,33 +253,14 @@ BAD = {
     'no space in a group': ('{mass: 12.0,', '{mass:12.0,', [
         'legs.cylinder.mass:12.0: has no value',
         'space is missing after the colon of legs.cylinder.mass']),
-    'no space, and nothing else in the group': (
-        '{length_min: 0.8, length_max: 1.4}', 'length_min:0.8', [
-            'limits: unknown', 'a space is missing after the colon of length_min']),
-    'a decimal comma': ('mass: 150.0', 'mass: 150,5', [
-        'platform.mass', "'150,5'", 'a decimal comma? write 150.5']),
-    'decimal commas in an array': ('[0.01, 0.0, 0.1]', '[0,01, 0,0, 0,1]', [
-        'platform.center_of_mass: [0, 1, 0, 0, 0, 1]', 'must have 3 entries, has 6',
-        'decimal commas? write 0.5, not 0,5']),
-    'a decimal comma in a group': ('{mass: 12.0,', '{mass: 12,5,', [
-        'legs.cylinder.5: has no value', 'a decimal comma? write 0.5, not 0,5']),
     'lists in a list': ('[0.01, 0.0, 0.1]', '[[0.01, 0.0, 0.1]]', [
         'platform.center_of_mass: [[0.01, 0.0, 0.1]]', 'one after the other']),
-    'a list of lists, line by line': (
-        'center_of_mass: [0.01, 0.0, 0.1]', 'center_of_mass:\n      - [1.0, 2.0]\n', [
-            'platform.center_of_mass', 'one after the other, [x1, y1, z1, x2']),
-    'digits in groups': ('mass: 150.0', 'mass: 1_500.0', [
-        "'1_500.0'", 'write its digits without anything between them']),
     'null': ('mass: 150.0', 'mass: null', ['platform.mass: missing, it has no default']),
     'a truth for a text': ('visualization_rate: 25.0', 'base_frame: on', [
         'base_frame', 'True', 'must be a string: put it in quotes']),
-    'an integer with zeros before it': ('mass: 150.0', 'mass: 0150', [
-        'platform.mass: 104: is an integer']),
     'a tag': ('mass: 150.0', 'mass: !!float 150', [
         'line 10, column 13', "a tag, 'tag:yaml.org,2002:float'"]),
     'a tag of Python': ('mass: 150.0', 'mass: !!python/object:os.system {}', ['a tag']),
-    'a tag of binary': ('mass: 150.0', 'mass: !!binary MTUw', ['a tag']),
-    'a tag of a set': ('mass: 150.0', 'mass: !!set {a}', ['a tag']),
     'a tag of ours': ('mass: 150.0', 'mass: !plain 150.0', ['line 10', "a tag, '!plain'"]),
     'a merge of mappings': ('mass: 150.0', '<<: *m', ['alias']),
     'a list for a name': ('mass: 150.0', '? [a]\n      : 150.0', [
@@ -321,7 +276,6 @@ BAD = {
     'an alias, which ROS rejects': (
         'mass: 150.0', 'mass: *m', ['alias', 'write the value out']),
     'a name without a value': ('mass: 150.0', 'mass:', ['platform.mass', 'has no value']),
-    'a date': ('mass: 150.0', 'mass: 2020-02-20', ['platform.mass', "'2020-02-20'"]),
     'two documents': ('/**:', 'a: 1\n---\n/**:', [
         'not YAML: line 2, column 1: expected a single document in the stream, but found ano']),
     'no section of ours': ('/**:', 'other_node:', [
@@ -329,6 +283,32 @@ BAD = {
     'no ros__parameters': ('ros__parameters:', 'parameters:', [
         '/**', "must hold 'ros__parameters:'"]),
 }
+
+
+@pytest.mark.parametrize(('name', 'value', 'rule'), [
+    ('platform.mass', -150.0, '-150.0 kg: must be more than 0'),
+    ('platform.mass', 0.0, '0.0 kg: must be more than 0'),
+    ('platform.mass', True, 'True: must be a double'),
+    ('platform.center_of_mass', [-np.inf, 0.0, 0.0], '-inf m: must be finite'),
+    ('platform.inertia', [20.0, 20.0, 35.0, 0.0, 0.0, 0.0], 'positive definite'),
+    ('geometry.zero_length', -0.9, '-0.9 m: must be at least 0'),
+    ('limits.length_min', -0.8, '-0.8 m: must be at least 0'),
+    ('limits.length_max', 0.0, '0.0 m: must be more than 0'),
+    ('limits.base_joint_angle_max', 3.2, '3.2 rad: must be more than 0, at most 3.14159'),
+    ('legs.piston.inertia', -1e-3, '-0.001 kg m^2: must be at least 0'),
+    ('legs.piston.mass', [6.0] * 5, 'must have 1 or 6 entries, has 5'),
+    ('legs.piston.mass', [6.0, 6.0, 6.0, 6.0, 6.0, -6.4], '-6.4 kg: must be at least 0'),
+    ('singularity.warn_condition', 0.5, '0.5: must be at least 1'),
+    ('setpoint.timeout', 2e9, '2000000000.0 s: must be more than 0, at most 1e+09'),
+    ('payload.window', 61.0, '61.0 s: must be at least 2, at most 60'),
+    ('joints', list('abcde') + [''], 'six different names'),
+    ('base.imu.orientation', [0.0, 0.0, 0.0, 1.002], 'length 1.002, must be within 0.001 of 1'),
+    ('geometry.base_joint_axes', [0.0] * 18, 'a direction must not be 0, 0, 0')])
+def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Parameters({**GIVEN, name: value})
+    assert str(caught.value).startswith(f'parameters: {name}: ')
+    assert rule in str(caught.value)
 
 
 @pytest.mark.parametrize('case', BAD)
@@ -413,7 +393,7 @@ def test_every_parameter_of_the_table_has_what_the_documents_need() -> None:
     ('a: ' + '[' * 3000, 'nests deeper'), ('- ' * 3000, 'nests deeper'),
     ('a: !!bool foo', 'a tag'), (f'a: {"9" * 90000}x', 'unknown parameter'),
     (f'{"a" * 1000}: 1.0', 'unknown parameter'),
-    (f'platform.mass: {"9" * 90000}', 'out of range|must be a double'),
+    (f'platform.mass: {"9" * 90000}', 'must be finite'),
     ('platform: {mass: 0x' + 'f' * 5000 + '}', 'platform.mass')])
 def test_difficult_yaml_is_rejected_in_one_short_line(
         tmp_path: Path, text: str, said: str) -> None:
@@ -437,9 +417,6 @@ def test_null_takes_the_default() -> None:
 # Arbitrary input
 
 NAMES = sorted(PARAMETERS)
-GIVEN = {'geometry.base_joints': [0.1 * n for n in range(18)],
-         'geometry.platform_joints': [0.2 * n for n in range(18)],
-         'platform.mass': 1.0, 'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]}
 plain = st.one_of(
     st.none(), st.booleans(), st.integers(-10 ** 30, 10 ** 30), st.floats(), st.text(max_size=8),
     st.sampled_from(['warn', 'base', '/**', 'ros__parameters', 'x' * 300]),
@@ -550,7 +527,7 @@ def test_parameters_that_ros_declares_are_ignored(tmp_path: Path, name: str) -> 
 
 @pytest.mark.parametrize('name, text, said', [
     ('platform.mass', '150', 'platform.mass: 150: is an integer, must be a double: write 150.0'),
-    ('platform.mass', '0,5', "platform.mass: '0,5': must be a double; a decimal comma?"),
+    ('platform.mass', '0,5', "platform.mass: '0,5': must be a double"),
     ('platform.mas', '1.0', 'platform.mas: unknown parameter; do you mean platform.mass?'),
     ('gravity', '[]', 'gravity: []: ROS accepts no empty list'),
     ('gravity', '[[0.0, 0.0, 1.0]]', 'gravity: [[0.0, 0.0, 1.0]]: has a list'),
@@ -701,8 +678,6 @@ def test_a_written_file_has_units_and_short_lines(tmp_path: Path) -> None:
     assert 'force_max' not in text  # not given, and none by default
     with pytest.raises(ParameterError, match='cannot be written: Is a directory'):
         parameters.to_yaml(tmp_path)
-    with pytest.raises(ParameterError, match='cannot be written: 1e-310: ROS reads no number so'):
-        parameters.replaced({'platform.mass': 1e-310}).to_yaml(tmp_path / 'small.yaml')
 
 
 TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str.isprintable)

@@ -29,7 +29,7 @@ from simulated import FRICTIONLESS, HEXAPOD, MASSLESS, random_simulated, simulat
 
 from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant, State
 from stewart_dynamics.simulator.plant_dynamics import STATE_TWIST

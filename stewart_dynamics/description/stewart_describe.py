@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.program import DONE, Program
+from stewart_dynamics.whole_file import write_files
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.table import Parameters
@@ -139,9 +140,9 @@ def _check_new(paths: Iterable[Path], given: argparse.Namespace) -> None:
 
 
 def _put(given: argparse.Namespace, files: dict[str, str]) -> None:
-    """Write all files, or none where one exists."""
+    """Write all files, or none if one exists or cannot be written."""
     paths = {given.output / name: text for name, text in files.items()}
     _check_new(paths, given)
-    for path, text in paths.items():
-        path.write_text(text, encoding='utf-8')
+    write_files(paths)
+    for path in paths:
         print(path)

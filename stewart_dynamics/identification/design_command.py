@@ -69,7 +69,7 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
     """Design a motion, write it and print its predicted intervals."""
     # Imported here, so that --help is fast.
     from stewart_dynamics.identification.design import design
-    from stewart_dynamics.parameters.files import write_yaml
+    from stewart_dynamics.parameters.yaml_file import write_yaml
     from stewart_dynamics.reporting.results_folder import (
         check_free, remove_abandoned, whole_folder)
     from tqdm import tqdm
@@ -91,10 +91,9 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
     with whole_folder(folder, options, TRAJECTORY) as partial:
         path = partial / TRAJECTORY
         given_values = designed.trajectory.given
-        write_yaml(path, given_values, {
-            name: designed.trajectory.table[name].unit for name in given_values})
         head = ''.join(f'# {line}'.rstrip() + '\n' for line in _head(designed, asked))
-        path.write_text(head + path.read_text(encoding='utf-8'), encoding='utf-8')
+        write_yaml(path, given_values, {
+            name: designed.trajectory.table[name].unit for name in given_values}, head)
     print('\n'.join(_lines(designed, asked)))
     print(f'\nmotion: {folder / TRAJECTORY}, for stewart_trajectory --ros-args --params-file')
 

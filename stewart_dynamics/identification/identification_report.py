@@ -35,6 +35,7 @@ from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.plots import COLORS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
+from stewart_dynamics.whole_file import write_files
 
 _FOLDER = Path(__file__).with_name('templates')
 # Samples of the curves at most, the first ones.
@@ -101,7 +102,7 @@ class Report:
                           for each in result['combinations']],
             legs=list(self._found.parameters['joints']), plotly=script, data=self._data(),
             two_sided=TWO_SIDED, samples=len(self._curves), most=_MOST)
-        path.write_text(text, encoding='utf-8', errors='backslashreplace', newline='\n')
+        write_files({path: text})
 
     def _data(self) -> dict[str, Any]:
         spectra = [] if self._density is None else [

@@ -34,7 +34,8 @@ from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.results_folder import (
-    check_free, IDENTIFICATION, remove_abandoned, whole_folder, write_json)
+    check_free, IDENTIFICATION, remove_abandoned, whole_folder)
+from stewart_dynamics.whole_file import write_json
 from tqdm import tqdm
 
 PARAMETERS, RESULT, REPORT = 'identified.yaml', IDENTIFICATION, 'report.html'

@@ -49,8 +49,8 @@ from stewart_dynamics.node.payload_service import inertia_message, PayloadServic
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.node.repeated_log import RepeatedLog
 from stewart_dynamics.node.topics import LEG_TRAJECTORY, MARKERS, PAYLOAD, Topics
-from stewart_dynamics.parameters.files import is_of_ros
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.rclpy_workarounds import (

@@ -26,10 +26,10 @@ from typing import Any, ClassVar, TYPE_CHECKING
 import numpy as np
 
 from stewart_dynamics.errors import ParameterError, shown, shown_name
-from stewart_dynamics.parameters.files import (
-    check_given, check_sections, flat, is_of_ros, parameters_of, read_yaml, write_yaml)
 from stewart_dynamics.parameters.rules import checked, Parameter
-from stewart_dynamics.parameters.yaml_file import no_space, read_document, read_value
+from stewart_dynamics.parameters.yaml_file import (
+    check_given, check_sections, flat, is_of_ros, parameters_of, read_document, read_value,
+    read_yaml, write_yaml)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -67,8 +67,8 @@ class ParameterSet(Mapping[str, Any]):
         if not isinstance(values, Mapping):
             raise ParameterError(
                 f'{source}: {shown(values)}: must be a mapping of names to values')
-        for name, value in values.items():
-            self.declared(name, value, source)
+        for name in values:
+            self.declared(name, source)
         self._given = {
             name: _plain(value) if exact_types else _as_double(self.table[name], _plain(value))
             for name, value in values.items() if value is not None}
@@ -176,7 +176,7 @@ class ParameterSet(Mapping[str, Any]):
         document = read_document(path)
         check_sections(path, document, cls.node)
         for name, value in list(parameters_of(document, cls.node, source)):
-            parameter = cls.declared(name, value, source)
+            parameter = cls.declared(name, source)
             if value is not None:
                 checked(parameter, value, source)
 
@@ -189,19 +189,17 @@ class ParameterSet(Mapping[str, Any]):
             if value is None:
                 raise ParameterError(f'{source}: {shown_name(name)}: has no value')
             if not is_of_ros(name):
-                checked(cls.declared(name, value, source), value, source)
+                checked(cls.declared(name, source), value, source)
         return given
 
     @classmethod
-    def declared(cls, name: str, value: Any = None, source: str = 'parameters') -> Parameter:
+    def declared(cls, name: str, source: str = 'parameters') -> Parameter:
         """Return the declaration of a parameter; ParameterError suggests the most similar name."""
         if isinstance(name, str) and name in cls.table:
             return cls.table[name]
         text = shown_name(name)
         near = difflib.get_close_matches(text, cls.table, n=1)
         hint = f'; do you mean {near[0]}?' if near else ''
-        if isinstance(value, str) and (missing := no_space(value)):
-            hint = f'; {missing}'
         raise ParameterError(f'{source}: {text}: unknown parameter{hint}')
 
     def _check_together(self, source: str) -> None:

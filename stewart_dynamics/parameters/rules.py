@@ -18,13 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import math
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.errors import ParameterError, shown
-from stewart_dynamics.parameters.yaml_file import scalar
 
 _PYTHON_TYPES: Mapping[str, Any] = {'string': str, 'double': float, 'bool': bool}
 
@@ -38,13 +36,13 @@ class Parameter(NamedTuple):
     name : str
         Dotted, as in a file.
     kind : str
-        Its type in ROS, for an array that of an entry: string, double or bool.
+        Type in ROS, for an array the type of an entry: string, double or bool.
     text : str
-        Its meaning, for the documents, ``--help`` and ROS's description.
+        Meaning, for the documents, ``--help`` and ROS's description.
     unit : str
         SI; empty if it has none.
     default : object
-        The value if it is not given; an empty tuple: no value, not checked.
+        The value if it is not given; an empty tuple: no value, unlimited.
     required : bool
         Whether it must be given.
     sizes : tuple of int
@@ -121,17 +119,15 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
     if not entries and parameter.default == ():
         return None
     if is_array and not parameter.accepts(len(entries)):
-        has = f'must have {parameter.lengths} entries, has {len(entries)}'
-        if parameter.kind == 'double' and len(entries) > min(parameter.sizes) and any(
-                type(entry) is int for entry in entries):  # [0,5, 1,5]
-            has += '; decimal commas? write 0.5, not 0,5'
-        raise _broken(parameter, value, source, has)
+        raise _broken(parameter, value, source,
+                      f'must have {parameter.lengths} entries, has {len(entries)}')
     for entry in entries:
-        _check_entry(parameter, entry, source)
-    if parameter.kind != 'double':
-        return tuple(entries) if parameter.sizes else entries[0]
+        if rule := _broken_rule(parameter, entry):
+            raise _broken(parameter, entry, source, rule)
     if not parameter.sizes:
         return entries[0]
+    if parameter.kind != 'double':
+        return tuple(entries)
     array = np.array(entries * 6 if len(entries) == 1 else entries)
     if parameter.repeated:
         array = array.reshape(-1, parameter.sizes[0])
@@ -141,39 +137,25 @@ def checked(parameter: Parameter, value: Any, source: str) -> Any:
     return array
 
 
-def _check_entry(parameter: Parameter, entry: Any, source: str) -> None:
-    if not isinstance(entry, _PYTHON_TYPES[parameter.kind]):
-        raise _broken(parameter, entry, source, _wrong_type(parameter.kind, entry))
-    if parameter.kind == 'string' and not entry.isprintable():
-        raise _broken(parameter, entry, source, 'must be printable text')
-    if parameter.choices and entry not in parameter.choices:
-        raise _broken(parameter, entry, source, f'must be {parameter.rule}')
-    if parameter.kind == 'double':
-        if not math.isfinite(entry):
-            raise _broken(parameter, entry, source, 'must be finite')
-        if (entry < parameter.minimum or entry > parameter.maximum
-                or (parameter.above and entry == parameter.minimum)):
-            raise _broken(parameter, entry, source, f'must be {parameter.rule}')
-
-
-def _wrong_type(kind: str, entry: Any) -> str:
-    """Return the rule that a value of another type breaks, with a likely correction."""
+def _broken_rule(parameter: Parameter, entry: Any) -> str:
+    """Return the rule that an entry breaks, with a likely correction; empty if it breaks none."""
+    kind = parameter.kind
     if kind == 'double' and type(entry) is int:
         written = f': write {entry}.0' if abs(entry) < 1e15 else ''
         return f'is an integer, must be a double{written}'
-    if kind == 'string':
-        return 'must be a string' + (
-            ': put it in quotes' if isinstance(entry, bool | int | float) else '')
-    if kind == 'double' and isinstance(entry, str) and len(entry) < 80:
-        if re.fullmatch(r'[+-]?[0-9]+,[0-9]+', entry, re.ASCII):
-            return f'must be a double; a decimal comma? write {entry.replace(",", ".")}'
-        if type(scalar(entry)) in (int, float):
-            return 'must be a double, not a text: write it without quotes'
-        if re.fullmatch(r'[+-]?[0-9][0-9_ ]*[0-9](\.[0-9_]*)?', entry, re.ASCII):
-            return 'must be a double: write its digits without anything between them'
-        if re.fullmatch(r'[+-]?[0-9]*\.?[0-9]*([eE][+-]?[0-9]+)?', entry, re.ASCII):
-            return 'must be a double: it is out of range'
-    return f'must be a {kind}'
+    if not isinstance(entry, _PYTHON_TYPES[kind]):
+        quoted = kind == 'string' and isinstance(entry, bool | int | float)
+        return f'must be a {kind}' + (': put it in quotes' if quoted else '')
+    if kind == 'string' and not entry.isprintable():
+        return 'must be printable text'
+    if kind == 'double' and not math.isfinite(entry):
+        return 'must be finite'
+    out_of_range = kind == 'double' and (
+        entry < parameter.minimum or entry > parameter.maximum
+        or (parameter.above and entry == parameter.minimum))
+    if out_of_range or (parameter.choices and entry not in parameter.choices):
+        return f'must be {parameter.rule}'
+    return ''
 
 
 def _broken(parameter: Parameter, value: Any, source: str, rule: str) -> ParameterError:

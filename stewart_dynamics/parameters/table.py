@@ -71,10 +71,11 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               required=True, sizes=(18,)),
     Parameter('geometry.base_joint_axes', 'double', 'x y z of the direction from which the angle '
               'of each base joint is measured, toward the platform, of any length, base axes; '
-              'none: of the leg at the home pose', '', (), sizes=(18,)),
-    Parameter('geometry.platform_joint_axes', 'double', 'likewise of each platform joint, from '
-              'the base toward the platform, platform axes; none: of the leg at the home pose', '',
-              (), sizes=(18,)),
+              'default: along the leg at the home pose', '', (), sizes=(18,)),
+    Parameter('geometry.platform_joint_axes', 'double', 'x y z of the direction from which the '
+              'angle of each platform joint is measured, from the base toward the platform, of '
+              'any length, platform axes; default: along the leg at the home pose', '', (),
+              sizes=(18,)),
     _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
           minimum=0.0),
     Parameter('platform.mass', 'double', 'mass of the platform with its payload', 'kg',
@@ -107,19 +108,20 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
               'base.source is pose or motion; not used where it is imu', 'm/s^2',
               STANDARD_GRAVITY, sizes=(3,)),
-    _legs('limits.length_min', 'minimum length of a leg; none: not checked', 'm', (), minimum=0.0),
-    _legs('limits.length_max', 'maximum length of a leg; none: not checked', 'm', (), minimum=0.0,
-          above=True),
-    _legs('limits.velocity_max', 'maximum rate of a leg; none: not checked', 'm/s', (),
+    _legs('limits.length_min', 'minimum length of a leg; unlimited if not set', 'm', (),
+          minimum=0.0),
+    _legs('limits.length_max', 'maximum length of a leg; unlimited if not set', 'm', (),
+          minimum=0.0, above=True),
+    _legs('limits.velocity_max', 'maximum rate of a leg; unlimited if not set', 'm/s', (),
           minimum=0.0, above=True),
     _legs('limits.force_max',
-          'maximum force of a leg, to which forces are clipped; none: not checked', 'N', (),
+          'maximum force of a leg, to which forces are clipped; unlimited if not set', 'N', (),
           minimum=0.0, above=True),
     _legs('limits.base_joint_angle_max', 'maximum angle between a leg and its '
-          'geometry.base_joint_axes; none: not checked', 'rad', (), minimum=0.0, above=True,
+          'geometry.base_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
           maximum=math.pi),
     _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
-          'geometry.platform_joint_axes; none: not checked', 'rad', (), minimum=0.0, above=True,
+          'geometry.platform_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
           maximum=math.pi),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
@@ -171,10 +173,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0,
               minimum=0.0, above=True, while_active=True),
     Parameter('external_wrench.force_max', 'double',
-              'external force above which diagnostics report an ERROR; none: not checked', 'N',
+              'external force above which diagnostics report an ERROR; unlimited if not set', 'N',
               minimum=0.0, above=True, while_active=True),
     Parameter('external_wrench.moment_max', 'double', "external moment at the platform's origin "
-              'above which diagnostics report an ERROR; none: not checked', 'N m', minimum=0.0,
+              'above which diagnostics report an ERROR; unlimited if not set', 'N m', minimum=0.0,
               above=True, while_active=True),
     Parameter('payload.window', 'double', 'time of the measurements that ~/identify_payload uses, '
               'the last ones', 's', 10.0, minimum=2.0, maximum=60.0),

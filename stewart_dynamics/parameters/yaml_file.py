@@ -13,26 +13,27 @@
 # limitations under the License.
 
 """
-YAML files as ROS reads them: plain scalars have the type that rcl, ROS's own reader, gives them.
+YAML files as ROS reads them, and the sections in them that hold a node's parameters.
 
-PyYAML's safe loader follows YAML 1.1, rcl does not: for rcl ``1e3`` is a double, ``y`` a bool,
-``1_000``, ``1:30`` and ``2020-01-01`` are texts.
+``/**:``, or a node's name with its namespaces, then ``ros__parameters:``, then the parameters,
+dotted or in groups. Plain scalars have the type that rcl, ROS's own reader, gives them: PyYAML's
+safe loader follows YAML 1.1, but for rcl ``1e3`` is a double, ``y`` a bool, and ``1_000``,
+``1:30`` and ``2020-01-01`` are texts.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 import re
-import stat
 from typing import Any
 
 from stewart_dynamics.errors import one_line, ParameterError, shown, shown_name
+from stewart_dynamics.whole_file import read_text, write_files
 import yaml  # type: ignore[import-untyped]
 
-# The file of a hexapod has 4 kB, that of a whole robot rarely more than 50. rcl needs at most 2 s
-# for a file of this size, but a minute for one list of 500 kB, whichever node it is for.
-LARGEST = 100_000  # [bytes]
+LARGEST = 100_000
+"""Size of the largest file that is read [bytes]."""
 _DEEPEST = 20
 
 
@@ -47,15 +48,11 @@ _SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 _TRUE = frozenset('Y y yes Yes YES true True TRUE on On ON'.split())
 _FALSE = frozenset('N n no No NO false False FALSE off Off OFF'.split())
-NULL = ('~', 'null', 'Null', 'NULL')
-"""For rcl these are texts; here they stand for no value."""
-_NUMBER = re.compile(
-    r'[+-]?((?P<octal>0[0-7]{1,20})|(?P<decimal>0|[1-9][0-9]{0,18})'
-    r'|(?P<hexadecimal>0x[0-9a-f]{1,15})|(?P<special>\.?inf|infinity|\.?nan)'
-    r'|([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[+-]?[0-9]+)?)',
+_NULL = frozenset(['~', 'null', 'Null', 'NULL'])
+_INTEGER = re.compile('[+-]?[0-9]{1,19}', re.ASCII)
+_DOUBLE = re.compile(
+    r'[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?\.?(inf|nan)|[+-]?infinity',
     re.ASCII | re.IGNORECASE)
-_BASES = {'octal': 8, 'decimal': 10, 'hexadecimal': 16}
-_SMALLEST = 2.0 ** -1022
 
 _TEXT = 'tag:yaml.org,2002:str'
 _LIST = 'tag:yaml.org,2002:seq'
@@ -64,27 +61,31 @@ _GROUP = 'tag:yaml.org,2002:map'
 _PLAIN = 'plain'  # a scalar without quotes
 _NO_SPACE = re.compile(r'\s*(- )?(?P<name>[A-Za-z_/*][\w./*]*):[^\s:][^:]*')
 
+_OF_ROS = ('use_sim_time', 'start_type_description_service')
+_OF_ROS_PREFIX = 'qos_overrides.'
+
+_NAME = re.compile('[A-Za-z_][A-Za-z0-9_]*')
+_LONGEST_ROW = 6
+_ROW = 3  # numbers in each row of a longer list: x y z
+_LISTED = 9
+
 
 def scalar(text: str) -> Any:
     """
     Return the value that ROS reads from a text without quotes: bool, int, float or str.
 
-    None for ``null`` and ``~``, which are texts for rcl: the value is not given.
+    None for ``null`` and ``~``, which are texts for rcl: the value is not given. Integers, which
+    no parameter of the package is, are decimal here, for rcl also octal and hexadecimal.
     """
-    if text in NULL:
+    if text in _NULL:
         return None
     if text in _TRUE or text in _FALSE:
         return text in _TRUE
-    found = _NUMBER.fullmatch(text)
-    if not found:
-        return text
-    for kind, base in _BASES.items():
-        if found[kind]:
-            return int(text, base)
-    number = float(text.replace('.', '') if found['special'] else text)
-    # For rcl a number out of range is a text.
-    in_range = found['special'] or number == 0.0 or _SMALLEST <= abs(number) < math.inf
-    return number if in_range else text
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if _DOUBLE.fullmatch(text):
+        return float(re.sub(r'\.(?=[in])', '', text, flags=re.IGNORECASE))
+    return text
 
 
 def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
@@ -99,7 +100,7 @@ def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
         deeper than 20.
 
     """
-    document = _read(_bytes_of(path, largest), str(path))
+    document = read_value(read_text(path, largest, ParameterError), str(path))
     if not isinstance(document, dict):
         raise ParameterError(f"{path}: must begin with '/**:' or a node's name")
     return document
@@ -107,16 +108,7 @@ def read_document(path: str | Path, largest: int = LARGEST) -> dict[str, Any]:
 
 def read_value(text: str, source: str) -> Any:
     """Return the value that ROS reads from a text, as on a command line."""
-    return _read(text.encode('utf-8', 'surrogateescape'), source)
-
-
-class _Loader(_SafeLoader):  # type: ignore[misc]
-    """The safe loader, without the types that YAML 1.1 gives plain scalars."""
-
-    yaml_implicit_resolvers = {None: [(_PLAIN, re.compile('(?!$)', re.DOTALL))]}
-
-
-def _read(data: bytes, source: str) -> Any:
+    data = text.encode('utf-8', 'surrogateescape')
     try:
         depth = 0
         for event in yaml.parse(data, Loader=_SafeLoader):  # its recursion is unbounded
@@ -129,7 +121,13 @@ def _read(data: bytes, source: str) -> Any:
         node = yaml.compose(data, Loader=_Loader)
         return None if node is None else _value(node)
     except yaml.YAMLError as exc:
-        raise ParameterError(f'{source}: not YAML: {_in_words(exc, data)}') from exc
+        raise ParameterError(f'{source}: not YAML: {_reason(exc, data)}') from exc
+
+
+class _Loader(_SafeLoader):  # type: ignore[misc]
+    """The safe loader, without the types that YAML 1.1 gives plain scalars."""
+
+    yaml_implicit_resolvers = {None: [(_PLAIN, re.compile('(?!$)', re.DOTALL))]}
 
 
 def _value(node: Any) -> Any:
@@ -157,28 +155,7 @@ def _wrong(where: Any, what: str) -> Exception:
     return error
 
 
-def _bytes_of(path: str | Path, largest: int) -> bytes:
-    """Return the bytes of a regular file of UTF-8 text; a pipe is rejected without waiting."""
-    try:
-        mode = Path(path).stat().st_mode
-        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            raise OSError(0, 'not a regular file')
-        with open(path, 'rb') as file:
-            data = file.read(largest + 1)
-        data[:largest].decode('utf-8')
-    except OSError as exc:
-        raise ParameterError(f'{path}: cannot be read: {exc.strerror}') from exc
-    except UnicodeDecodeError as exc:
-        if exc.end < largest:
-            raise ParameterError(f'{path}: cannot be read: not UTF-8 text') from exc
-    except (TypeError, ValueError) as exc:
-        raise ParameterError(f'{shown(str(path))}: cannot be read: {exc}') from exc
-    if len(data) > largest:
-        raise ParameterError(f'{path}: larger than {largest} bytes')
-    return data
-
-
-def _in_words(exc: Any, data: bytes) -> str:
+def _reason(exc: Any, data: bytes) -> str:
     """Return where and why a text is not YAML, with a likely correction."""
     mark = getattr(exc, 'problem_mark', None)
     if mark is None:  # an invalid character, with its position in bytes
@@ -187,13 +164,13 @@ def _in_words(exc: Any, data: bytes) -> str:
     lines = data.decode('utf-8', 'replace').splitlines()
     context = getattr(exc, 'context_mark', None) or mark
     hint = ''
-    for number in dict.fromkeys((context.line, mark.line - 1, mark.line)):
+    for number in (context.line, mark.line - 1, mark.line):
         text = lines[number] if 0 <= number < len(lines) else ''
         if '\t' in text[:len(text) - len(text.lstrip())]:
             hint = f'; line {number + 1} is indented with a tab: use spaces'
-            break
-        if missing := no_space(text):
+        elif missing := no_space(text):
             hint = f'; line {number + 1}: {missing}'
+        if hint:
             break
     problem = one_line(exc.problem)
     if problem.startswith('but '):
@@ -202,8 +179,209 @@ def _in_words(exc: Any, data: bytes) -> str:
 
 
 def no_space(text: str) -> str:
-    """Return the text that a space is missing after a colon; empty if it is not."""
+    """Return the remark that a space is missing after a colon; empty if it is not."""
     found = _NO_SPACE.match(text)
-    if not found:
-        return ''
-    return f'a space is missing after the colon of {shown_name(found["name"])}'
+    return f'a space is missing after the colon of {shown_name(found["name"])}' if found else ''
+
+
+# Sections
+
+def is_of_ros(name: str) -> bool:
+    """Return whether a parameter of this name is one that ROS itself declares in nodes."""
+    return name in _OF_ROS or name.startswith(_OF_ROS_PREFIX)
+
+
+def read_yaml(path: str | Path, node: str) -> dict[str, Any]:
+    """
+    Return the values of a ROS parameter file for a node, under dotted names.
+
+    Sections apply in the order of the file; a later one overrides an earlier one, as in ROS.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, breaks a rule, or holds no parameters for the node.
+
+    """
+    document = read_document(path)
+    values = dict(parameters_of(document, node, str(path)))
+    if not values:
+        raise _without_parameters(path, document, node)
+    return values
+
+
+def check_sections(path: str | Path, document: Mapping[str, Any], node: str) -> None:
+    """Raise ParameterError where a file has no parameters of any node: rcl rejects it."""
+    if document and not any(_all_sections(document)):
+        raise _without_parameters(path, document, node)
+
+
+def _without_parameters(
+        path: str | Path, document: Mapping[str, Any], node: str) -> ParameterError:
+    return ParameterError(f"{path}: holds {_listed(document)}, but no parameters under '/**:' or "
+                          f"'{node}:', 'ros__parameters:'")
+
+
+def other_nodes(path: str | Path, node: str) -> str:
+    """Return the sections of a file as text if none is for the node; else an empty text."""
+    names = [section for section, _ in _all_sections(read_document(path))]
+    return '' if any(_is_meant(name, node) for name in names) else _listed(names)
+
+
+def _listed(names: Iterable[Any]) -> str:
+    shown_names = [shown_name(name) for name in names]
+    return ', '.join(shown_names[:_LISTED] + ['...'] * (len(shown_names) > _LISTED))
+
+
+def parameters_of(document: Mapping[str, Any], node: str, source: str,
+                  ) -> Iterator[tuple[str, Any]]:
+    """
+    Yield the names and values of a document for a node, in their order.
+
+    Sections of other nodes are checked as well: rcl reads all of them, and may read them otherwise
+    than intended.
+    """
+    for name, content in document.items():
+        sections = list(_sections(name, content))
+        if not sections and _is_meant(name, node):
+            raise ParameterError(f"{source}: {shown_name(name)}: must hold 'ros__parameters:'")
+        for section, parameters in sections:
+            is_meant = _is_meant(section, node)
+            seen = set()
+            for parameter, value in flat(parameters, '', source):
+                if parameter in seen:
+                    raise ParameterError(
+                        f'{source}: {shown_name(parameter)}: given twice under '
+                        f'{shown_name(section)}')
+                seen.add(parameter)
+                if is_meant:
+                    check_given(parameter, value, source)
+                    if not is_of_ros(parameter):
+                        yield parameter, value
+
+
+def _all_sections(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for name, content in document.items():
+        yield from _sections(name, content)
+
+
+def _sections(name: str, content: Any) -> Iterator[tuple[str, Any]]:
+    """Yield names of nodes with their namespaces, and the content of ros__parameters."""
+    if not isinstance(content, dict):
+        return
+    for key, value in content.items():
+        if key == 'ros__parameters':
+            yield name, {} if value is None or value is BLANK else value
+        else:
+            yield from _sections(f'{name}/{key}', value)
+
+
+def _is_meant(section: str, node: str) -> bool:
+    """Return whether a section is for a node; in it /* matches one part of a name, /** any."""
+    pattern = re.escape(f'/{section.removeprefix("/")}')
+    pattern = re.sub(r'(/\\\*\\\*)+', r'(/\\w+)*', pattern).replace(r'/\*', r'/\w+')
+    return re.fullmatch(pattern, f'/{node.strip("/")}') is not None
+
+
+def flat(tree: Any, prefix: str, source: str) -> Iterator[tuple[str, Any]]:
+    """Yield dotted names and values of groups within groups."""
+    if not isinstance(tree, dict):
+        name = prefix or 'ros__parameters'
+        raise ParameterError(
+            f'{source}: {shown_name(name)}: {shown(tree)}: must hold names and values')
+    for key, value in tree.items():
+        name = f'{prefix}{key}'
+        if isinstance(value, dict):
+            yield from flat(value, f'{name}.', source)
+            continue
+        if isinstance(value, list) and any(isinstance(each, list | dict) for each in value):
+            raise ParameterError(
+                f'{source}: {shown_name(name)}: {shown(value)}: has a list or a group in the '
+                'list: write the numbers one after the other, [x1, y1, z1, x2, y2, z2]')
+        yield name, value
+
+
+def check_given(name: str, value: Any, source: str) -> None:
+    """Raise ParameterError for a value that rcl does not accept, with a likely correction."""
+    given = f'{source}: {shown_name(name)}'
+    if value == []:
+        raise ParameterError(f'{given}: []: ROS accepts no empty list: leave the name out')
+    if value is BLANK:
+        missing = no_space(name)  # {mass:0.5}
+        raise ParameterError(f'{given}: has no value' + (f'; {missing}' if missing else ''))
+    # ROS ignores a value of another type: the node would not use simulated time.
+    if name in _OF_ROS and not isinstance(value, bool):
+        raise ParameterError(f'{given}: {shown(value)}: must be a bool')
+
+
+# Writing
+
+def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[str, str],
+               head: str = '') -> None:
+    """
+    Write a ROS parameter file for any node, with comments, complete or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; an existing one is replaced.
+    values : mapping of dotted name to value
+        Texts, doubles, bools, or tuples of them; a tuple of length 1 is written as a single value.
+    comments : mapping of dotted name to str
+        Behind the values: units and more; may be empty.
+    head : str
+        Lines of comment before all others.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be written.
+
+    """
+    tree: dict[str, Any] = {}
+    for name, value in values.items():
+        *groups, last = name.split('.')
+        group = tree
+        for each in groups:
+            group = group.setdefault(each, {})
+        group[last] = value, comments[name]
+    lines = ['/**:', '  ros__parameters:', *_lines(tree, '    ')]
+    try:
+        write_files({Path(path): (head + '\n'.join([*lines, ''])).encode('utf-8')})
+    except (OSError, TypeError, ValueError) as exc:
+        reason = exc.strerror if isinstance(exc, OSError) else exc
+        raise ParameterError(f'{shown_name(path)}: cannot be written: {reason}') from exc
+
+
+def _lines(tree: Mapping[str, Any], indent: str) -> Iterator[str]:
+    """Yield the lines of a group."""
+    for name, content in tree.items():
+        if isinstance(content, dict):
+            yield f'{indent}{name}:'
+            yield from _lines(content, f'{indent}  ')
+            continue
+        value, text = content
+        entries = [_written(each) for each in (value if isinstance(value, tuple) else (value,))]
+        comment = f'  # {text}' if text else ''
+        if len(entries) == 1:
+            yield f'{indent}{name}: {entries[0]}{comment}'
+        elif len(entries) <= _LONGEST_ROW:
+            yield f'{indent}{name}: [{", ".join(entries)}]{comment}'
+        else:
+            yield f'{indent}{name}: [{comment}'
+            for n in range(0, len(entries), _ROW):
+                end = ']' if n + _ROW >= len(entries) else ','
+                yield f'{indent}  {", ".join(entries[n:n + _ROW])}{end}'
+
+
+def _written(value: Any) -> str:
+    """Return a value as YAML with the same meaning to rcl and to YAML 1.1."""
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, float):
+        text = repr(value)
+        return text if '.' in text else text.replace('e', '.0e')
+    if _NAME.fullmatch(value) and scalar(value) == value:
+        return str(value)
+    quoted = value.replace("'", "''")
+    return f"'{quoted}'"

@@ -43,6 +43,7 @@ from stewart_dynamics.reporting.plots import (
     base_wrench_plots, COLORS, measured_plots, motion_plots, spectrum_plots)
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.step import Batch, Outputs
+from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
 # A frame of the moving platform: position, rotation, lengths, forces.
@@ -168,7 +169,7 @@ class Report:
             rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), units=units(),
             most_times=_MOST_TIMES)
-        path.write_text(text, encoding='utf-8', errors='backslashreplace', newline='\n')
+        write_files({path: text})
 
     def _continued(self, angles: Array) -> Array:
         """Return angles [deg] without jumps at half a turn."""
@@ -237,7 +238,5 @@ def share_plotly(folder: Path) -> Path:
     path = folder.absolute() / f'plotly-{hashlib.sha256(script).hexdigest()[:12]}.min.js'
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f'.{path.name}.{os.getpid()}')
-        partial.write_bytes(script)
-        partial.replace(path)
+        write_files({path: script})
     return path

@@ -17,14 +17,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 import csv
+import io
 import math
 import os
 from pathlib import Path
-import tempfile
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
@@ -34,6 +33,7 @@ from stewart_dynamics.replay.summary_text import plural
 from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.spreadsheet import harmless
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
+from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
 
@@ -207,15 +207,14 @@ def _reasons(summary: dict[str, Any]) -> list[str]:
 
 
 def write_fleet(output: Path, rows: Sequence[Row]) -> None:
-    """Write fleet.csv and index.html into a folder, each complete or not at all."""
-    with _whole_file(output / FLEET_TABLE) as file:
-        # All text in quotes: spreadsheets that separate by semicolon do not split names.
-        table = csv.writer(file, quoting=csv.QUOTE_NONNUMERIC)
-        table.writerow([column.key for column in COLUMNS])
-        table.writerows([_harmless(column.key, row.get(column.key)) for column in COLUMNS]
-                        for row in rows)
-    with _whole_file(output / FLEET_PAGE) as file:
-        file.write(_page(output, rows))
+    """Write fleet.csv and index.html into a folder, both complete or not at all."""
+    text = io.StringIO(newline='')
+    # All text in quotes: spreadsheets that separate by semicolon do not split names.
+    table = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC)
+    table.writerow([column.key for column in COLUMNS])
+    table.writerows([_harmless(column.key, row.get(column.key)) for column in COLUMNS]
+                    for row in rows)
+    write_files({output / FLEET_TABLE: text.getvalue(), output / FLEET_PAGE: _page(output, rows)})
 
 
 def listed_results(table: Path) -> set[str] | None:
@@ -275,19 +274,3 @@ def _link(output: Path, row: Row) -> str | None:
     report = Path(str(row['results'])) / 'report.html'
     target = report if (output / report).is_file() else report.parent
     return quote(os.fsencode(target))
-
-
-@contextmanager
-def _whole_file(final: Path) -> Iterator[TextIO]:
-    """Yield a file that gets its final name only when it is complete."""
-    descriptor, name = tempfile.mkstemp(prefix=f'.{final.name}.', dir=final.parent)
-    partial = Path(name)
-    try:
-        # Names that are not UTF-8 are written with escapes.
-        with open(descriptor, 'w', newline='', encoding='utf-8',
-                  errors='backslashreplace') as file:
-            yield file
-        partial.chmod(0o644)
-        partial.replace(final)
-    finally:
-        partial.unlink(missing_ok=True)

@@ -52,13 +52,14 @@ from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
-from stewart_dynamics.reporting.results_folder import check_free, whole_folder, write_json
+from stewart_dynamics.reporting.results_folder import check_free, whole_folder
 from stewart_dynamics.setpoints import base_wrench, step, topics as inputs
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.outputs import OutputMessages
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.setpoints.step import Batch, Step
+from stewart_dynamics.whole_file import write_json
 
 _SECOND = 1_000_000_000
 _STAMP = re.compile(r'stamp (\d+) ns')

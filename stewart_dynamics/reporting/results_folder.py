@@ -25,13 +25,12 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 import fcntl
 import hashlib
-import json
 import os
 from pathlib import Path
 import re
 import shutil
 import tempfile
-from typing import Any, Protocol
+from typing import Protocol
 
 from stewart_dynamics.errors import BagError
 
@@ -73,6 +72,9 @@ def whole_folder(final: Path, options: Writing, result: str = RESULT) -> Iterato
             check_free(final, options, result)
             final.rename(replaced)
         partial.rename(final)
+    except OSError as exc:  # errors of writing to an open file have no name
+        exc.filename = str(exc.filename or final).replace(str(partial), str(final))
+        raise
     finally:
         if os.path.lexists(replaced) and not os.path.lexists(final):
             replaced.rename(final)  # its replacement was not completed
@@ -159,9 +161,3 @@ def check_free(folder: Path, options: Writing, result: str = RESULT) -> None:
     if not (folder / result).is_file():
         raise BagError(f'{folder}: exists already and is not a folder of {_KINDS[result]}: it is '
                        'not replaced')
-
-
-def write_json(path: Path, document: Any) -> None:
-    """Write a document; names that are not UTF-8 are written with escapes."""
-    path.write_text(json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + '\n',
-                    encoding='utf-8', errors='backslashreplace')

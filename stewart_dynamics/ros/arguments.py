@@ -20,8 +20,7 @@ from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.files import is_of_ros, parameters_of
-from stewart_dynamics.parameters.yaml_file import read_document
+from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read_document
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.parameter_set import ParameterSet

@@ -29,9 +29,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.files import is_of_ros, other_nodes
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes
 from stewart_dynamics.ros.arguments import given_parameters, parameter_files
 from stewart_dynamics.ros.rclpy_workarounds import describe_by, is_present, set_parameters_together
 

@@ -1,0 +1,128 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files of others, read within a bound, and files written as a whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+import errno
+import json
+import os
+from pathlib import Path
+import secrets
+import stat
+from typing import Any
+
+from stewart_dynamics.errors import shown, StewartError
+
+
+def read_text(path: str | Path, largest: int, error: type[StewartError]) -> str:
+    """
+    Return the text of a regular file of UTF-8.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; a pipe or a device is rejected without waiting for it.
+    largest : int
+        Largest size [bytes].
+    error : type
+        Class of the error that is raised.
+
+    Raises
+    ------
+    StewartError
+        In one line: the file cannot be read, is too large or is not UTF-8.
+
+    """
+    try:
+        with open(os.fspath(path), 'rb', opener=_without_waiting) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise OSError(errno.EINVAL, 'not a regular file')
+            data = file.read(largest + 1)
+    except OSError as exc:
+        raise error(f'{path}: cannot be read: {exc.strerror}') from exc
+    except (TypeError, ValueError) as exc:
+        raise error(f'{shown(str(path))}: cannot be read: {exc}') from exc
+    if len(data) > largest:
+        raise error(f'{path}: larger than {largest} bytes')
+    try:
+        return data.decode('utf-8')
+    except UnicodeDecodeError as exc:
+        raise error(f'{path}: cannot be read: not UTF-8 text') from exc
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe without waiting for its writer."""
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def write_files(files: Mapping[Path, str | bytes]) -> None:
+    """
+    Write files, all of them complete or none.
+
+    Each is written to the disk under another name in its folder; when all are complete, they take
+    their names. Existing files are replaced, and kept where writing fails. Text is UTF-8; names in
+    it that are not UTF-8 are written with escapes.
+
+    Raises
+    ------
+    OSError
+        With the name of the file that cannot be written.
+
+    """
+    partial: dict[Path, Path] = {}
+    try:
+        for path, content in files.items():
+            with named(path):
+                final = Path(path).resolve()  # the target of a link is replaced, not the link
+                partial[final] = final.with_name(f'.{secrets.token_hex(8)}.partial')
+                _write(partial[final], final, content)
+        for final, complete in partial.items():
+            with named(final):
+                complete.replace(final)
+    finally:
+        for left in partial.values():
+            left.unlink(missing_ok=True)
+
+
+def write_json(path: Path, document: Any) -> None:
+    """Write a document as JSON, complete or not at all."""
+    write_files({path: json.dumps(
+        document, indent=2, allow_nan=False, ensure_ascii=False) + '\n'})
+
+
+@contextmanager
+def named(path: str | Path) -> Iterator[None]:
+    """Name a file in errors of writing, which have no name or the name of a partial file."""
+    try:
+        yield
+    except OSError as exc:
+        raise type(exc)(exc.errno, exc.strerror, str(path)) from exc
+
+
+def _write(partial: Path, final: Path, content: str | bytes) -> None:
+    if final.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if final.exists() and not final.is_file():
+        raise OSError(errno.EINVAL, 'not a regular file')
+    with partial.open('xb') as file:
+        if final.exists():
+            os.fchmod(file.fileno(), stat.S_IMODE(final.stat().st_mode))
+        file.write(content.encode('utf-8', 'backslashreplace') if isinstance(content, str)
+                   else content)
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,177 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Files are written as a whole or not at all, and what is read is a bounded regular file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import resource
+import stat
+import sys
+
+import pytest
+from referees import ROOT
+from stewart_dynamics import ParameterError, Parameters, StewartError
+from stewart_dynamics.description.stewart_describe import main as describe
+from stewart_dynamics.replay.index import write_fleet
+from stewart_dynamics.replay.stewart_replay import main as replay
+from stewart_dynamics.reporting.results_folder import RESULT, whole_folder
+from stewart_dynamics.whole_file import read_text, write_files, write_json
+
+PLATFORM = ROOT / 'config' / 'platform.yaml'
+FULL = 2000  # [bytes]
+
+
+@contextmanager
+def full_disk(room: int = FULL) -> Iterator[None]:
+    """Let no file grow beyond ``room`` bytes: writing fails halfway, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # Python would cut its own files
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        yield
+    finally:
+        sys.dont_write_bytecode = kept
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Return the text of each file of a folder, hidden ones as well."""
+    return {path.name: path.read_text(encoding='utf-8') for path in folder.iterdir()}
+
+
+# Writing
+
+@pytest.mark.parametrize('write, name', [
+    (lambda folder: write_files({folder / 'a': 'x', folder / 'b': 'y' * 2 * FULL}), 'b'),
+    (lambda folder: write_json(folder / 'a.json', ['x' * 2 * FULL]), 'a.json'),
+    (lambda folder: Parameters.from_yaml(PLATFORM).to_yaml(folder / 'a.yaml'), 'a.yaml'),
+    (lambda folder: write_fleet(folder, []), 'index.html')])
+def test_on_a_full_disk_files_stay_as_they_were_and_the_error_names_one(
+        tmp_path: Path, write: Callable[[Path], None], name: str) -> None:
+    before = {'a': 'old', 'b': 'old', 'a.json': 'old', 'a.yaml': 'old', 'fleet.csv': 'old'}
+    for each, text in before.items():
+        (tmp_path / each).write_text(text)
+    with full_disk(500 if name == 'a.yaml' else FULL), pytest.raises(
+            (OSError, ParameterError)) as caught:
+        write(tmp_path)
+    assert f'{tmp_path / name}' in str(caught.value)
+    assert contents(tmp_path) == before
+
+
+def test_a_full_disk_leaves_no_partial_description(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ['--params', f'{PLATFORM}', '--output', f'{tmp_path}']
+    with full_disk():
+        assert describe(arguments) == 2
+    assert contents(tmp_path) == {}
+    assert describe(arguments) == 0
+    before = contents(tmp_path)
+    assert set(before) == {'platform.urdf', 'platform.sdf', 'platform.xml'}
+    capsys.readouterr()
+    with full_disk():
+        assert describe([*arguments, '--force', '--ros2-control', 'effort']) == 2
+        assert describe([
+            '--from', f'{tmp_path / "platform.urdf"}', '--output', f'{tmp_path}']) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].endswith(f'{tmp_path / "platform.urdf"}: cannot be written: File too large')
+    assert said[-1].endswith(f'{tmp_path / "platform.yaml"}: cannot be written: File too large')
+    assert contents(tmp_path) == before
+
+
+def test_a_replay_on_a_full_disk_keeps_the_results_that_were_there(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [f'{ROOT / "bags" / "clear"}', '--params', f'{PLATFORM}', '--output',
+                 f'{tmp_path / "out"}']
+    assert replay(arguments) == 0
+    before = {path: path.read_bytes() for path in tmp_path.rglob('*') if path.is_file()}
+    capsys.readouterr()
+    with full_disk():
+        assert replay([*arguments, '--force']) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert f'{tmp_path / "out"}' in said
+    assert 'File too large' in said
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob('*') if path.is_file()}
+
+
+def test_an_error_in_a_folder_of_results_names_the_file_by_its_final_path(tmp_path: Path) -> None:
+    class Options:
+        force = False
+        run = 'one'
+
+    for write in (lambda folder: write_json(folder / RESULT, 'x' * 2 * FULL),
+                  lambda folder: (folder / RESULT).write_bytes(b'x' * 2 * FULL)):
+        with full_disk(), pytest.raises(OSError, match='File too large') as caught, whole_folder(
+                tmp_path / 'out', Options()) as folder:
+            write(folder)
+        assert str(caught.value.filename).startswith(f'{tmp_path / "out"}')
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_replaced_file_keeps_its_mode_and_a_link_its_target(tmp_path: Path) -> None:
+    target, link = tmp_path / 'target', tmp_path / 'link'
+    target.write_text('old')
+    target.chmod(0o640)
+    link.symlink_to(target)
+    write_files({link: 'new', tmp_path / 'other': b'\xff'})
+    assert link.is_symlink()
+    assert target.read_text() == 'new'
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE((tmp_path / 'other').stat().st_mode) == 0o666 & ~umask
+    assert (tmp_path / 'other').read_bytes() == b'\xff'
+
+
+def test_a_folder_or_a_device_is_not_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'pipe')
+    (tmp_path / 'folder').mkdir()
+    for name, reason in (('pipe', 'not a regular file'), ('folder', 'Is a directory'),
+                         ('no/where', 'No such file')):
+        with pytest.raises(OSError, match=reason) as caught:
+            write_files({tmp_path / 'new': 'x', tmp_path / name: 'x'})
+        assert caught.value.filename == f'{tmp_path / name}'
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['folder', 'pipe']
+
+
+# Reading
+
+def test_a_regular_file_of_utf_8_is_read(tmp_path: Path) -> None:
+    file = tmp_path / 'file'
+    file.write_bytes('\u00fc\r\n'.encode())
+    assert read_text(file, 4, StewartError) == '\u00fc\r\n'
+    with pytest.raises(StewartError, match='file: larger than 3 bytes'):
+        read_text(file, 3, StewartError)
+
+
+@pytest.mark.parametrize('content', [b'\xff\xfe\x00a', 'text'.encode('utf-16'), b'a: \xc3'])
+def test_other_encodings_are_rejected(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / 'file').write_bytes(content)
+    with pytest.raises(ParameterError, match='file: cannot be read: not UTF-8 text'):
+        read_text(tmp_path / 'file', 100, ParameterError)
+
+
+def test_pipes_and_devices_are_rejected_without_waiting(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'pipe')
+    (tmp_path / 'link').symlink_to('/dev/zero')
+    for path in (tmp_path / 'pipe', Path('/dev/zero'), tmp_path / 'link'):
+        with pytest.raises(ParameterError, match='cannot be read: not a regular file'):
+            read_text(path, 100, ParameterError)
+    with pytest.raises(ParameterError, match='cannot be read: Is a directory'):
+        read_text(tmp_path, 100, ParameterError)
