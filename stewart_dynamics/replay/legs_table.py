@@ -22,16 +22,16 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import orjson
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.replay.csv_rows import rows_of, RowsProcess
 from stewart_dynamics.reporting.spreadsheet import harmless
 from stewart_dynamics.setpoints.step import Outputs
 
-# End of a row in legs.csv: no warning, warning.
-_ENDS = (b',0\n', b',1\n')
+# Rows from which on a second process formats them: it takes 0.1 s to start.
+_LONG = 100_000
 
 
 class Table(Protocol):
@@ -110,6 +110,8 @@ class CsvTable:
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
             joint_angles: bool = False) -> None:
         self._quasi_static = quasi_static
+        self._rows = 0
+        self._process: RowsProcess | None = None
         self._file = (folder / self.FILE).open('wb')
         names = [_quoted(harmless(name)) for name in column_names(legs, joint_angles)]
         self._file.write(','.join(names).encode() + b'\n')
@@ -120,20 +122,23 @@ class CsvTable:
         if not len(outputs.stamps):
             return
         numbers = _numbers(seconds, motions, outputs, base_wrenches, self._quasi_static)
-        text = orjson.dumps(numbers, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2]
-        if not np.isfinite(numbers).all():
-            text = text.replace(b'null', b'')
-        # '1,2],[3,4' becomes ',1,2' and ',3,4'
-        cells = [b''] * (3 * len(numbers))
-        cells[::3] = orjson.dumps(
-            outputs.stamps, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1].split(b',')
-        cells[1::3] = (b',' + text.replace(b'[', b'')).split(b']')
-        cells[2::3] = [_ENDS[on] for on in outputs.warnings.tolist()]
-        self._file.write(b''.join(cells))
+        block = outputs.stamps, numbers, outputs.warnings
+        self._rows += len(numbers)
+        if self._rows <= _LONG:
+            self._file.write(rows_of(*block))
+            return
+        if self._process is None:
+            self._file.flush()
+            self._process = RowsProcess(self._file)
+        self._process.write(*block)
 
     def close(self) -> None:
         """Complete the file."""
-        self._file.close()
+        try:
+            if self._process is not None:
+                self._process.close()
+        finally:
+            self._file.close()
 
 
 def _quoted(text: str) -> str:

@@ -52,6 +52,7 @@ from stewart_dynamics.replay.replay_options import code_of, Options
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
+from stewart_dynamics.replay.writer_thread import WriterThread
 from stewart_dynamics.reporting.results_folder import check_free, whole_folder
 from stewart_dynamics.setpoints import base_wrench, step, topics as inputs
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
@@ -192,6 +193,8 @@ class _Run:
             folder, parameters['joints'], self._quasi_static,
             any(parameters[name] is not None for name in OF_JOINTS))
         stack.callback(self._table.close)
+        self._writer = WriterThread()
+        stack.callback(self._writer.abandon)
 
     def take(self, messages: Messages) -> int:
         """Process messages; return the number of setpoints answered."""
@@ -217,6 +220,7 @@ class _Run:
         if self._comparison is not None:
             self._efforts.check()
             self._compared(self._comparison.finish())
+        self._writer.finish()
         self._table.close()
         self._bag.close()
 
@@ -301,18 +305,21 @@ class _Run:
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
         base_wrenches = self._base_wrench.many(setpoints)
-        self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
         seconds = self._seconds(setpoints.stamps)
-        self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
-        breakdown = None
-        if self.report is not None and self._breakdown is not None:
-            breakdown = self._breakdown(
-                setpoints.motions, setpoints.wrenches, setpoints.bases)
-            self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
+        breakdown = None if self._breakdown is None else self._breakdown(
+            setpoints.motions, setpoints.wrenches, setpoints.bases)
+        self._writer.call(self._write, seconds, setpoints, outputs, base_wrenches, breakdown)
         self._summary.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(seconds, setpoints, outputs))
         return len(setpoints.stamps)
+
+    def _write(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
+               breakdown: Array | None) -> None:
+        self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
+        self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
+        if self.report is not None and breakdown is not None:
+            self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
 
     def _seconds(self, stamps: Stamps) -> Array:
         """Return the time since the first setpoint, never decreasing [s]."""
@@ -335,4 +342,4 @@ class _Run:
 
     def _compared(self, compared: Any) -> None:
         if self.report is not None and len(compared[0]):
-            self.report.add_measured(*compared)
+            self._writer.call(self.report.add_measured, *compared)
