@@ -30,7 +30,7 @@ from referees import random_parameters, rng, size_of
 
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.replay.residuals import Comparison
-from stewart_dynamics.replay.summary_text import measured_headline
+from stewart_dynamics.replay.summary_text import _measured_lines, measured_headline
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
 Array = NDArray[np.float64]
@@ -220,6 +220,18 @@ def test_a_contact_is_found_with_its_time_and_load() -> None:
     assert blow['axis'] == 'moment_x'
     assert blow['moment_n_m'][0] == pytest.approx(900.0, abs=30.0)
     assert contacts['resolution_s'] < 0.01
+
+
+def test_a_contact_of_one_sample_has_one_time_in_the_summary() -> None:
+    case = case_of(many=3000)
+    load = np.zeros((3000, 6))
+    load[[0, *range(1200, 1230)], 2] = -400.0
+    comparison = Comparison(case.parameters)
+    compared(comparison, case, (case.setpoints.stamps, case.forces(load)))
+    values = comparison.values()
+    lines = _measured_lines({'headline': '', **values})
+    assert [line.partition(':')[0] for line in lines if line.startswith('contact')] == [
+        'contact at t = 0.00 s', 'contact from t = 12.00 to 12.29 s']
 
 
 def test_a_payload_and_noise_are_no_contact() -> None:

@@ -1348,6 +1348,20 @@ def joint_state(stamp: int, names: Sequence[str], efforts: Sequence[float]) -> b
                                             np.array(efforts)), 'sensor_msgs/msg/JointState'))
 
 
+def test_measured_legs_that_are_not_compared_are_a_notice(tmp_path: Path) -> None:
+    of = motion(5)
+    for topic in ('/hexapod/state', '/stewart_dynamics/leg_states'):
+        of.insert(0, (topic, RECORDED, joint_state(0, PARAMETERS['joints'], [0.0] * 6)))
+    kind = 'sensor_msgs/msg/JointState'
+    bag = write_bag(tmp_path / 'bag', of, state=kind, leg_states=kind)
+    expected = ('/hexapod/state: not used; --measured compares the efforts of measured legs with '
+                'the computed forces')
+    for options, given in (((), [expected]), (('--measured', '/hexapod/state'), [])):
+        run(bag, tmp_path / 'out', '--force', '--no-report', *options)
+        summary = json.loads((tmp_path / 'out' / 'bag' / 'summary.json').read_text())
+        assert [each for each in summary['notices'] if '--measured' in each] == given
+
+
 def test_measured_forces_give_the_external_load(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     load = np.array([30.0, -10.0, -200.0, 5.0, 8.0, -4.0])

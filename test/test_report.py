@@ -24,6 +24,7 @@ import functools
 from html.parser import HTMLParser
 import json
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -137,12 +138,12 @@ class _Elements(HTMLParser):
         self.text += '' if self._hidden else f'{data} '
 
 
-def write_measured(given: Given, path: Path) -> None:
+def write_measured(given: Given, path: Path, pushed: slice = slice(200, 260)) -> None:
     """Write the report of a motion whose measured forces differ, and for a while by far."""
     report, comparison = given.report(measured=True), Comparison(PARAMETERS)
     forces = given.outputs.demanded_forces
     measured = forces + np.random.default_rng(1).normal(size=forces.shape)
-    measured[200:260] += 300.0
+    measured[pushed] += 300.0
     for compared in (
             comparison.add_measured(given.setpoints.stamps, measured),
             comparison.add_setpoints(given.seconds, given.setpoints, given.outputs),
@@ -387,6 +388,26 @@ def test_measured_forces_and_contacts_are_shown_and_drawn(tmp_path: Path) -> Non
     text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
     assert 'Measured against computed' in text
     assert 'Contact, most in' in text
+
+
+def test_every_section_with_tables_has_a_link(tmp_path: Path) -> None:
+    given = trajectory('clear')
+    for name, write in (('plain', given.write),
+                        ('measured', functools.partial(write_measured, given))):
+        write(tmp_path / name)
+        page = (tmp_path / name).read_text(encoding='utf-8')
+        sections = set(re.findall(r'<section id="(\w+)"', page))
+        links = set(re.findall(r'<a href="#(\w+)">', page.split('<nav>')[1].split('</nav>')[0]))
+        assert links == sections - {'verdict', 'notices'}
+        assert ('comparison' in links) is (name == 'measured')
+        assert 'force_breakdown' in links
+
+
+def test_a_contact_of_one_sample_has_no_end(tmp_path: Path) -> None:
+    given = trajectory('clear')
+    write_measured(given, tmp_path / 'report.html', slice(200, 201))
+    text = _Elements((tmp_path / 'report.html').read_text(encoding='utf-8')).text
+    assert 'one sample' in text
 
 
 def test_missing_plotly_is_reported_in_one_line(tmp_path: Path) -> None:
@@ -649,7 +670,8 @@ def test_hover_shows_the_time_at_the_cursor_of_every_plot(opened: Callable[..., 
 
 
 def test_nothing_is_wider_than_a_phone_or_paper(opened: Callable[..., Opened]) -> None:
-    report = opened(trajectory('clear'))
+    given = trajectory('clear')
+    report = opened(given, functools.partial(write_measured, given))
     report.page.set_viewport_size({'width': 390, 'height': 800})
     report.see('platform')
     assert report.page.evaluate('document.documentElement.scrollWidth') == 390

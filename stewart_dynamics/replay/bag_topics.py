@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 
 from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.description.joint_states import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
@@ -84,6 +85,12 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
              or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
         notices.append(f'{", ".join(base)}: not used: base.source is {parameters["base.source"]}')
+    legs = sorted(name for name, kind in recording.topics.items()
+                  if kind == _MEASURED_TYPE and name not in topics.values()
+                  and name not in (f'{options.node}/leg_states', f'{options.node}/{JOINT_STATES}'))
+    if legs and MEASURED not in topics:
+        notices.append(f'{", ".join(legs)}: not used; --measured compares the efforts of measured '
+                       'legs with the computed forces')
     return notices
 
 

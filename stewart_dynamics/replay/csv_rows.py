@@ -27,7 +27,7 @@ import os
 from struct import Struct
 import subprocess
 import sys
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 import orjson
@@ -103,12 +103,12 @@ class RowsProcess:
 def main() -> int:
     """Format blocks of rows until the input ends; return 0, or the number of an OSError."""
     try:
-        with open(1, 'wb', buffering=0) as out:
-            while len(head := sys.stdin.buffer.read(_HEAD.size)) == _HEAD.size:
+        with open(0, 'rb') as rows_in, open(1, 'wb', buffering=0) as out:
+            while len(head := rows_in.read(_HEAD.size)) == _HEAD.size:
                 rows, columns = _HEAD.unpack(head)
                 block = (np.empty(rows, dtype=np.int64), np.empty((rows, columns)),
                          np.empty(rows, dtype=bool))
-                if not all(map(_filled, block)):
+                if not all(rows_in.readinto(each.data) == each.nbytes for each in block):
                     break
                 text = memoryview(rows_of(*block))
                 while text:
@@ -116,8 +116,3 @@ def main() -> int:
     except OSError as exc:
         return exc.errno or 1
     return 0
-
-
-def _filled(array: np.ndarray[Any, Any]) -> bool:
-    """Fill an array from the input; return False where the input ends before."""
-    return sys.stdin.buffer.readinto(array.data.cast('B')) == array.nbytes

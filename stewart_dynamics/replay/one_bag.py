@@ -59,7 +59,7 @@ from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.outputs import OutputMessages
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
-from stewart_dynamics.setpoints.step import Batch, Step
+from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 from stewart_dynamics.whole_file import write_json
 
 _SECOND = 1_000_000_000

@@ -117,12 +117,17 @@ def _measured_lines(measured: Mapping[str, Any]) -> list[str]:
               f'force, RMS [N]: {rms}',
               'stewart_identify finds the payload and friction that fit the measured forces']
     contacts = measured['contacts']
-    lines += [f'contact from t = {each["from_s"]:.2f} to {each["to_s"]:.2f} s: external force '
+    lines += [f'contact {_span(each["from_s"], each["to_s"])}: external force '
               f'({", ".join(f"{part:.1f}" for part in each["force_n"])}) N'
               for each in contacts['strongest'][:_LISTED]]
     if contacts['count'] > _LISTED:
         lines.append(f'and {contacts["count"] - _LISTED} more contacts')
     return lines
+
+
+def _span(begin: float, end: float) -> str:
+    first, last = f'{begin:.2f}', f'{end:.2f}'
+    return f'at t = {first} s' if first == last else f'from t = {first} to {last} s'
 
 
 def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) -> list[str]:
