@@ -97,14 +97,21 @@ def test_a_rotation_at_constant_rate_is_interpolated_exactly(angle: float) -> No
     assert np.abs(got[:, 21:24]).max() < 1e-6
 
 
-def test_path_and_bend_are_within_their_bounds() -> None:
+def test_position_and_its_derivatives_are_within_their_bounds() -> None:
     between, durations, _ = some(1.0)
-    arm = 0.5
+    bounds = between.bounds(0.5)
     part = np.linspace(0.0, 1.0, 401)
     for n in range(MANY):
         rows = between.at(np.full(len(part), n), part)
-        way = np.linalg.norm(np.diff(rows[:, 0:3], axis=0), axis=1).sum()
-        assert way <= between.path_bound(arm)[n]
-        line = rows[0, 18:21] + part[:, None] * (rows[-1, 18:21] - rows[0, 18:21])
-        bend = np.linalg.norm(rows[:, 18:21] - line, axis=1).max()
-        assert bend <= between.bend_bound(arm)[n]
+        assert np.linalg.norm(np.diff(rows[:, 0:3], axis=0), axis=1).sum() <= bounds.path[n]
+        for columns, bound, deviation in (
+                (slice(0, 3), None, bounds.position_deviation),
+                (slice(12, 15), bounds.speed, bounds.velocity_deviation),
+                (slice(18, 21), bounds.acceleration, bounds.acceleration_deviation)):
+            values = rows[:, columns]
+            if bound is not None:
+                assert np.linalg.norm(values, axis=1).max() <= bound[n]
+            line = values[0] + part[:, None] * (values[-1] - values[0])
+            assert np.linalg.norm(values - line, axis=1).max() <= deviation[n]
+        jerk = np.diff(rows[:, 18:21], axis=0) / (durations[n] / 400.0)
+        assert np.linalg.norm(jerk, axis=1).max() <= bounds.jerk[n]

@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 import pytest
+from referees import random_direction, random_parameters, rng, rotation_about, size_of
 from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
@@ -103,7 +104,7 @@ def legs_of(parameters: Parameters, rows: Array) -> Array:
 
 
 def between_points(times: Sequence[int], rows: Array) -> tuple[Array, Array]:
-    """Return times and rows of motion of what the platform does between points, densely."""
+    """Return times and rows of the motion of the platform, sampled densely between points."""
     seconds = np.array(times) * 1e-9
     motion = motion_of(rows)
     between = Interpolation(np.diff(seconds), motion.rows)
@@ -187,6 +188,78 @@ def test_a_rate_exceeded_between_points_alone_is_found(whose: str, acceleration:
         {'limits.velocity_max': [1.01 * extremes[whose]]})).accepted
 
 
+def scaled(parameters: Parameters, size: float) -> Parameters:
+    """Return a hexapod of another size of the same materials, which no singularity stops."""
+    def times(power: float, *names: str) -> dict[str, Array]:
+        return {name: np.ravel(parameters[name]) * size ** power for name in names}
+
+    changed = {
+        **times(1.0, 'geometry.base_joints', 'geometry.platform_joints',
+                'platform.center_of_mass', 'legs.cylinder.center_of_mass',
+                'legs.piston.center_of_mass'),
+        **times(2.5, 'actuator.viscous_friction'),
+        **times(3.0, 'legs.cylinder.mass', 'legs.piston.mass', 'actuator.reflected_mass',
+                'actuator.coulomb_friction'),
+        **times(5.0, 'platform.inertia', 'legs.cylinder.inertia', 'legs.piston.inertia')}
+    return Parameters({
+        **changed, 'platform.mass': parameters['platform.mass'] * size ** 3,
+        'gravity': parameters['gravity'], 'singularity.stop_condition': 1e11,
+        'singularity.warn_condition': 1e11})
+
+
+def random_trajectory(parameters: Parameters, random: np.random.Generator) -> tuple[Array, Motion]:
+    """Return 2 to 5 points, 1e-4 to 0.2 of the size apart, at rest or not; 3 mm/s^2 and more."""
+    size, points = size_of(parameters), int(random.integers(2, 6))
+    step = size * 10.0 ** random.uniform(-4.0, -0.7)
+    duration = np.sqrt(step / 10.0 ** random.uniform(-2.5, 1.0)) * random.uniform(1.0, 4.0)
+    times = duration * np.cumsum([0.0, *random.uniform(0.5, 1.5, points - 1)])
+    times = np.rint(1e9 * times) * 1e-9
+    center = size * (np.array([0.0, 0.0, 1.0]) + 0.1 * random.normal(size=3))
+    turn = rotation_about(random_direction(random), random.uniform(0.0, 0.4))
+    rotations = [rotation_about(random_direction(random), random.uniform(0.0, step / size)) @ turn
+                 for _ in range(points)]
+    at_rest, steady = random.integers(2, size=2)
+    scales = (1 - at_rest) * np.array([1.0, 1.0 / size, 1 - steady, (1 - steady) / size])
+    derivatives = scales[:, None, None] * random.uniform(0.0, 1.0, (4, points, 1)) * random.normal(
+        size=(4, points, 3)) * step / duration
+    derivatives[2:] /= duration
+    return times, Motion(center + step * random.uniform(-1.0, 1.0, (points, 3)), rotations,
+                         *derivatives)
+
+
+@pytest.mark.parametrize('size', [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize(('reflected', 'weightless'), [
+    (0.0, False), (1.0, False), (70.0, False), (1.0, True)])
+def test_no_force_or_rate_is_missed_by_a_hundredth(
+        size: float, reflected: float, weightless: bool) -> None:
+    """The referee are 10,000 samples; reflected masses are up to 70 times the platform's."""
+    random = rng(int(10.0 * reflected) + weightless)
+    parameters = random_parameters(random)
+    change: dict[str, Array] = {
+        'actuator.reflected_mass': reflected * parameters['platform.mass'] * random.uniform(
+            0.5, 1.5, 6)}
+    if weightless:
+        change['gravity'] = np.zeros(3)
+    parameters = scaled(parameters.replaced(change), size)
+    platform = StewartPlatform(parameters)
+    for _ in range(10):
+        times, motion = random_trajectory(parameters, random)
+        between = Interpolation(np.diff(times), motion.rows)
+        part = np.linspace(0.0, 1.0, 10_000 // (len(times) - 1) + 1)
+        results = platform.solve(np.concatenate([
+            between.at(np.full(len(part), n), part) for n in range(len(times) - 1)]))
+        largest = np.abs(results[:, FORCES]).max()
+        assert check_planned_trajectory(platform, times, motion).force >= 0.99 * largest
+        for limit, exceeded, kept in (
+                ('limits.force_max', 0.99 * largest, 1.005 * largest),
+                ('limits.velocity_max', 0.99 * np.abs(results[:, RATES]).max(), math.inf)):
+            limited = StewartPlatform(parameters.replaced({limit: [exceeded]}))
+            assert check_planned_trajectory(limited, times, motion).limit == limit
+            if math.isfinite(kept):
+                limited = StewartPlatform(parameters.replaced({limit: [kept]}))
+                assert check_planned_trajectory(limited, times, motion).accepted
+
+
 @pytest.mark.parametrize('duration', [SECOND, SECOND // 100])
 def test_a_force_exceeded_between_points_alone_is_found(duration: int) -> None:
     """At rest at both ends, 10 cm or 0.2 mm apart: what moves it lies between."""
@@ -266,7 +339,7 @@ def yaw(angle: float, rate: float = 0.0, acceleration: float = 0.0) -> list[floa
 
 
 def parabola(start: float, top: float, duration: int, ways: int) -> tuple[list[int], Array]:
-    """Return times and points of a turn up to an angle [deg] and back, in so many ways."""
+    """Return times and points of a turn up to an angle [deg] and back, in equal intervals."""
     rate = 4.0 * (top - start) / (duration * 1e-9)
     bend = -2.0 * rate / (duration * 1e-9)
     times = [duration * n // ways for n in range(ways + 1)]
@@ -450,8 +523,8 @@ def test_a_crossing_within_a_dip_of_the_determinant_is_found() -> None:
     assert result.time == pytest.approx(dense[np.argmax(crossed)], abs=1e-3)
 
 
-@pytest.mark.parametrize(('depth', 'closer'), [(0.05, False), (0.15, True)])
-def test_samples_are_made_closer_where_the_determinant_dips_by_a_tenth(
+@pytest.mark.parametrize(('depth', 'closer'), [(0.002, False), (0.05, True), (0.15, True)])
+def test_samples_are_made_closer_where_the_determinant_dips(
         monkeypatch: pytest.MonkeyPatch, depth: float, closer: bool) -> None:
     accepted, samples = solved_rows(dipping(0.1, depth, 0.0), monkeypatch)
     assert accepted

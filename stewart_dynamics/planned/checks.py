@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
 from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
@@ -34,6 +35,7 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.cubics import Cubics
+from stewart_dynamics.planned.sampling import TOLERANCE
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 
 # Where |det(J)| falls below this part of its values at two samples, the samples between them are
@@ -81,10 +83,12 @@ class Checks:
         self.violations: list[Violation] = []
         self.condition_number, self.condition_time = 0.0, 0.0
         self.force, self.force_leg, self.load = -1.0, 0, 0.0
+        self._strongest = np.zeros(6)
         self._joints = parameters['joints']
         self._limits = Limits(parameters)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
+        self._coulomb = parameters['actuator.coulomb_friction']
 
     def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
               ) -> list[int]:
@@ -102,12 +106,13 @@ class Checks:
         joined : (M - 1,)
             The next one follows it in the trajectory.
         near : (M - 1,)
-            The next one is so near that det(J) between the two follows from its values there.
+            The next one is so near that det(J) and forces between the two follow from their
+            values there.
 
         Returns
         -------
         list of int
-            After which samples det(J) needs closer samples.
+            After which samples det(J) or the forces need closer samples.
 
         """
         finite = np.isfinite(results).all(axis=1)
@@ -123,7 +128,8 @@ class Checks:
                               (VELOCITY_MAX, results[:, RATES]), (FORCE_MAX, results[:, FORCES])):
             self._check_limit(limit, values, np.broadcast_to(times[:, None], values.shape))
         self._check_cubics(times, durations, results, joined)
-        return self.check_singularities(times, durations, results, near)
+        unclear = self.check_singularities(times, durations, results, near)
+        return sorted({*unclear, *self._reversals(durations, results, near)})
 
     def check_joints(self, times: Array, durations: Array, motions: Array, joined: Flags) -> None:
         """
@@ -168,10 +174,39 @@ class Checks:
 
     def _keep_largest_force(self, forces: Array) -> None:
         magnitudes = np.abs(forces)
+        self._strongest = np.maximum(self._strongest, magnitudes.max(axis=0))
         largest = float(magnitudes.max())
         if largest > self.force:
             self.force, self.force_leg = largest, int(np.argmax(magnitudes)) % 6
         self.load = max(self.load, float((magnitudes / self._limits.force_max).max()))
+
+    def _exceed_known(self, forces: Array) -> Flags:
+        """Return where bounds of forces (M, 6) may change the largest force, or pass a limit."""
+        known = (1.0 + TOLERANCE) * np.minimum(
+            self.force, np.maximum(self._strongest, self._limits.force_max))
+        exceeding: Flags = (forces > known).any(axis=1)
+        return exceeding
+
+    def _reversals(self, durations: Array, results: Array, near: Flags) -> list[int]:
+        """Return after which samples a change of Coulomb friction may add to the largest force."""
+        forces = np.abs(results[:, FORCES])
+        which = np.flatnonzero(near & self._exceed_known(
+            np.maximum(forces[:-1], forces[1:]) + 2.0 * self._coulomb))
+        if not len(which) or not self._coulomb.any():
+            return []
+        here, there = results[which], results[which + 1]
+        middle = Cubics(
+            here[:, LENGTHS], there[:, LENGTHS], here[:, RATES] * durations[which, None],
+            there[:, RATES] * durations[which, None]).middle_rate() / durations[which, None]
+        of_rates = np.empty((3, len(which), 6))
+        for rates, its in zip((here[:, RATES], there[:, RATES], middle), of_rates, strict=True):
+            friction.friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb, its)
+        others = here[:, FORCES] - of_rates[0], there[:, FORCES] - of_rates[1]
+        highest = np.maximum(*others) + of_rates.max(axis=0)
+        lowest = np.minimum(*others) + of_rates.min(axis=0)
+        unclear: list[int] = which[
+            self._exceed_known(np.maximum(highest, -lowest))].tolist()
+        return unclear
 
     def _check_limit(self, limit: str, values: Array, times: Array) -> None:
         """Note the first of the values (M, 6) at their times that exceeds a limit."""
@@ -234,8 +269,10 @@ class Checks:
         lowest = np.fmin.reduce([smaller, *map(cubics.at, cubics.extrema())])
         # The condition number grows about as det(J) falls.
         predicted = np.maximum(condition[dips], condition[dips + 1]) * smaller
-        unclear: list[int] = dips[(lowest < DIP * smaller) | (
-            (lowest < smaller) & (predicted >= self._stop * lowest))].tolist()
+        forces = np.abs(results[:, FORCES])
+        forces = np.maximum(forces[dips], forces[dips + 1]) * (smaller / lowest)[:, None]
+        unclear: list[int] = dips[(lowest < DIP * smaller) | ((lowest < smaller) & (
+            (predicted >= self._stop * lowest) | self._exceed_known(forces)))].tolist()
         return unclear
 
     def _singular(self, time: float, result: Array, words: str) -> None:

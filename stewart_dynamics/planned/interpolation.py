@@ -29,7 +29,7 @@ estimation in robotics, 2018, arXiv:1812.01537, equation 145).
 from __future__ import annotations
 
 from math import comb, factorial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,30 @@ _SERIES = np.array([
         (1, 2, lambda n: 1), (1, 3, lambda n: 1),
         (-1, 4, lambda n: 2 * (n + 1)), (-1, 5, lambda n: 2 * (n + 1)))]
     for n in range(_TERMS)])
+
+
+class Bounds(NamedTuple):
+    """
+    Bounds of the motion of a point in each of N intervals, each (N,).
+
+    A deviation is from the straight line, in time, between the values at both ends. Rotations
+    enter by the derivatives of the rotation vector.
+    """
+
+    path: Array
+    """Length of the path [m]."""
+    speed: Array
+    """[m/s]"""
+    acceleration: Array
+    """[m/s^2]"""
+    jerk: Array
+    """[m/s^3]"""
+    position_deviation: Array
+    """[m]"""
+    velocity_deviation: Array
+    """[m/s]"""
+    acceleration_deviation: Array
+    """[m/s^2]"""
 
 
 class Interpolation:
@@ -85,9 +109,9 @@ class Interpolation:
             end_value - 2.0 * h / 5.0 * end_rate + h * h / 20.0 * end_acceleration,
             end_value - h / 5.0 * end_rate, end_value], axis=1)
 
-    def path_bound(self, arm: float) -> Array:
+    def bounds(self, arm: float) -> Bounds:
         """
-        Return a bound of the path length (N,) [m] of a point of the platform.
+        Return bounds of the motion of a point of the platform in each interval.
 
         Parameters
         ----------
@@ -95,21 +119,17 @@ class Interpolation:
             Distance of the point from the platform's origin [m].
 
         """
-        length: Array = _length(np.diff(self._control, axis=1), arm).sum(axis=1)
-        return length
-
-    def bend_bound(self, arm: float) -> Array:
-        """
-        Return a bound of how far the acceleration of such a point is from linear (N,) [m/s^2].
-
-        From the straight line, in time, between its values at the two points; without the terms
-        of the angular velocity.
-        """
-        h = self._durations[:, None, None]
-        acceleration = 20.0 * np.diff(self._control, n=2, axis=1) / (h * h)
-        line = acceleration[:, :1] + (acceleration[:, 3:] - acceleration[:, :1]) * _THIRDS
-        bend: Array = _length(acceleration[:, 1:3] - line, arm).max(axis=1)
-        return bend
+        h = self._durations
+        differences, steps = self._control, []
+        for _ in range(4):
+            differences = differences[:, 1:] - differences[:, :-1]
+            steps.append(_length(differences, arm))
+        first, second, third, fourth = (each.max(axis=1) for each in steps)
+        # Derivatives of order n are 5! / (5 - n)! h^-n times the n-th differences.
+        return Bounds(
+            steps[0].sum(axis=1), 5.0 * first / h, 20.0 * second / h ** 2,
+            60.0 * third / h ** 3, 20.0 / 8.0 * second, 60.0 / 8.0 * third / h,
+            120.0 / 8.0 * fourth / h ** 2)
 
     def at(self, which: Integers, fraction: NDArray[np.floating[Any]]) -> Array:
         """
@@ -151,7 +171,6 @@ class Interpolation:
         return rows
 
 
-_THIRDS = np.array([[1.0 / 3.0], [2.0 / 3.0]])
 _BINOMIAL = {degree: np.array([comb(degree, n) for n in range(degree + 1)], dtype=float)
              for degree in (3, 4, 5)}
 
@@ -166,8 +185,9 @@ def _bernstein(degree: int, fraction: NDArray[np.floating[Any]]) -> Array:
 
 def _length(steps: Array, arm: float) -> Array:
     """Return a bound of how far a point at a distance moves by position and rotation (..., 6)."""
-    length: Array = np.sqrt((steps[..., :3] ** 2).sum(axis=-1)) + arm * np.sqrt(
-        (steps[..., 3:] ** 2).sum(axis=-1))
+    # Four times as fast as sum().
+    x, y, z, rx, ry, rz = np.moveaxis(steps * steps, -1, 0)
+    length: Array = np.sqrt(x + y + z) + arm * np.sqrt(rx + ry + rz)
     return length
 
 

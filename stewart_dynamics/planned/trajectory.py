@@ -34,7 +34,7 @@ from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong_type
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics
+from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, joint_angles
@@ -44,11 +44,12 @@ from stewart_dynamics.planned.checks import Checks, Violation
 from stewart_dynamics.planned.cubics import Cubics
 from stewart_dynamics.planned.interpolation import Interpolation
 from stewart_dynamics.planned.result import PlannedTrajectory
+from stewart_dynamics.planned.sampling import Sampling
 
 # The machine code that a check needs.
 FUNCTIONS = (
     inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses,
-    joint_angles.joint_haversines)
+    joint_angles.joint_haversines, friction.friction)
 
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
@@ -60,11 +61,6 @@ _LARGE_PIECE = 16 * PIECE
 # A time_from_start holds less [s].
 _TIMES_END = 2 ** 31
 
-# Between two samples, a point of the platform at the characteristic length from its origin moves
-# by at most this part of that length, and its acceleration deviates from a straight line by at
-# most this [m/s^2], a hundredth of gravity.
-_STEP = 0.01
-_BEND = 0.1
 # Closer samples part an interval in so many, down to this part of the interval of two points.
 _PARTS = 16
 _CLOSEST = 1e-6
@@ -203,6 +199,7 @@ class _Work:
         self._legs = np.empty((len(times), 18))
         self._checks = Checks(self._parameters)
         self._legs_checks = Checks(self._parameters)
+        self._sampling = Sampling(self._parameters)
         self._samples = 0
 
     def check(self) -> Iterator[None]:
@@ -223,7 +220,7 @@ class _Work:
         durations = _seconds(np.diff(self._times[block]))
         with np.errstate(all='ignore'):
             between = Interpolation(durations, motions)
-            many = self._parts_between(first, between)
+            many = self._parts_between(first, durations, between, results)
         legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
         near = many == 1.0
         dips = self._checks.check(times, durations, results, np.ones_like(near), near)
@@ -297,12 +294,15 @@ class _Work:
                 times[:found], after[:found - 1], self._platform.solve(poses), joined)
             self._legs_checks.check_joints(times[:found], after[:found - 1], poses, joined)
 
-    def _parts_between(self, first: int, between: Interpolation) -> Array:
+    def _parts_between(self, first: int, durations: Array, between: Interpolation,
+                       results: Array) -> Array:
         """Return in how many parts each interval of points is sampled."""
-        arm = self._parameters['singularity.characteristic_length']
-        many: Array = np.ceil(np.maximum(
-            between.path_bound(arm) / (_STEP * arm), np.sqrt(between.bend_bound(arm) / _BEND)))
-        many = np.maximum(many, 1.0, dtype=float)
+        bases = self._bases
+        if bases is not None:
+            bases = bases[None] if bases.ndim == 1 else bases[first:first + len(results)]
+        largest = float(np.fmax.reduce(
+            np.abs(results[:, FORCES]), axis=None, initial=self._checks.force))
+        many = self._sampling.parts(durations, between, results, bases, largest)
         if not (bounded := many <= MOST_SAMPLES).all():
             n = first + int(np.argmin(bounded))
             raise self._too_far(f'{TOO_FAR}: points[{n}] and the next: more', n)

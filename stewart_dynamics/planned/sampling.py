@@ -1,0 +1,183 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The number of samples between two points of a planned trajectory.
+
+Enough that neither the largest force nor a length or rate past a limit is missed by more than
+1 %. Between two samples, a quantity q(u), u from 0 to 1 between the points, deviates from the
+straight line by at most |q''| / (8 n^2) if the interval has n parts. Lengths, rates and forces of
+the legs are bounded so from those at the points and from the derivatives of the platform's motion,
+with the inertia of the platform and its legs, the reflected masses and the friction of the
+actuators. An interval whose bounds stay below the limits and below the largest force that is
+already known needs no samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
+from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.mechanics.rows import (
+    BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.planned.interpolation import Bounds, Interpolation
+
+# Relative, of the largest force and of limits.force_max.
+TOLERANCE = 0.005
+# Between two samples, a point of the platform at the characteristic length from its origin moves
+# by at most this part of that length.
+_STEP = 0.01
+# At nearly one pose, forces are polynomials of at most 8th degree of time between two points: by
+# Markov's inequality this many parts find their largest value to 1 %, whatever it is.
+_ENOUGH = 64
+# An interval that needs samples has so many parts at least: cubics join lengths and rates at the
+# samples, and are then off by less than 1e-3.
+_FEWEST = 16
+
+
+class Sampling:
+    """
+    The number of samples that the trajectories of a hexapod need.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the hexapod, with its limits.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._arm = arm = float(parameters['singularity.characteristic_length'])
+        self._limits = Limits(parameters)
+        self._viscous = parameters['actuator.viscous_friction']
+        self._coulomb = parameters['actuator.coulomb_friction']
+        self._reflected = parameters['actuator.reflected_mass']
+        # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
+        radii = np.linalg.norm(parameters['geometry.platform_joints'], axis=1)
+        self._lever = np.maximum(1.0, radii / arm)
+        # Largest wrench |F| + |N| / arm at an acceleration |a| + arm |alpha| of the platform.
+        offset = float(np.linalg.norm(parameters['platform.center_of_mass'])) / arm
+        xx, _, _, yy, _, zz = parameters['platform.inertia']
+        self._platform_mass = (parameters['platform.mass'] * (1.0 + offset) ** 2
+                               + float(xx + yy + zz) / arm ** 2)
+        self._piston_mass = parameters['legs.piston.mass']
+        self._piston_center = parameters['legs.piston.center_of_mass']
+        cylinder_center = parameters['legs.cylinder.center_of_mass']
+        self._joint_inertia = (
+            parameters['legs.cylinder.mass'] * cylinder_center ** 2
+            + parameters['legs.cylinder.inertia'] + parameters['legs.piston.inertia'])
+
+    def parts(self, durations: Array, between: Interpolation, results: Array,
+              bases: Array | None, largest: float) -> Array:
+        """
+        Return in how many parts each of N intervals is sampled (N,).
+
+        Parameters
+        ----------
+        durations, between, results : (N,), Interpolation, (N + 1, RESULT)
+            Of the intervals [s], the motion in them, and the results at the points.
+        bases : (N + 1, BASE) or (1, BASE), optional
+            Rows of the base's motion at the points; by default it is still.
+        largest : float
+            Absolute force that is known to occur in the trajectory [N].
+
+        """
+        bounds = between.bounds(self._arm)
+        # Accelerations of the joints and along the legs due to speed.
+        inverse_radius = 1.0 / self._arm + 1.0 / _smaller(results[:, LENGTHS]).min(axis=1)
+        steps = bounds.path / (_STEP * self._arm)
+        forces = self._force_parts(durations, bounds, inverse_radius, results, bases, largest)
+        cubics = self._may_exceed_limits(durations, bounds, inverse_radius, results)
+        parts: Array = np.maximum(np.maximum(np.ceil(steps), forces),
+                                  np.where(cubics, float(_FEWEST), 1.0))
+        return parts
+
+    def _may_exceed_limits(self, durations: Array, bounds: Bounds, inverse_radius: Array,
+                           results: Array) -> Flags:
+        """Return in which intervals a length or a rate may exceed its limit (N,)."""
+        square = durations ** 2 / 8.0
+        length = bounds.position_deviation + square * bounds.speed ** 2 * inverse_radius
+        shortest, longest, fastest = self._limits.thresholds[:3]
+        lengths, length_deviation = results[:, LENGTHS], self._lever * length[:, None]
+        exceeding: Flags = (
+            (_smaller(lengths) - length_deviation < shortest)
+            | (_larger(lengths) + length_deviation > longest)
+            | (_larger(np.abs(results[:, RATES])) + self._rate_deviation(
+                durations, bounds, inverse_radius) > fastest)).any(axis=1)
+        return exceeding
+
+    def _rate_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array) -> Array:
+        """Return how far rates of the legs may be from the straight line (N, 6) [m/s]."""
+        speed = bounds.speed * inverse_radius
+        turning = 3.0 * speed * bounds.acceleration + speed ** 2 * bounds.speed
+        deviation: Array = self._lever * (
+            bounds.velocity_deviation + durations ** 2 / 8.0 * turning)[:, None]
+        return deviation
+
+    def _force_parts(self, durations: Array, bounds: Bounds, inverse_radius: Array,
+                     results: Array, bases: Array | None, largest: float) -> Array:
+        """Return in how many parts the forces ask for (N,)."""
+        rates, magnitudes = results[:, RATES], np.abs(results[:, FORCES])
+        rate_deviation = self._rate_deviation(durations, bounds, inverse_radius)
+        deviation = self._viscous * rate_deviation + self._inertia_deviation(
+            durations, bounds, inverse_radius, results, bases)
+        # Coulomb friction changes where a rate is, or may come, near zero.
+        changes = (_smaller(np.abs(rates)) - rate_deviation < COULOMB_RATE) | (
+            rates[:-1] * rates[1:] < 0.0)
+        friction = np.where(changes, 2.0 * self._coulomb, 0.0)
+        allowed = TOLERANCE * np.minimum(largest, self._limits.force_max)
+        relevant = _larger(magnitudes) + deviation + friction > np.minimum(
+            largest, self._limits.force_max) + allowed
+        needed = relevant & (deviation + friction > allowed)
+        parts: Array = np.where(needed, np.ceil(np.sqrt(deviation / allowed)).clip(
+            _FEWEST, _ENOUGH), 1.0).max(axis=1)
+        return parts
+
+    def _inertia_deviation(self, durations: Array, bounds: Bounds, inverse_radius: Array,
+                           results: Array, bases: Array | None) -> Array:
+        """Return how far the forces of all masses may be from the straight line (N, 6) [N]."""
+        # Beside the acceleration's own: speeds that change the directions, a pose that changes
+        # what a changing acceleration asks for, and a base that turns.
+        h, speed = durations, bounds.speed
+        condition = _larger(results[:, CONDITION])
+        changing = bounds.jerk * h
+        acceleration = bounds.acceleration_deviation + 0.25 * (
+            inverse_radius * ((bounds.acceleration * h) ** 2
+                              + 8.0 * speed * bounds.velocity_deviation)
+            + np.minimum(condition * bounds.path / self._arm, 1.0) * changing)
+        if bases is not None:
+            turning = np.sqrt((bases[:, BASE_ANGULAR_VELOCITY] ** 2).sum(axis=1))
+            turning = np.nan_to_num(_larger(turning) if len(turning) > 1 else turning)
+            acceleration += 2.0 * turning * bounds.velocity_deviation
+        length = _smaller(results[:, LENGTHS])
+        legs = self._piston_mass + (self._joint_inertia + self._piston_mass * (
+            _larger(results[:, LENGTHS]) - self._piston_center) ** 2) / length ** 2
+        mass = self._platform_mass + (legs * self._lever ** 2).sum(axis=1)
+        deviation: Array = (
+            _larger(results[:, UNIT_LOAD_FORCES]) * mass[:, None] + self._reflected * self._lever
+            ) * acceleration[:, None]
+        return deviation
+
+
+def _smaller(values: Array) -> Array:
+    """Return the smaller of the values at both ends of each interval."""
+    return np.minimum(values[:-1], values[1:])
+
+
+def _larger(values: Array) -> Array:
+    """Return the larger of the values at both ends of each interval."""
+    return np.maximum(values[:-1], values[1:])
