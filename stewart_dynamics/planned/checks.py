@@ -89,6 +89,7 @@ class Checks:
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
         self._coulomb = parameters['actuator.coulomb_friction']
+        self._coulomb_velocity = parameters['actuator.coulomb_velocity']
 
     def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
               ) -> list[int]:
@@ -200,7 +201,8 @@ class Checks:
             there[:, RATES] * durations[which, None]).middle_rate() / durations[which, None]
         of_rates = np.empty((3, len(which), 6))
         for rates, its in zip((here[:, RATES], there[:, RATES], middle), of_rates, strict=True):
-            friction.friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb, its)
+            friction.friction(np.ascontiguousarray(rates), np.zeros(6), self._coulomb,
+                              self._coulomb_velocity, its)
         others = here[:, FORCES] - of_rates[0], there[:, FORCES] - of_rates[1]
         highest = np.maximum(*others) + of_rates.max(axis=0)
         lowest = np.minimum(*others) + of_rates.min(axis=0)

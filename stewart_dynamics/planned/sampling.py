@@ -29,7 +29,6 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.limits import Limits
 from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, CONDITION, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
@@ -65,6 +64,7 @@ class Sampling:
         self._limits = Limits(parameters)
         self._viscous = parameters['actuator.viscous_friction']
         self._coulomb = parameters['actuator.coulomb_friction']
+        self._coulomb_velocity = parameters['actuator.coulomb_velocity']
         self._reflected = parameters['actuator.reflected_mass']
         # Largest speed of a platform joint at a speed |v| + arm |w| of the platform.
         radii = np.linalg.norm(parameters['geometry.platform_joints'], axis=1)
@@ -136,7 +136,7 @@ class Sampling:
         deviation = self._viscous * rate_deviation + self._inertia_deviation(
             durations, bounds, inverse_radius, results, bases)
         # Coulomb friction changes where a rate is, or may come, near zero.
-        changes = (_smaller(np.abs(rates)) - rate_deviation < COULOMB_RATE) | (
+        changes = (_smaller(np.abs(rates)) - rate_deviation < self._coulomb_velocity) | (
             rates[:-1] * rates[1:] < 0.0)
         friction = np.where(changes, 2.0 * self._coulomb, 0.0)
         allowed = TOLERANCE * np.minimum(largest, self._limits.force_max)
