@@ -22,6 +22,7 @@ from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from stewart_dynamics.capability.capability import Capability, Extent
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
     from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdown
@@ -38,12 +39,13 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 
 __all__ = [
-    'BagError', 'BaseMotion', 'ForceBreakdown', 'InverseDynamics', 'Motion', 'MotionError',
-    'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose', 'PoseError',
-    'SingularityError', 'StewartError', 'StewartPlatform', '__version__',
+    'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics', 'Motion',
+    'MotionError', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose',
+    'PoseError', 'SingularityError', 'StewartError', 'StewartPlatform', '__version__',
     'check_planned_trajectory']
 
 _MODULES = {
+    'capability.capability': ('Capability', 'Extent'),
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
     'mechanics.frames.base_motion': ('BaseMotion',),

@@ -1,0 +1,377 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How far a hexapod can go, what it can carry and exert at a pose, and how much faster a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.capability import travel
+from stewart_dynamics.capability.force_intervals import (
+    largest_multiple, quadratic_exit)
+from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.mechanics import limits
+from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
+from stewart_dynamics.mechanics.batch import compact, in_parts
+from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
+from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.platform_arguments import copies, motion_rows
+from stewart_dynamics.mechanics.rows import ACCELERATION, POSE, TWIST
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# Names of the codes of ``travel``.
+_ENDS = np.array(['length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max',
+                  'singularity', ''])
+
+
+class Extent(NamedTuple):
+    """
+    How far something can grow until the first limit of a hexapod.
+
+    Attributes
+    ----------
+    value : float or (...)
+        In the unit of the question; 0 where a limit is exceeded already, infinity where nothing
+        limits.
+    limit : str or (...)
+        Name of the limit without ``limits.``, or ``singularity``; empty where nothing limits.
+    leg : int or (...)
+        Index of the leg that reaches it; -1 for a singularity or nothing.
+    sample : int or None
+        Index of the sample of a motion at which it is reached.
+
+    """
+
+    value: Any
+    limit: Any
+    leg: Any
+    sample: int | None = None
+
+
+class Capability:
+    """
+    Answers to "possible?" and "how far?" of a hexapod: exact, without sampling.
+
+    J_inv is square, so leg forces are an affine function of a load, of an acceleration and of an
+    added mass: each question at a pose is six intervals. Poses and directions have any leading
+    shapes that broadcast against each other. A direction is six numbers, translation and rotation
+    (or force and moment), base axes; answers are multiples of it, so a unit vector gives meters,
+    radians, newtons.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        The hexapod; its ``limits.*`` that are not set do not limit.
+
+    Raises
+    ------
+    ParameterError
+        By all calls: no limit of the question is set; names them.
+    MotionError
+        By all calls: an argument has another type or shape, or is not finite.
+    SingularityError
+        By calls on forces: J_inv cannot be solved at a pose.
+
+    """
+
+    def __init__(self, platform: StewartPlatform) -> None:
+        if not isinstance(platform, StewartPlatform):
+            raise wrong_type('platform', platform, 'a StewartPlatform')
+        self.platform = platform
+        self._limits = limits.Limits(platform.parameters)
+        bounds = self._limits.bounds
+        self._bounds = np.array([
+            bounds.get(name, np.full(6, 0.0 if name == limits.LENGTH_MIN else math.inf))
+            for name in (limits.LENGTH_MIN, limits.LENGTH_MAX, *limits.OF_JOINTS)])
+        angles = angles_to_check(platform.parameters, self._limits.of_joints)
+        self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
+        self._frictionless = StewartPlatform(platform.parameters.replaced({
+            'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}))
+
+    def travel(self, pose: Pose | Motion, direction: ArrayLike, pivot: ArrayLike | None = None,
+               ) -> Extent:
+        """
+        Return how far the platform can move from a pose until the first limit.
+
+        Lengths, joint angles, and the condition number of J_inv up to
+        ``singularity.stop_condition``, which comes before det(J) = 0. No limit is exceeded before
+        the answer: one that is left and entered again is not passed.
+
+        Parameters
+        ----------
+        pose : Pose or Motion
+            Start of the travel, (...).
+        direction : (..., 6)
+            Translation [m] and rotation vector [rad] for a travel of 1, base axes.
+        pivot : (..., 3), optional
+            Point that the platform turns about, platform frame [m]; by default its origin.
+
+        """
+        directions = _directions(direction)
+        pivots = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
+        shape = common_shape(pose=pose.shape, direction=directions.shape[:-1],
+                             pivot=pivots.shape[:-1])
+        rows = motion_rows(pose, shape)
+        found = self._travels(rows, copies(directions, shape), copies(pivots, shape))
+        return _extent(*(each.reshape(shape) for each in found))
+
+    def _travels(self, rows: Array, directions: Array, pivots: Array,
+                 ) -> tuple[Array, Any, Integers]:
+        values = np.empty(len(rows))
+        codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
+
+        def solve(constants: Array, rows: Array, directions: Array, pivots: Array, *written: Any,
+                  ) -> None:
+            travel.travels(constants, self._axes, self._bounds,
+                           self.platform.parameters['singularity.stop_condition'], rows, directions,
+                           pivots, *written)
+
+        in_parts(solve, self.platform.constants, compact(rows), compact(directions),
+                 compact(pivots), values, codes, legs, scratch=(6, travel.LEG))
+        return values, _ENDS[codes], legs
+
+    def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
+               ) -> Extent:
+        """
+        Return the largest wrench that the platform at rest can exert on its surroundings.
+
+        Applied as ``wrench = -value * direction`` to ``inverse_dynamics``, it brings the leg that
+        is named to its ``limits.force_max``.
+
+        Parameters
+        ----------
+        pose : Pose or Motion
+            Pose, (...).
+        direction : (..., 6)
+            Force [N] and moment [N m] at the platform's origin for a value of 1, base axes.
+        base : BaseMotion, optional
+            Motion or tilt of the base, as in ``inverse_dynamics``.
+
+        """
+        directions = _directions(direction)
+        return self._multiple(self._at_rest(pose, base), self._per_wrench(pose, directions))
+
+    def force(self, pose: Pose | Motion) -> Array | float:
+        """Return the force (...) [N] that the platform at rest can exert in every direction."""
+        return self._in_every_direction(pose, slice(0, 3))
+
+    def moment(self, pose: Pose | Motion) -> Array | float:
+        """Return the moment (...) [N m] that it can exert about every axis, at its origin."""
+        return self._in_every_direction(pose, slice(3, 6))
+
+    def velocity(self, pose: Pose | Motion, direction: ArrayLike) -> Extent:
+        """Return the largest twist along a direction (..., 6) that ``velocity_max`` permits."""
+        fastest = self._required(limits.VELOCITY_MAX)
+        rates = np.einsum('...ij,...j->...i', self.platform.inverse_jacobian(pose),
+                          _directions(direction))
+        return _smallest(largest_multiple(np.zeros(6), rates, fastest), 'velocity_max')
+
+    def acceleration(self, pose: Pose | Motion, direction: ArrayLike,
+                     motion: Motion | None = None) -> Extent:
+        """
+        Return the largest acceleration along a direction that ``force_max`` permits.
+
+        Parameters
+        ----------
+        pose : Pose or Motion
+            Pose, (...).
+        direction : (..., 6)
+            Acceleration of the platform's origin [m/s^2] and angular acceleration [rad/s^2] for a
+            value of 1, base axes.
+        motion : Motion, optional
+            Its twist is that of the platform; by default it is at rest.
+
+        """
+        directions = _directions(direction)
+        inertial = np.einsum('...ij,...j->...i', self.platform.mass_matrix(pose), directions)
+        return self._multiple(self._at_rest(pose, None, motion), self._per_wrench(pose, inertial))
+
+    def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike) -> Extent:
+        """
+        Return the largest point mass that can be added to the platform [kg].
+
+        Parameters
+        ----------
+        motion : Pose or Motion
+            Poses at rest, with an answer for each; or a motion, with one answer for all samples.
+        center_of_mass : (3,)
+            Place of the added mass, platform frame [m].
+
+        """
+        center = as_array('center_of_mass', center_of_mass, (3,))
+        moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
+        forces = self.platform.inverse_dynamics(moving).forces
+        matrix = self.platform.regressor(moving).matrix[..., PLATFORM]
+        mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
+        per_mass = matrix @ mass
+        return self._multiple(forces, per_mass, whole=isinstance(motion, Motion))
+
+    def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
+                     base: BaseMotion | None = None) -> Extent:
+        """
+        Return how much faster a motion can be played until the first limit.
+
+        Played k times as fast, leg rates are k times as large, and leg forces
+        ``g + k c1 + k^2 c2`` with a Coulomb friction that is linear below
+        ``actuator.coulomb_velocity``: so the answer is the smallest root of all samples. Below 1
+        the motion is not possible as it is.
+
+        Parameters
+        ----------
+        motion : Motion
+            Samples of the motion, (...). Only these are looked at: see ``dense``.
+        wrench : (..., 6), optional
+            External wrench, which does not depend on the speed.
+        base : BaseMotion, optional
+            Motion of the base, likewise.
+
+        """
+        found = [self._speed_of_rates(motion), self._speed_of_forces(motion, wrench, base),
+                 self._of_path(motion)]
+        known = [each for each in found if each is not None]
+        if not known:
+            raise self._unlimited((limits.VELOCITY_MAX, limits.FORCE_MAX))
+        return min(known, key=lambda each: float(each.value))
+
+    def _of_path(self, motion: Motion) -> Extent | None:
+        """Return an extent of 0 where lengths or joint angles are exceeded at any speed."""
+        values = {limits.LENGTH_MIN: (lengths := self.platform.inverse_kinematics(motion)),
+                  limits.LENGTH_MAX: lengths}
+        if self._limits.of_joints:
+            values.update(zip(limits.OF_JOINTS, self.platform.joint_angles(motion), strict=True))
+        for name, each in values.items():
+            exceeded = self._limits.exceeds(name, each).reshape(-1, 6)
+            if exceeded.any():
+                sample, leg = (int(n) for n in np.argwhere(exceeded)[0])
+                return Extent(0.0, _short(name), leg, sample)
+        return None
+
+    def _speed_of_rates(self, motion: Motion) -> Extent | None:
+        fastest = self._limits.bounds.get(limits.VELOCITY_MAX)
+        if fastest is None:
+            return None
+        rates = self.platform.inverse_dynamics(motion, singular='nan').rates
+        return _of_all(largest_multiple(np.zeros(6), rates, fastest), 'velocity_max')
+
+    def _speed_of_forces(self, motion: Motion, wrench: ArrayLike | None,
+                         base: BaseMotion | None) -> Extent | None:
+        strongest = self._limits.bounds.get(limits.FORCE_MAX)
+        if strongest is None:
+            return None
+        rows = motion.rows
+        still, back = rows.copy(), rows.copy()
+        still[..., TWIST.start:] = 0.0
+        back[..., TWIST] = -rows[..., TWIST]
+        solved = self._frictionless.inverse_dynamics(motion, wrench, base)
+        constant, backward = (
+            self._frictionless.inverse_dynamics(Motion.of_rows(each), wrench, base).forces
+            for each in (still, back))
+        p = self.platform.parameters
+        linear = (solved.forces - backward) / 2.0 + p['actuator.viscous_friction'] * solved.rates
+        square = (solved.forces + backward) / 2.0 - constant
+        coulomb, band = p['actuator.coulomb_friction'], COULOMB_RATE
+        with np.errstate(divide='ignore'):
+            knee = np.where(coulomb > 0.0, band / np.abs(solved.rates), 0.0)
+        slope = np.where(knee > 0.0, coulomb * solved.rates / band, 0.0)
+        slow = quadratic_exit(constant, linear + slope, square, strongest, np.zeros(()), knee)
+        fast = quadratic_exit(constant + coulomb * np.sign(solved.rates), linear, square,
+                              strongest, knee, np.full((), math.inf))
+        return _of_all(np.minimum(slow, fast), 'force_max')
+
+    def _at_rest(self, pose: Pose | Motion, base: BaseMotion | None,
+                 motion: Motion | None = None) -> Array:
+        """Return the leg forces (..., 6) at a pose without acceleration."""
+        rows = np.zeros((*pose.shape, 24))
+        if motion is not None:
+            if not isinstance(motion, Motion):
+                raise wrong_type('motion', motion, 'a Motion')
+            rows = np.zeros((*common_shape(pose=pose.shape, motion=motion.shape), 24))
+            rows[..., TWIST] = motion.rows[..., TWIST]
+        rows[..., POSE] = pose.rows[..., POSE]
+        rows[..., ACCELERATION] = 0.0
+        return self.platform.inverse_dynamics(Motion.of_rows(rows), base=base).forces
+
+    def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
+        """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
+        transposed = np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2)
+        forces: Array = np.linalg.solve(transposed, wrenches[..., None])[..., 0]
+        return forces
+
+    def _multiple(self, forces: Array, change: Array, whole: bool = False) -> Extent:
+        """Return the largest multiple of a change of leg forces that ``force_max`` permits."""
+        multiples = largest_multiple(forces, change, self._required(limits.FORCE_MAX))
+        return (_of_all if whole else _smallest)(multiples, 'force_max')
+
+    def _in_every_direction(self, pose: Pose | Motion, part: slice) -> Array | float:
+        strongest = self._required(limits.FORCE_MAX)
+        forces = self._at_rest(pose, None)
+        inverse = np.linalg.inv(np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2))
+        reach = np.linalg.norm(inverse[..., part], axis=-1)
+        with np.errstate(divide='ignore'):
+            values = np.maximum((strongest - np.abs(forces)) / reach, 0.0).min(axis=-1)
+        return float(values) if values.ndim == 0 else values
+
+    def _required(self, limit: str) -> Array:
+        if limit not in self._limits.bounds:
+            raise self._unlimited((limit,))
+        return self._limits.bounds[limit]
+
+    def _unlimited(self, names: Sequence[str]) -> ParameterError:
+        return ParameterError(f'parameters: {", ".join(names)}: not set: without a limit there is '
+                              'no answer')
+
+
+def _directions(value: ArrayLike) -> Array:
+    directions = as_array('direction', value, (6,))
+    if not np.abs(directions).max(axis=-1).all():
+        raise MotionError('direction: all six numbers are zero')
+    return directions
+
+
+def _short(limit: str) -> str:
+    return limit.removeprefix('limits.')
+
+
+def _smallest(multiples: Array, limit: str) -> Extent:
+    """Return the smallest of six multiples of each sample (..., 6)."""
+    legs = multiples.argmin(axis=-1)
+    values = multiples.min(axis=-1)
+    limited = np.isfinite(values)
+    return _extent(values, np.where(limited, limit, ''), np.where(limited, legs, -1))
+
+
+def _of_all(multiples: Array, limit: str) -> Extent:
+    """Return the smallest of six multiples of all samples (..., 6)."""
+    flat = multiples.reshape(-1, 6)
+    sample, leg = divmod(int(flat.argmin()), 6)
+    if not math.isfinite(flat[sample, leg]):
+        return Extent(math.inf, '', -1)
+    return Extent(float(flat[sample, leg]), limit, leg, sample)
+
+
+def _extent(values: Array, names: Any, legs: Any) -> Extent:
+    if values.ndim == 0:
+        return Extent(float(values), str(names), int(legs))
+    return Extent(values, names, legs)

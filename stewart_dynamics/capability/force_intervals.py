@@ -1,0 +1,84 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Intervals in which leg forces stay within their bounds while something grows from zero."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.limits import TOLERANCE
+
+
+def largest_multiple(values: Array, changes: Array, bounds: Array) -> Array:
+    """
+    Return the largest t >= 0 with ``|values + t changes| <= bounds``.
+
+    Parameters
+    ----------
+    values, changes : (..., 6)
+        Leg forces or rates, and their change for t = 1.
+    bounds : (6,)
+        Largest magnitudes.
+
+    Returns
+    -------
+    (..., 6)
+        0 where the bound is exceeded at t = 0, infinity where it is never reached.
+
+    """
+    room = np.where(changes > 0.0, bounds - values, bounds + values)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        multiples = np.where(changes == 0.0, np.inf, room / np.abs(changes))
+    return np.where(np.abs(values) > bounds * (1.0 + TOLERANCE), 0.0, np.maximum(multiples, 0.0))
+
+
+def quadratic_exit(constant: Array, linear: Array, square: Array, bounds: Array, begin: Array,
+                   end: Array) -> Array:
+    """
+    Return the first k in [begin, end] from which ``|constant + k linear + k^2 square| > bounds``.
+
+    Parameters
+    ----------
+    constant, linear, square : (..., 6)
+        Coefficients of leg forces.
+    bounds : (6,)
+        Largest magnitudes.
+    begin, end : (..., 6) or ()
+        Ends of the interval of each leg.
+
+    Returns
+    -------
+    (..., 6)
+        ``begin`` where the bound is exceeded there, infinity where it is not exceeded up to
+        ``end``.
+
+    """
+    first = np.full(np.broadcast_shapes(constant.shape, begin.shape, end.shape), np.inf)
+    for sign in (1.0, -1.0):
+        # room = c + b k + a k^2 is positive within the bound
+        a, b, c = -sign * square, -sign * linear, bounds - sign * constant
+        with np.errstate(all='ignore'):
+            root = np.sqrt(b * b - 4.0 * a * c)
+            far = -0.5 * (b + np.copysign(root, b))
+            candidates = np.stack([far / a, c / far])
+            slopes = b + 2.0 * a * candidates
+            # room ends where it falls, or touches zero with a falling square
+            ends = (candidates >= begin) & (candidates <= end) & (
+                (slopes < 0.0) | ((slopes == 0.0) & (a < 0.0)))
+            outside = c + begin * (b + begin * a) < -TOLERANCE * bounds
+        found = np.where(ends, candidates, np.inf).min(axis=0)
+        first = np.minimum(first, np.where(outside, begin, found))
+    return first

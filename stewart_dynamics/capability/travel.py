@@ -1,0 +1,410 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Travel of the platform along a line or about an axis until the first limit; compiled.
+
+The platform moves from a pose by ``t`` times a direction ``[v; w]``: its pivot by ``t v``, and it
+turns by the rotation vector ``t w``, base axes. The end ``l_i(t)`` of each leg then moves as
+
+    l = A + t v + B cos(|w| t) + C sin(|w| t)
+
+with constant vectors A, B, C of the leg, so that its speed and acceleration are bounded by
+``V = |v| + |w| |B|`` and ``|w|^2 |B|``. Every limit is a function ``g(t) >= 0`` whose second
+derivative is bounded from below by such numbers: ``g(t + h) >= g + g' h - k h^2 / 2``. The largest
+``h`` that keeps this bound positive is a safe step: steps never pass a root, and converge to the
+first one quadratically, like Newton's method. So a limit that is left and entered again is not
+jumped over.
+
+The condition number of J_inv ends the travel as well. Singular values of a matrix change by no
+more than the norm of its change (Golub and Van Loan, Matrix Computations, 4th ed., 8.6.2), which
+is bounded as above: each evaluation clears an interval around it. Where such an interval is
+shorter than 1e-7 of the hexapod's size over its speed, the root is bracketed by the margin and the
+sign of det(J) instead.
+"""
+
+from __future__ import annotations
+
+import math
+
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
+    characteristic_length_of, joints_of)
+from stewart_dynamics.mechanics.matrix6 import (
+    gram, inverse_and_determinant, laguerre_step, Symmetric, tridiagonal)
+from stewart_dynamics.mechanics.rows import POSITION, ROTATION
+from stewart_dynamics.mechanics.vectors import (
+    add, cross, dot, read3, read9, rotate, scale, subtract, Vector3)
+
+LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, SINGULARITY, NOTHING = range(6)
+"""Codes of the limit that ends a travel."""
+
+# The constants of a leg: A, B, C, speed V and reach |B| of its platform joint; the axis of the
+# base joint; three parts each (kept, by cos, by sin) of the platform joint's axis and of its arm R p;
+# and, as scratch, a row of dJ/dt and a row of J^-1, J the scaled J_inv.
+_A, _B, _C, _SPEED, _REACH, _BASE_AXIS, _PLATFORM_AXIS, _ARM = 0, 3, 6, 9, 10, 11, 14, 23
+_ROW_RATE, _INVERSE, LEG = 32, 38, 44
+# A value within this of its limit, relative to the limit's own size, is on it.
+_ROUNDING = 1e-12
+# Steps end below this part of the way so far, or of the hexapod's size.
+_EXACT = 1e-16
+_MOST_STEPS = 500
+# Bounds of the second derivative of J_inv hold while a leg is longer than this part of its length.
+_SHORTER = 0.8
+# The condition number is certified by intervals down to this part of the hexapod's size.
+_NARROW = 1e-7
+
+
+@inlined
+def _length(a: Vector3) -> float:
+    return math.sqrt(dot(a, a))
+
+
+@inlined
+def _put3(array: Array, at: int, a: Vector3) -> None:
+    array[at], array[at + 1], array[at + 2] = a
+
+
+@inlined
+def _turned(array: Array, at: int, cosine: float, sine: float) -> Vector3:
+    """Return the vector of three parts (kept, by cos, by sin) that begin at a place."""
+    return (array[at] + cosine * array[at + 3] + sine * array[at + 6],
+            array[at + 1] + cosine * array[at + 4] + sine * array[at + 7],
+            array[at + 2] + cosine * array[at + 5] + sine * array[at + 8])
+
+
+@inlined
+def _change(array: Array, at: int, cosine: float, sine: float) -> Vector3:
+    """Return the derivative of that vector by the angle."""
+    return (cosine * array[at + 6] - sine * array[at + 3],
+            cosine * array[at + 7] - sine * array[at + 4],
+            cosine * array[at + 8] - sine * array[at + 5])
+
+
+@inlined
+def _put_turning(leg: Array, at: int, turns: bool, axis: Vector3, a: Vector3) -> None:
+    """Write the parts of a vector that a rotation about an axis keeps, and turns by cos, sin."""
+    along = scale(dot(axis, a), axis) if turns else a
+    _put3(leg, at, along)
+    _put3(leg, at + 3, subtract(a, along))
+    _put3(leg, at + 6, cross(axis, a))
+
+
+@compiled
+def _prepare(constants: Array, axes: Array, pose: Array, direction: Array, pivot: Array,
+             legs: Array) -> None:
+    """Write the constants of the six legs (6, LEG)."""
+    position, rotation = read3(pose, POSITION.start), read9(pose, ROTATION.start)
+    velocity, turn = read3(direction, 0), read3(direction, 3)
+    rate = _length(turn)
+    turns = rate > 0.0
+    axis = scale(1.0 / rate if turns else 0.0, turn)
+    center = add(position, rotate(rotation, read3(pivot, 0)))
+    for n in range(6):
+        leg = legs[n]
+        base_joint, platform_joint = joints_of(constants, n)
+        arm = rotate(rotation, subtract(platform_joint, read3(pivot, 0)))
+        _put_turning(leg, _A, turns, axis, arm)
+        leg[_REACH] = _length(read3(leg, _B))
+        leg[_SPEED] = _length(velocity) + rate * leg[_REACH]
+        _put3(leg, _A, add(subtract(center, base_joint), read3(leg, _A)))
+        _put3(leg, _BASE_AXIS, read3(axes[n], 0))
+        _put_turning(leg, _PLATFORM_AXIS, turns, axis, rotate(rotation, read3(axes[6 + n], 0)))
+        _put_turning(leg, _ARM, turns, axis, rotate(rotation, platform_joint))
+
+
+@compiled
+def _safe_step(value: float, slope: float, curvature: float) -> float:
+    """Return the largest h with value + slope h - curvature h^2 / 2 >= 0 on all of [0, h]."""
+    if curvature <= 0.0:
+        return -value / slope if slope < 0.0 else math.inf
+    root = math.sqrt(slope * slope + 2.0 * curvature * value)
+    return (slope + root) / curvature if slope > 0.0 else 2.0 * value / (root - slope)
+
+
+@compiled
+def _line(leg: Array, velocity: Vector3, rate: float, t: float) -> tuple[Vector3, Vector3]:
+    """Return the leg's vector l and its derivative by t."""
+    cosine, sine = math.cos(rate * t), math.sin(rate * t)
+    return (add(_turned(leg, _A, cosine, sine), scale(t, velocity)),
+            add(scale(rate, _change(leg, _A, cosine, sine)), velocity))
+
+
+@compiled
+def _end_of_length(leg: Array, velocity: Vector3, rate: float, bound: float, longest: bool,
+                   end: float) -> float:
+    """Return the first t in [0, end] at which a leg leaves a bound of its length, or end."""
+    curving = rate * rate * leg[_REACH]
+    speed = leg[_SPEED]
+    scale_of_t = bound / speed
+    t = 0.0
+    for _ in range(_MOST_STEPS):
+        line, change = _line(leg, velocity, rate, t)
+        length = _length(line)
+        slope = 2.0 * dot(line, change)
+        if longest:
+            value = (bound - length) * (bound + length)
+            slope = -slope
+            step = _safe_step(max(value, 0.0), slope,
+                              2.0 * (speed * speed + curving * bound))
+        else:
+            value = (length - bound) * (length + bound)
+            # while it moves by no more than its length, it is shorter than twice of it
+            step = min(_safe_step(max(value, 0.0), slope, 4.0 * curving * length),
+                       length / speed)
+        if value < -_ROUNDING * bound * bound:
+            return t
+        if step <= _EXACT * (t + scale_of_t):
+            return t
+        t += step
+        if t >= end:
+            return end
+    return t
+
+
+@compiled
+def _end_of_angle(leg: Array, velocity: Vector3, rate: float, bound: float, at_platform: bool,
+                  end: float) -> float:
+    """Return the first t in [0, end] at which a joint's angle exceeds its bound, or end."""
+    least = math.cos(bound)
+    speed = leg[_SPEED]
+    t = 0.0
+    for _ in range(_MOST_STEPS):
+        line, change = _line(leg, velocity, rate, t)
+        length = _length(line)
+        inverse = 1.0 / length
+        s = scale(inverse, line)
+        s_change = scale(inverse, subtract(change, scale(dot(s, change), s)))
+        # over a step of half the leg's length it stays longer than half of it
+        swing = 2.0 * speed * inverse
+        curvature = 2.0 * rate * rate * leg[_REACH] * inverse + 3.0 * swing * swing
+        if at_platform:
+            cosine, sine = math.cos(rate * t), math.sin(rate * t)
+            axis = _turned(leg, _PLATFORM_AXIS, cosine, sine)
+            slope = dot(axis, s_change) + rate * dot(_change(leg, _PLATFORM_AXIS, cosine, sine), s)
+            curvature += 2.0 * rate * swing + rate * rate
+        else:
+            axis = read3(leg, _BASE_AXIS)
+            slope = dot(axis, s_change)
+        value = dot(axis, s) - least
+        if value < -_ROUNDING:
+            return t
+        step = min(_safe_step(max(value, 0.0), slope, curvature), 0.5 * length / speed)
+        if step <= _EXACT * (t + length / speed):
+            return t
+        t += step
+        if t >= end:
+            return end
+    return t
+
+
+@compiled
+def _largest_eigenvalue(g: Symmetric) -> float:
+    trace = g[0][0] + g[1][0] + g[2][0] + g[3][0] + g[4][0] + g[5][0]
+    k = 1.0 / trace
+    t = tridiagonal(g)
+    kk = k * k
+    scaled = (k * t[0], k * t[1], k * t[2], k * t[3], k * t[4], k * t[5], kk * t[6], kk * t[7],
+              kk * t[8], kk * t[9], kk * t[10])
+    x = 1.0 + 1e-14
+    for _ in range(64):
+        nearer = laguerre_step(x, scaled)
+        if nearer == x:
+            break
+        x = nearer
+    return x * trace
+
+
+@compiled
+def _margin(constants: Array, legs: Array, velocity: Vector3, rate: float, stop: float, t: float,
+            ) -> tuple[float, float, float]:
+    """
+    Return the margin to a condition number, the step that it clears on both sides, and det(J).
+
+    With J the scaled J_inv, the margin is ``smallest - largest / stop`` of its singular values.
+    At t + h the matrix is ``J (1 + h J^-1 J') + R``, ``|R| <= k h^2 / 2``: so the smallest value
+    is at least ``smallest (1 - h |J^-1 J'|) - |R|``, the largest at most
+    ``largest + h |J'| + |R|``.
+    The bound k of J'' holds while no leg is shorter than _SHORTER of its length at t.
+    """
+    inverse_size = 1.0 / characteristic_length_of(constants)
+    cosine, sine = math.cos(rate * t), math.sin(rate * t)
+    bending = squares = quickest = 0.0
+    r0 = r1 = r2 = r3 = r4 = r5 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for n in range(6):
+        leg = legs[n]
+        line, change = _line(leg, velocity, rate, t)
+        inverse_length = 1.0 / _length(line)
+        s = scale(inverse_length, line)
+        s_rate = scale(inverse_length, subtract(change, scale(dot(s, change), s)))
+        arm = scale(inverse_size, _turned(leg, _ARM, cosine, sine))
+        arm_rate = scale(inverse_size * rate, _change(leg, _ARM, cosine, sine))
+        moment = cross(arm, s)
+        moment_rate = add(cross(arm_rate, s), cross(arm, s_rate))
+        squares += dot(s_rate, s_rate) + dot(moment_rate, moment_rate)
+        _put3(leg, _ROW_RATE, s_rate)
+        _put3(leg, _ROW_RATE + 3, moment_rate)
+        swing = leg[_SPEED] * inverse_length
+        quickest = max(quickest, swing)
+        swing /= _SHORTER
+        curve = rate * rate * leg[_REACH] * inverse_length / _SHORTER + 3.0 * swing * swing
+        reach = _length(arm)
+        moment_curve = reach * (rate * rate + 2.0 * rate * swing + curve)
+        bending += curve * curve + moment_curve * moment_curve
+        row = s[0], s[1], s[2], moment[0], moment[1], moment[2]
+        if n == 0:
+            r0 = row
+        elif n == 1:
+            r1 = row
+        elif n == 2:
+            r2 = row
+        elif n == 3:
+            r3 = row
+        elif n == 4:
+            r4 = row
+        else:
+            r5 = row
+    inverse, determinant = inverse_and_determinant(r0, r1, r2, r3, r4, r5)
+    largest = math.sqrt(_largest_eigenvalue(gram(r0, r1, r2, r3, r4, r5)))
+    smallest = 1.0 / math.sqrt(_largest_eigenvalue(gram(
+        inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5])))
+    for n in range(6):
+        legs[0, _INVERSE + n] = inverse[0][n]
+        legs[1, _INVERSE + n] = inverse[1][n]
+        legs[2, _INVERSE + n] = inverse[2][n]
+        legs[3, _INVERSE + n] = inverse[3][n]
+        legs[4, _INVERSE + n] = inverse[4][n]
+        legs[5, _INVERSE + n] = inverse[5][n]
+    relative = 0.0
+    for row_of_inverse in range(6):
+        for column in range(6):
+            product = 0.0
+            for n in range(6):
+                product += legs[row_of_inverse, _INVERSE + n] * legs[n, _ROW_RATE + column]
+            relative += product * product
+    margin = smallest - largest / stop
+    step = _safe_step(
+        max(margin, 0.0), -smallest * math.sqrt(relative) - math.sqrt(squares) / stop,
+        math.sqrt(bending) * (1.0 + 1.0 / stop))
+    return margin, min(step, (1.0 - _SHORTER) / quickest), determinant
+
+
+@compiled
+def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: float, stop: float,
+                      end: float) -> float:
+    """Return the first t in [0, end] at which the condition number is ``stop``, or end."""
+    margin, width, side = _margin(constants, legs, velocity, rate, stop, 0.0)
+    if margin <= 0.0:
+        return 0.0
+    fastest = 0.0
+    for n in range(6):
+        fastest = max(fastest, legs[n, _SPEED])
+    narrow = _NARROW * characteristic_length_of(constants) / fastest
+    t = width  # the margin is positive before it
+    for _ in range(40 * _MOST_STEPS):
+        if t >= end:
+            return end
+        # The next interval is cleared from its middle, where it reaches back to the last one.
+        middle = t + max(0.9 * width, narrow)
+        margin, cleared, sign = _margin(constants, legs, velocity, rate, stop, middle)
+        inside = margin > 0.0 and sign * side > 0.0
+        if inside and (middle - cleared <= t or width <= narrow):
+            width, t = cleared, middle + cleared
+        elif width > narrow:
+            width = 0.5 * max(min(width, cleared), narrow) if inside else 0.25 * width
+        else:
+            break  # the root is between t and the middle
+    low, high = t, t + narrow
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        margin, _, sign = _margin(constants, legs, velocity, rate, stop, middle)
+        if margin > 0.0 and sign * side > 0.0:
+            low = middle
+        else:
+            high = middle
+    return min(low, end)
+
+
+@compiled
+def _travel(constants: Array, bounds: Array, stop: float, legs: Array, direction: Array,
+            ) -> tuple[float, int, int]:
+    """Return t at the first limit, its code, and the leg (-1: none)."""
+    velocity = read3(direction, 0)
+    rate = _length(read3(direction, 3))
+    # a platform that only turns is back at its pose after one turn
+    whole = 2.0 * math.pi / rate if _length(velocity) == 0.0 else math.inf
+    end, limit, leg = whole, NOTHING, -1
+    for n in range(6):
+        if bounds[LENGTH_MAX, n] < math.inf:
+            t = _end_of_length(legs[n], velocity, rate, bounds[LENGTH_MAX, n], True, end)
+            if t < end:
+                end, limit, leg = t, LENGTH_MAX, n
+    for n in range(6):
+        if bounds[LENGTH_MIN, n] > 0.0:
+            t = _end_of_length(legs[n], velocity, rate, bounds[LENGTH_MIN, n], False, end)
+            if t < end:
+                end, limit, leg = t, LENGTH_MIN, n
+    for code in range(BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX + 1):
+        for n in range(6):
+            if bounds[code, n] < math.pi:
+                t = _end_of_angle(legs[n], velocity, rate, bounds[code, n],
+                                  code == PLATFORM_ANGLE_MAX, end)
+                if t < end:
+                    end, limit, leg = t, code, n
+    t = _end_of_condition(constants, legs, velocity, rate, stop, end)
+    if t < end:
+        end, limit, leg = t, SINGULARITY, -1
+    if limit == NOTHING:
+        end = math.inf
+    return end, limit, leg
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
+             'f8[::1]', 'i8[::1]', 'i8[::1]', 'f8[:,::1]')
+def travels(constants: Array, axes: Array, bounds: Array, stop: float, poses: Array,
+            directions: Array, pivots: Array, values: Array, limits: Integers, legs: Integers,
+            work: Array) -> None:
+    """
+    Write how far each pose can move in its direction.
+
+    Parameters
+    ----------
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
+    axes : (12, 3)
+        Axes of the joints, see ``joint_axes``; not read where an angle has no bound.
+    bounds : (4, 6)
+        Bounds of each leg by code: shortest and longest length [m], largest angles of base and
+        platform joint [rad]; 0 and infinity where there is no bound.
+    stop : float
+        Condition number that ends a travel.
+    poses : (N, MOTION)
+        Rows of motion, of which the pose is read.
+    directions : (N, 6)
+        Directions [v; w], base axes, not zero.
+    pivots : (N, 3)
+        Centers of rotation, platform frame [m].
+    values, limits, legs : (N,)
+        Written: multiple of the direction until the first limit, its code, and the leg; infinity,
+        NOTHING and -1 if nothing limits, leg -1 at a singularity.
+    work : (6, LEG)
+        Scratch memory.
+
+    """
+    for n in range(len(poses)):
+        _prepare(constants, axes, poses[n], directions[n], pivots[n], work)
+        values[n], limits[n], legs[n] = _travel(constants, bounds, stop, work, directions[n])

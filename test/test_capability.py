@@ -1,0 +1,322 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Capability: every answer is applied in the dynamics, or compared with dense sampling."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    random_direction, random_motion, random_parameters, rng, rotation_about, size_of)
+from stewart_dynamics import (
+    BaseMotion, Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
+from stewart_dynamics.arrays import Array
+
+CONFIG = Path(__file__).resolve().parent.parent / 'config'
+PLATFORM = StewartPlatform.from_yaml(CONFIG / 'platform.yaml')
+
+
+def limited(random: np.random.Generator, **more: Any) -> tuple[StewartPlatform, Pose]:
+    """Return a random hexapod with limits around a random pose that keeps them."""
+    parameters = random_parameters(random)
+    motion = random_motion(parameters, random, 1)
+    pose = Pose(motion.position[0], motion.rotation[0])
+    platform = StewartPlatform(parameters)
+    lengths = platform.inverse_kinematics(pose)
+    forces = platform.inverse_dynamics(Motion.from_pose(pose)).forces
+    return StewartPlatform(parameters.replaced({
+        'limits.length_min': lengths * random.uniform(0.7, 0.99, 6),
+        'limits.length_max': lengths * random.uniform(1.01, 1.3, 6),
+        'limits.velocity_max': random.uniform(0.1, 2.0, 6),
+        'limits.force_max': np.abs(forces).max() * random.uniform(1.01, 5.0, 6),
+        'singularity.stop_condition': 1e6, 'singularity.warn_condition': 1e5} | more)), pose
+
+
+def moved(pose: Pose, direction: Array, pivot: Array, by: Array) -> Pose:
+    """Return the poses of a travel, by matrix exponentials of their own."""
+    rate = float(np.linalg.norm(direction[3:]))
+    turns = np.array([rotation_about(direction[3:] / rate, rate * t) if rate else np.eye(3)
+                      for t in by])
+    center = pose.position + pose.rotation @ pivot
+    rotations = turns @ pose.rotation
+    return Pose(center + by[:, None] * direction[:3] - rotations @ pivot, rotations)
+
+
+def random_travel(random: np.random.Generator, size: float) -> tuple[Array, Array]:
+    """Return a translation, a rotation, or both, and a pivot."""
+    direction = np.concatenate([random_direction(random), random_direction(random) / size])
+    kind = random.integers(3)
+    if kind < 2:
+        direction[3 * kind:3 * kind + 3] = 0.0
+    return direction, size * random.uniform(-0.5, 0.5, 3)
+
+
+def test_the_wrench_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
+    for seed in range(200):
+        random = rng(seed)
+        platform, pose = limited(random)
+        capability = Capability(platform)
+        bounds = platform.parameters['limits.force_max']
+        for direction in random.normal(size=(5, 6)):
+            found = capability.wrench(pose, direction)
+            forces = platform.inverse_dynamics(
+                Motion.from_pose(pose), wrench=-found.value * direction).forces
+            ratios = np.abs(forces) / bounds
+            assert found.limit == 'force_max'
+            assert ratios.argmax() == found.leg
+            assert ratios.max() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_acceleration_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
+    for seed in range(100):
+        random = rng(seed)
+        platform, pose = limited(random)
+        twist = Motion(pose.position, pose.rotation, 0.1 * random.normal(size=3),
+                       0.1 * random.normal(size=3))
+        direction = random.normal(size=6)
+        for motion in (None, twist):
+            found = Capability(platform).acceleration(pose, direction, motion)
+            velocity = (np.zeros(3), np.zeros(3)) if motion is None else (
+                twist.linear_velocity, twist.angular_velocity)
+            forces = platform.inverse_dynamics(Motion(
+                pose.position, pose.rotation, *velocity, found.value * direction[:3],
+                found.value * direction[3:])).forces
+            ratios = np.abs(forces) / platform.parameters['limits.force_max']
+            if found.value > 0.0:
+                assert ratios.max() == pytest.approx(1.0, abs=1e-11)
+                assert ratios.argmax() == found.leg
+            else:
+                assert ratios.max() > 1.0
+
+
+def test_the_force_in_every_direction_is_the_smallest_of_all_directions() -> None:
+    random = rng()
+    platform, pose = limited(random)
+    capability = Capability(platform)
+    directions = np.array([random_direction(random) for _ in range(20000)])
+    for value, place in ((capability.force(pose), 0), (capability.moment(pose), 3)):
+        wrenches = np.zeros((len(directions), 6))
+        wrenches[:, place:place + 3] = directions
+        values = capability.wrench(pose, wrenches).value
+        assert value <= values.min()
+        assert value == pytest.approx(values.min(), rel=1e-2)
+
+
+def test_the_velocity_at_the_limit_brings_a_leg_to_its_largest_rate() -> None:
+    for seed in range(100):
+        random = rng(seed)
+        platform, pose = limited(random)
+        direction = random.normal(size=6)
+        found = Capability(platform).velocity(pose, direction)
+        rates = platform.inverse_jacobian(pose) @ (found.value * direction)
+        ratios = np.abs(rates) / platform.parameters['limits.velocity_max']
+        assert ratios.max() == pytest.approx(1.0, abs=1e-13)
+        assert ratios.argmax() == found.leg
+
+
+def test_the_payload_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
+    for seed in range(60):
+        random = rng(seed)
+        platform, pose = limited(random)
+        center = 0.3 * random.normal(size=3)
+        motion = random_motion(platform.parameters, random, 20)
+        for given in (pose, motion):
+            found = Capability(platform).payload(given, center)
+            if found.value == 0.0 or math.isinf(found.value):
+                continue
+            p = platform.parameters
+            mass, more = p['platform.mass'], found.value
+            both = (mass * p['platform.center_of_mass'] + more * center) / (mass + more)
+            six = p['platform.inertia']
+            inertia = np.array([[six[0], six[1], six[2]], [six[1], six[3], six[4]],
+                                [six[2], six[4], six[5]]])
+            for m, c in ((mass, p['platform.center_of_mass']), (more, center)):
+                d = c - both
+                inertia = inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
+            heavier = StewartPlatform(p.replaced({
+                'platform.mass': mass + more, 'platform.center_of_mass': both,
+                'platform.inertia': inertia[np.triu_indices(3)]}))
+            moving = given if isinstance(given, Motion) else Motion.from_pose(given)
+            ratios = np.abs(heavier.inverse_dynamics(moving).forces) / p['limits.force_max']
+            assert ratios.max() == pytest.approx(1.0, abs=1e-9)
+            assert ratios.reshape(-1, 6)[found.sample or 0].argmax() == found.leg
+
+
+@pytest.mark.parametrize('seed', range(24))
+def test_a_travel_ends_at_the_first_limit(seed: int) -> None:
+    random = rng(seed)
+    platform, pose = limited(random, **{
+        'limits.base_joint_angle_max': 0.6, 'limits.platform_joint_angle_max': 0.7,
+        'geometry.base_joint_axes': np.tile([0.0, 0.0, 1.0], 6),
+        'geometry.platform_joint_axes': np.tile([0.0, 0.0, 1.0], 6)} if seed % 2 else {})
+    p = platform.parameters
+    if seed % 2:  # the axes are the legs' directions at a pose nearby
+        legs = pose.position + platform.parameters['geometry.platform_joints'] @ (
+            pose.rotation.T) - p['geometry.base_joints']
+        axes = legs / np.linalg.norm(legs, axis=1)[:, None] + 0.1 * random.normal(size=(6, 3))
+        platform = StewartPlatform(p.replaced({
+            'geometry.base_joint_axes': axes.ravel(),
+            'geometry.platform_joint_axes': (axes @ pose.rotation).ravel()}))
+        p = platform.parameters
+    direction, pivot = random_travel(random, size_of(p))
+    found = Capability(platform).travel(pose, direction, pivot)
+
+    def margins(by: Array) -> Array:
+        poses = moved(pose, direction, pivot, by)
+        lengths = platform.inverse_kinematics(poses)
+        parts = [lengths - p['limits.length_min'], p['limits.length_max'] - lengths]
+        if seed % 2:
+            base, top = platform.joint_angles(poses)
+            parts += [p['limits.base_joint_angle_max'] - base,
+                      p['limits.platform_joint_angle_max'] - top]
+        condition = platform.inverse_dynamics(
+            Motion.from_pose(poses), singular='nan').condition_number
+        return np.column_stack([*parts, 1.0 - condition / p['singularity.stop_condition']])
+
+    dense = np.linspace(0.0, found.value, 5001)
+    assert margins(dense).min() >= -1e-12 * size_of(p)
+    at_end, behind = margins(np.array([found.value, found.value + 1e-7 * size_of(p)]))
+    names = np.repeat(['length_min', 'length_max', *(
+        ['base_joint_angle_max', 'platform_joint_angle_max'] if seed % 2 else [])], 6)
+    least = int(at_end.argmin())
+    assert abs(at_end[least]) < 1e-12 * max(size_of(p), 1.0)
+    assert behind[least] < 0.0
+    assert found.limit == (*names, 'singularity')[least]
+    assert found.leg == (least % 6 if least < len(names) else -1)
+
+
+@pytest.mark.parametrize('part', [0.5, 0.99, 1.0 - 1e-9])
+def test_a_limit_that_is_left_and_entered_again_is_not_passed(part: float) -> None:
+    """Leg 1 is too short for a part of the way, and longer at both ends of it."""
+    p = PLATFORM.parameters
+    home = PLATFORM.home_pose()
+    across = home.position + p['geometry.platform_joints'][0] - p['geometry.base_joints'][0]
+    distance = math.hypot(across[1], across[2])  # where the leg is in the plane of y and z
+    shortest = distance * math.sqrt(1.0 + 0.01 * (1.0 - part))
+    lengths = np.zeros(6)
+    lengths[0] = shortest
+    platform = StewartPlatform(p.replaced({
+        'limits.length_min': np.maximum(lengths, 1e-3), 'limits.length_max': 10.0}))
+    begin = Pose(home.position - [across[0] + 0.4, 0.0, 0.0], home.rotation)
+    found = Capability(platform).travel(begin, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert (found.limit, found.leg) == ('length_min', 0)
+    assert found.value == pytest.approx(0.4 - math.sqrt(shortest ** 2 - distance ** 2), abs=1e-7)
+
+
+def test_a_travel_ends_at_the_stop_condition_and_before_a_singularity() -> None:
+    platform = StewartPlatform(PLATFORM.parameters.replaced({
+        'limits.length_min': None, 'limits.length_max': None,
+        'limits.base_joint_angle_max': None, 'limits.platform_joint_angle_max': None}))
+    home = platform.home_pose()
+    sides = np.concatenate([np.eye(6), -np.eye(6)])
+    for stop in (20.0, 1e3, 1e6):
+        narrower = StewartPlatform(platform.parameters.replaced({
+            'singularity.stop_condition': stop, 'singularity.warn_condition': stop}))
+        found = Capability(narrower).travel(home, sides)
+        assert set(found.limit) == {'singularity'}
+        for n, direction in enumerate(sides):
+            by = np.append(np.linspace(0.0, found.value[n], 501),
+                           found.value[n] * (1.0 + 1e-8))
+            solved = platform.inverse_dynamics(Motion.from_pose(
+                moved(home, direction, np.zeros(3), by)), singular='nan')
+            assert solved.condition_number[:-1].max() <= stop * (1.0 + 1e-6)
+            assert solved.condition_number[-2] == pytest.approx(stop, rel=1e-6)
+            assert np.all(np.sign(solved.determinant[:-1]) == np.sign(solved.determinant[0]))
+
+
+def test_a_travel_from_outside_the_limits_is_zero() -> None:
+    home = PLATFORM.home_pose()
+    outside = Pose(home.position + [0.0, 0.0, 5.0], home.rotation)
+    found = Capability(PLATFORM).travel(outside, [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+    assert (found.value, found.limit) == (0.0, 'length_max')
+
+
+@pytest.mark.parametrize('seed', range(30))
+def test_a_motion_as_much_faster_as_it_can_be_reaches_its_limit(seed: int) -> None:
+    random = rng(seed)
+    platform, _ = limited(random)
+    motion = random_motion(platform.parameters, random, 50)
+    static = Motion(motion.position, motion.rotation)
+    parameters = platform.parameters.replaced({
+        'limits.length_min': None, 'limits.length_max': None,
+        'limits.force_max': 200.0 + 1.5 * np.abs(
+            platform.inverse_dynamics(static, singular='nan').forces).max(axis=0)})
+    platform = StewartPlatform(parameters)
+    wrench = 50.0 * random.normal(size=6)
+    found = Capability(platform).speed_factor(motion, wrench)
+
+    def ratio(factor: float) -> float:
+        faster = Motion(motion.position, motion.rotation, factor * motion.linear_velocity,
+                        factor * motion.angular_velocity,
+                        factor ** 2 * motion.linear_acceleration,
+                        factor ** 2 * motion.angular_acceleration)
+        solved = platform.inverse_dynamics(faster, wrench)
+        return max((np.abs(solved.rates) / parameters['limits.velocity_max']).max(),
+                   (np.abs(solved.forces) / parameters['limits.force_max']).max())
+
+    if found.value > 0.0:
+        assert ratio(found.value) == pytest.approx(1.0, abs=1e-9)
+        assert ratio(found.value * (1.0 + 1e-6)) > 1.0
+        assert max(ratio(k) for k in np.linspace(0.0, found.value, 200)) <= 1.0 + 1e-9
+    else:
+        assert ratio(0.0) > 1.0
+
+
+def test_answers_have_the_leading_shapes_of_poses_and_directions() -> None:
+    capability = Capability(PLATFORM)
+    home = PLATFORM.home_pose()
+    poses = Pose(home.position + np.zeros((4, 1, 3)), np.broadcast_to(home.rotation, (4, 1, 3, 3)))
+    for found in (capability.travel(poses, np.eye(6)), capability.wrench(poses, np.eye(6)),
+                  capability.velocity(poses, np.eye(6)),
+                  capability.acceleration(poses, np.eye(6))):
+        assert np.shape(found.value) == np.shape(found.limit) == np.shape(found.leg) == (4, 6)
+    assert np.shape(capability.force(poses)) == (4, 1)
+    one = capability.travel(home, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    assert (type(one.value), type(one.limit), type(one.leg)) == (float, str, int)
+
+
+def test_a_tilted_base_changes_the_wrench() -> None:
+    tilted = BaseMotion([3.0, 0.0, -9.3])
+    home = PLATFORM.home_pose()
+    direction = np.eye(6)[2]
+    found = Capability(PLATFORM).wrench(home, direction, tilted)
+    forces = PLATFORM.inverse_dynamics(
+        Motion.from_pose(home), wrench=-found.value * direction, base=tilted).forces
+    assert (np.abs(forces) / PLATFORM.parameters['limits.force_max']).max() == pytest.approx(
+        1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize('ask, text', [
+    (lambda c, home: c.wrench(home, np.eye(6)[0]), 'limits.force_max: not set'),
+    (lambda c, home: c.force(home), 'limits.force_max: not set'),
+    (lambda c, home: c.velocity(home, np.eye(6)[0]), 'limits.velocity_max: not set'),
+    (lambda c, home: c.payload(home, [0.0, 0.0, 0.0]), 'limits.force_max: not set'),
+    (lambda c, home: c.speed_factor(Motion.from_pose(home)),
+     'limits.velocity_max, limits.force_max: not set')])
+def test_a_question_without_a_limit_is_rejected(ask: Any, text: str) -> None:
+    unlimited = StewartPlatform(Parameters({
+        name: value for name, value in PLATFORM.parameters.given.items()
+        if not name.startswith('limits.')}))
+    with pytest.raises(ParameterError, match=text):
+        ask(Capability(unlimited), PLATFORM.home_pose())
+
+
+def test_a_direction_of_zeros_is_rejected() -> None:
+    with pytest.raises(MotionError, match='all six numbers are zero'):
+        Capability(PLATFORM).travel(PLATFORM.home_pose(), np.zeros(6))
