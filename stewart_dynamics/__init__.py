@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 __version__ = '0.1.0'
 
 __all__ = [
-    'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics', 'Motion',
-    'MotionError', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory', 'Pose',
-    'PoseError', 'SingularityError', 'StewartError', 'StewartPlatform', '__version__',
+    'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics',
+    'Motion', 'MotionError', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
+    'Pose', 'PoseError', 'SingularityError', 'StewartError', 'StewartPlatform', '__version__',
     'check_planned_trajectory']
 
 _MODULES = {

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How far a hexapod can go, what it can carry and exert at a pose, and how much faster a motion."""
+"""Travel, loads, rates and payload of a hexapod at a pose, and the speed of a motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,6 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
 from stewart_dynamics.mechanics.batch import compact, in_parts
-from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
@@ -142,11 +141,10 @@ class Capability:
         values = np.empty(len(rows))
         codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
 
-        def solve(constants: Array, rows: Array, directions: Array, pivots: Array, *written: Any,
-                  ) -> None:
-            travel.travels(constants, self._axes, self._bounds,
-                           self.platform.parameters['singularity.stop_condition'], rows, directions,
-                           pivots, *written)
+        stop = self.platform.parameters['singularity.stop_condition']
+
+        def solve(constants: Array, *arrays: Any) -> None:
+            travel.travels(constants, self._axes, self._bounds, stop, *arrays)
 
         in_parts(solve, self.platform.constants, compact(rows), compact(directions),
                  compact(pivots), values, codes, legs, scratch=(6, travel.LEG))
@@ -174,11 +172,11 @@ class Capability:
         return self._multiple(self._at_rest(pose, base), self._per_wrench(pose, directions))
 
     def force(self, pose: Pose | Motion) -> Array | float:
-        """Return the force (...) [N] that the platform at rest can exert in every direction."""
+        """Return the force [N] that the platform at rest can exert in every direction."""
         return self._in_every_direction(pose, slice(0, 3))
 
     def moment(self, pose: Pose | Motion) -> Array | float:
-        """Return the moment (...) [N m] that it can exert about every axis, at its origin."""
+        """Return the moment [N m] that the platform at rest can exert about every axis."""
         return self._in_every_direction(pose, slice(3, 6))
 
     def velocity(self, pose: Pose | Motion, direction: ArrayLike) -> Extent:
@@ -291,7 +289,7 @@ class Capability:
         p = self.platform.parameters
         linear = (solved.forces - backward) / 2.0 + p['actuator.viscous_friction'] * solved.rates
         square = (solved.forces + backward) / 2.0 - constant
-        coulomb, band = p['actuator.coulomb_friction'], COULOMB_RATE
+        coulomb, band = p['actuator.coulomb_friction'], p['actuator.coulomb_velocity']
         with np.errstate(divide='ignore'):
             knee = np.where(coulomb > 0.0, band / np.abs(solved.rates), 0.0)
         slope = np.where(knee > 0.0, coulomb * solved.rates / band, 0.0)

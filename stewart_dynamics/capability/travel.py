@@ -52,8 +52,8 @@ LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, SINGULARITY, NOTHING
 """Codes of the limit that ends a travel."""
 
 # The constants of a leg: A, B, C, speed V and reach |B| of its platform joint; the axis of the
-# base joint; three parts each (kept, by cos, by sin) of the platform joint's axis and of its arm R p;
-# and, as scratch, a row of dJ/dt and a row of J^-1, J the scaled J_inv.
+# base joint; three parts each (kept, by cos, by sin) of the platform joint's axis and of its arm
+# R p; and, as scratch, a row of dJ/dt and a row of J^-1, J the scaled J_inv.
 _A, _B, _C, _SPEED, _REACH, _BASE_AXIS, _PLATFORM_AXIS, _ARM = 0, 3, 6, 9, 10, 11, 14, 23
 _ROW_RATE, _INVERSE, LEG = 32, 38, 44
 # A value within this of its limit, relative to the limit's own size, is on it.
