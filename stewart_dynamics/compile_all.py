@@ -31,7 +31,7 @@ MODULES = (
     'mechanics.dynamics.base_wrench', 'mechanics.dynamics.friction',
     'mechanics.dynamics.regressor', 'mechanics.kinematics.forward_kinematics',
     'mechanics.kinematics.joint_angles', 'simulator.plant_dynamics', 'setpoints.step',
-    'external_wrench.estimate', 'bags.blocks', 'bags.mcap_scan')
+    'external_wrench.estimate', 'bags.blocks', 'bags.mcap_scan', 'capability.travel')
 """Those with functions that Python calls."""
 
 

@@ -23,14 +23,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
-from stewart_dynamics.mechanics.batch import compact, in_parts
+from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
@@ -133,11 +133,6 @@ class Capability:
         shape = common_shape(pose=pose.shape, direction=directions.shape[:-1],
                              pivot=pivots.shape[:-1])
         rows = motion_rows(pose, shape)
-        found = self._travels(rows, copies(directions, shape), copies(pivots, shape))
-        return _extent(*(each.reshape(shape) for each in found))
-
-    def _travels(self, rows: Array, directions: Array, pivots: Array,
-                 ) -> tuple[Array, Any, Integers]:
         values = np.empty(len(rows))
         codes, legs = (np.empty(len(rows), dtype=np.int64) for _ in range(2))
 
@@ -146,9 +141,9 @@ class Capability:
         def solve(constants: Array, *arrays: Any) -> None:
             travel.travels(constants, self._axes, self._bounds, stop, *arrays)
 
-        in_parts(solve, self.platform.constants, compact(rows), compact(directions),
-                 compact(pivots), values, codes, legs, scratch=(6, travel.LEG))
-        return values, _ENDS[codes], legs
+        in_parts(solve, self.platform.constants, rows, copies(directions, shape),
+                 copies(pivots, shape), values, codes, legs, scratch=(6, travel.LEG))
+        return _extent(values.reshape(shape), _ENDS[codes].reshape(shape), legs.reshape(shape))
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
                ) -> Extent:
@@ -314,8 +309,7 @@ class Capability:
     def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
         """Return the leg forces (..., 6) that balance wrenches (..., 6) alone."""
         transposed = np.swapaxes(self.platform.inverse_jacobian(pose), -1, -2)
-        forces: Array = np.linalg.solve(transposed, wrenches[..., None])[..., 0]
-        return forces
+        return np.asarray(np.linalg.solve(transposed, wrenches[..., None])[..., 0], dtype=float)
 
     def _multiple(self, forces: Array, change: Array, whole: bool = False) -> Extent:
         """Return the largest multiple of a change of leg forces that ``force_max`` permits."""
@@ -334,7 +328,8 @@ class Capability:
     def _required(self, limit: str) -> Array:
         if limit not in self._limits.bounds:
             raise self._unlimited((limit,))
-        return self._limits.bounds[limit]
+        bounds: Array = self._limits.bounds[limit]
+        return bounds
 
     def _unlimited(self, names: Sequence[str]) -> ParameterError:
         return ParameterError(f'parameters: {", ".join(names)}: not set: without a limit there is '
