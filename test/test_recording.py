@@ -49,7 +49,8 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics import BagError, Parameters
-from stewart_dynamics.bags.mcap_layout import LARGEST_CHUNK
+from stewart_dynamics.bags import mcap_file
+from stewart_dynamics.bags.blocks import LARGEST_CHUNK, LARGEST_MESSAGE
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
@@ -339,18 +340,21 @@ def test_chunks_are_in_order_although_a_time_in_a_head_is_wrong(tmp_path: Path) 
             assert is_part(found.messages, given_)
 
 
-def test_a_topic_that_two_records_declare_differently_is_not_used(tmp_path: Path) -> None:
+def test_records_that_contradict_each_other_are_damage(tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
-    content = chunk(message(2, 5) + message(3, 6), 5)
-    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'), channel(2, '/b'),
-                             channel(3, '/c'), content))
+    begin = schema(1, 'a/msg/A') + channel(2, '/a') + channel(3, '/c') + chunk(message(2, 4), 4)
+    content = file_of(begin, channel(2, '/b'), chunk(message(3, 6), 6))
+    file.write_bytes(content)
     found = read(file)
-    assert [topic for topic, _, _ in found.messages] == ['/c']
-    assert found.missing == ['bag.mcap: /b: declared differently by two records']
-    # also within a chunk
-    file.write_bytes(file_of(schema(1, 'a/msg/A'), channel(2, '/a'), channel(3, '/c'),
-                             chunk(channel(2, '/b') + message(2, 5) + message(3, 6), 5)))
-    assert [topic for topic, _, _ in read(file).messages] == ['/c']
+    assert [topic for topic, _, _ in found.messages] == ['/a']
+    assert found.missing == [f'bag.mcap: byte {content.index(channel(2, "/b"))} to the end: '
+                             'number 2 of two topics or types']
+    # also within a chunk, which is lost
+    file.write_bytes(file_of(begin, chunk(channel(2, '/b') + message(3, 5), 5),
+                             chunk(message(3, 6), 6)))
+    found = read(file)
+    assert [topic for topic, _, _ in found.messages] == ['/a', '/c']
+    assert 'number 2 of two topics or types' in found.missing[0]
 
 
 def test_messages_on_an_undeclared_channel_are_missing(tmp_path: Path) -> None:
@@ -582,9 +586,9 @@ def test_a_chunk_with_a_wrong_size_is_not_decompressed(
 
 def test_large_compressed_messages_do_not_fill_the_memory(tmp_path: Path) -> None:
     zeros = zstandard.ZstdCompressor().compress(bytes(1 << 24))
-    small = zstandard.ZstdCompressor().compress(bytes(1 << 20))
+    small = zstandard.ZstdCompressor().compress(bytes(LARGEST_MESSAGE))
     file = tmp_path / 'bag.mcap'
-    for frame, size in ((zeros, len(zeros)), (small, 1 << 20)):
+    for frame, size in ((zeros, len(zeros)), (small, LARGEST_MESSAGE)):
         given_ = [(f'{NODE}/{POSE}', RECORDED + n, frame) for n in range(150)]
         file.write_bytes(mcap(given_, compression=CompressionType.ZSTD))
         assert file.stat().st_size < 100_000
@@ -609,6 +613,65 @@ def test_a_chunk_that_is_too_large_is_missing(compression: str, tmp_path: Path) 
     assert len(found.missing) == 1
     assert f'at most {LARGEST_CHUNK} are read' in found.missing[0]
     assert peak_of(file) < 10_000_000
+
+
+def empty_messages(count: int, time: int) -> bytes:
+    return message(1, time, b'') * count
+
+
+def bomb(*contents: bytes, start: int = 5) -> bytes:
+    packer = zstandard.ZstdCompressor()
+    return file_of(schema(1, 'a/msg/A'), channel(1, '/a'), *(
+        chunk(content, start, compression='zstd', packed=packer.compress(content))
+        for content in contents))
+
+
+@pytest.mark.parametrize('contents', [
+    [empty_messages(1_000_000, 5)], [empty_messages(200_000, time) for time in range(5, 10)],
+    [empty_messages(300_000, 5)] * 4])
+def test_of_a_file_with_more_messages_than_bytes_the_first_are_read(
+        contents: list[bytes], tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    file.write_bytes(bomb(*contents))
+    size = file.stat().st_size
+    assert size < 20_000
+    found = read(file)
+    assert 80_000 < len(found.messages) < 100_000 + size
+    assert found.missing == ['bag.mcap: more messages than bytes: those after '
+                             f'{len(found.messages)} are not read']
+    found.messages.clear()
+    assert peak_of(file) < 200_000_000
+    # a few are no bomb, however well they are compressed
+    file.write_bytes(bomb(empty_messages(50_000, 5), empty_messages(40_000, 6)))
+    assert len(read(file).messages) == 90_000
+
+
+def test_chunks_that_overlap_wait_in_limited_memory(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / 'bag.mcap'
+    contents = [message(1, 7, bytes(1 << 20)) + message(1, 8 + n, bytes(1 << 20))
+                for n in range(20)]
+    file.write_bytes(bomb(*contents))
+    whole = read(file)
+    assert [when for _, when, _ in whole.messages] == [7] * 20 + list(range(8, 28))
+    assert not whole.missing
+    whole.messages.clear()
+    monkeypatch.setattr(mcap_file, '_MOST_WAITING', 1 << 23)
+    found = read(file)
+    times = [when for _, when, _ in found.messages]
+    assert times == sorted(times)
+    assert len(times) < 40
+    assert 'overlap in time by more than 8 MB' in found.missing[0]
+    found.messages.clear()
+    assert peak_of(file) < 40_000_000
+
+
+def test_many_small_chunks_of_equal_times(tmp_path: Path) -> None:
+    file = tmp_path / 'bag.mcap'
+    for content, count in ((b'', 0), (message(1, 5), 5000)):
+        file.write_bytes(file_of(
+            schema(1, 'a/msg/A'), channel(1, '/a'), chunk(content, 5) * 5000))
+        assert read(file) == ([('/a', 5, b'\0\1\0\0')] * count, [], [])
 
 
 def test_a_compressed_file_is_unpacked_up_to_a_limit(

@@ -13,46 +13,32 @@
 # limitations under the License.
 
 
-"""Recorded messages in blocks; merging, splitting and compacting of blocks."""
+"""Blocks of recorded messages: merging, splitting, and bringing to a good length."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.compilation.functions import entry_point
+from stewart_dynamics.messages.recorded import Messages
 import zstandard
 
+LATEST = int(np.iinfo(np.int64).max)
+# No recorder writes larger chunks; larger ones are not decompressed.
+LARGEST_CHUNK = 1 << 27
+# Larger than any setpoint or leg state; larger messages are not decompressed.
+LARGEST_MESSAGE = 1 << 16
 # Messages in a block: enough that the overhead of a numpy call is small, few enough that they fit
 # into the processor's cache.
-_FEWEST, _MOST = 4096, 16384
+_FEWEST, IN_A_BLOCK = 4096, 16384
 # Bytes from which a block may have fewer messages.
-_MOST_BYTES = 1 << 23
-# Larger than any setpoint or leg state; larger messages are not decompressed.
-LARGEST_MESSAGE = 1 << 20
+MOST_BYTES = 1 << 23
+# Blocks of fewer bytes are not compacted.
+_FEW_BYTES = 4096
 _ZSTD = b'\x28\xb5\x2f\xfd'
-_LATEST = np.iinfo(np.int64).max
-
-
-class Block(NamedTuple):
-    """M messages in the order of time, and the bytes that contain them."""
-
-    channels: Integers
-    """(M,)"""
-    times: Integers
-    """When each was recorded (M,) [ns]."""
-    starts: Integers
-    """Start of each in the bytes (M,)."""
-    sizes: Integers
-    """Length of each (M,) [bytes]."""
-    data: Bytes
-
-    def chosen(self, which: Any) -> Block:
-        """Return some of the messages: a slice, or a mask or an index (M,)."""
-        return Block(self.channels[which], self.times[which], self.starts[which],
-                     self.sizes[which], self.data)
 
 
 class Source(Protocol):
@@ -77,14 +63,14 @@ class Source(Protocol):
     def topics(self) -> dict[str, str]:
         """Return the type of each topic."""
 
-    def blocks(self, topics: Mapping[str, int]) -> Iterator[tuple[Block, int]]:
+    def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
         """
         Yield messages in the order of time, and the number of bytes read for them.
 
         Parameters
         ----------
-        topics : mapping
-            The number of each topic to be read, which replaces the channel of its messages.
+        keys : mapping
+            From topics in the file to the names under which their messages are given.
 
         """
 
@@ -92,44 +78,34 @@ class Source(Protocol):
         """Close the file."""
 
 
-_NONE = np.empty(0, np.int64)
-EMPTY = Block(_NONE, _NONE, _NONE, _NONE, np.empty(0, np.uint8))
+def cost(block: Messages) -> int:
+    """Return the memory that a block needs, with its index arrays [bytes]."""
+    return len(block.data) + 32 * len(block.times) + 1000
 
 
-def block_of(channels: Sequence[int] | Integers, times: Sequence[int] | Integers,
-             messages: Sequence[bytes]) -> Block:
-    """Return a block of single messages."""
-    sizes = np.array([len(message) for message in messages], dtype=np.int64)
-    return Block(np.array(channels, dtype=np.int64), np.array(times, dtype=np.int64),
-                 np.cumsum(sizes) - sizes, sizes,
-                 np.frombuffer(bytearray(b''.join(messages)), dtype=np.uint8))
-
-
-def joined(blocks: Sequence[Block]) -> Block:
+def _joined(blocks: Sequence[Messages]) -> Messages:
     """Return the concatenation of blocks."""
     if len(blocks) == 1:
         return blocks[0]
-    if not blocks:
-        return EMPTY
     before = np.cumsum([0, *(len(block.data) for block in blocks[:-1])])
-    channels, times, _, sizes, data = (np.concatenate(parts) for parts in zip(
-        *blocks, strict=True))
+    of_topic, times, data, _, sizes = (np.concatenate(parts) for parts in zip(
+        *(block[1:] for block in blocks), strict=True))
     starts = np.concatenate([block.starts + n for block, n in zip(blocks, before, strict=True)])
-    return Block(channels, times, starts, sizes, data)
+    return Messages(blocks[0].topics, of_topic, times, data, starts, sizes)
 
 
-def merged(blocks: Sequence[Block]) -> Block:
+def merged(blocks: Sequence[Messages]) -> Messages:
     """Return blocks merged in the order of time; at equal times earlier blocks come first."""
-    block = joined([lean(each) for each in blocks] if len(blocks) > 1 else blocks)
+    block = _joined([compact(each) for each in blocks] if len(blocks) > 1 else blocks)
     if np.any(block.times[1:] < block.times[:-1]):
         block = block.chosen(np.argsort(block.times, kind='stable'))
     return block
 
 
-def split(block: Block, time: float) -> tuple[Block, Block]:
+def split(block: Messages, time: int) -> tuple[Messages, Messages]:
     """Return the messages before a time, and the others."""
-    at = len(block.times) if time > _LATEST else int(np.searchsorted(block.times, int(time)))
-    return block.chosen(slice(at)), lean(block.chosen(slice(at, None)))
+    at = len(block.times) if time > LATEST else int(np.searchsorted(block.times, time))
+    return block.chosen(slice(at)), compact(block.chosen(slice(at, None)))
 
 
 @entry_point('u1[::1]', 'i8[::1]', 'i8[::1]', 'u1[::1]')
@@ -146,40 +122,40 @@ def _gather(data: Bytes, starts: Integers, sizes: Integers, out: Bytes) -> None:
 FUNCTIONS = (_gather,)
 
 
-def lean(block: Block) -> Block:
+def compact(block: Messages) -> Messages:
     """Return a block without the bytes that belong to no message of it, if these are many."""
-    total = int(block.sizes.sum())
-    if 2 * total >= len(block.data):
+    if len(block.data) < _FEW_BYTES or 2 * (total := int(block.sizes.sum())) >= len(block.data):
         return block
     data = np.empty(total, dtype=np.uint8)
-    _gather(block.data, block.starts, block.sizes, data)
+    _gather(block.data, np.ascontiguousarray(block.starts), np.ascontiguousarray(block.sizes),
+            data)
     return block._replace(starts=np.cumsum(block.sizes) - block.sizes, data=data)
 
 
-def of_good_length(blocks: Iterator[tuple[Block, int]]) -> Iterator[tuple[Block, int]]:
+def of_good_length(blocks: Iterator[tuple[Messages, int]]) -> Iterator[tuple[Messages, int]]:
     """Join short blocks, split long ones, and decompress compressed messages."""
-    short: list[Block] = []
-    many = size = read = 0
+    short: list[Messages] = []
+    count = size = read = 0
     for whole, its_read in blocks:
         read += its_read
-        for block in _decompressed(whole):
-            if len(block.times):
-                short.append(lean(block))
-                many += len(block.times)
-                size += len(short[-1].data)
-            if many >= _FEWEST or size >= _MOST_BYTES:
-                yield from _cut(joined(short), read)
-                short, many, size, read = [], 0, 0, 0
-    yield from _cut(joined(short), read)
+        for block in _decompressed(whole) if len(whole.times) else ():
+            short.append(compact(block))
+            count += len(block.times)
+            size += cost(short[-1])
+            if count >= _FEWEST or size >= MOST_BYTES:
+                yield from _cut(_joined(short), read)
+                short, count, size, read = [], 0, 0, 0
+    if short:
+        yield from _cut(_joined(short), read)
 
 
-def _cut(block: Block, read: int) -> Iterator[tuple[Block, int]]:
-    edges = range(0, len(block.times), _MOST)
+def _cut(block: Messages, read: int) -> Iterator[tuple[Messages, int]]:
+    edges = range(0, len(block.times), IN_A_BLOCK)
     for first in edges:
-        yield block.chosen(slice(first, first + _MOST)), read // len(edges)
+        yield block.chosen(slice(first, first + IN_A_BLOCK)), read // len(edges)
 
 
-def _decompressed(block: Block) -> Iterator[Block]:
+def _decompressed(block: Messages) -> Iterator[Messages]:
     """
     Yield messages after decompression, if rosbag2 has compressed each of them.
 
@@ -204,6 +180,7 @@ def _decompressed(block: Block) -> Iterator[Block]:
                 pass
         messages.append(message)
         size += len(message)
-        if size >= _MOST_BYTES or n == len(block.times):
-            yield block_of(block.channels[first:n], block.times[first:n], messages)
+        if size >= MOST_BYTES or n == len(block.times):
+            yield Messages.of(block.topics, block.of_topic[first:n].tolist(),
+                              block.times[first:n].tolist(), messages)
             messages, first, size = [], n, 0

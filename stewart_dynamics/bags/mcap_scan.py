@@ -13,72 +13,126 @@
 # limitations under the License.
 
 
-"""A compiled scan for the messages in a sequence of MCAP records."""
+"""A compiled scan of MCAP records, see https://mcap.dev/spec."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.compilation.functions import entry_point
 
-# Columns of the result; of schemas and channels the first is minus the opcode.
-CHANNEL, TIME, START, SIZE, _FOUND = range(5)
+# Opcode and length in front of each record; the fields of a message in front of its data.
+HEAD, MESSAGE_HEAD = 9, 22
+# Entries of the table of channels: messages are skipped, or skipped and counted.
+IGNORED, UNDECLARED = -1, -2
+NUMBERS = 1 << 16
+"""Possible channel numbers."""
 
 
-@entry_point('u1[::1]', 'b1', 'i8[:,::1]', 'i8[::1]')
-def scan(data: Bytes, only_messages: bool, found: Integers, totals: Integers) -> None:
+class Scan(NamedTuple):
+    """Records found in a sequence of bytes."""
+
+    kinds: Integers
+    """(K,): the number of the topic of a message; minus the opcode of another record."""
+    times: Integers
+    """(K,): first field of eight bytes: the time of a message or the start of a chunk [ns]."""
+    starts: Integers
+    """(K,): start of the data of a message, or of the content of another record."""
+    sizes: Integers
+    """(K,): length of the data or content [bytes]."""
+    data: Bytes
+    end: int
+    """End of the last record; it may be outside of the data."""
+    records: int
+    """Number of records, with the messages that are not listed."""
+    messages: int
+    undeclared: int
+    """Number of messages on undeclared channels."""
+
+    def content(self, record: int) -> bytes:
+        """Return the content of a record, as far as it is in the data."""
+        start = self.starts[record]
+        return self.data[start:start + self.sizes[record]].tobytes()
+
+
+@entry_point('u1[::1]', 'i8[::1]', 'i8[:,::1]', 'i8[::1]')
+def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> None:
     """
-    Find the messages in a sequence of records.
+    List the messages of some channels, and all records that are not messages.
 
     Parameters
     ----------
     data : (M,)
-        The bytes of the records.
-    only_messages : bool
-        End at the first record that is not a message.
-    found : (K, 4)
-        Output: channel, time, start, size; of schemas and channels minus the opcode in place
-        of the channel. Messages beyond K rows are only counted.
-    totals : (2,)
-        Output: the number of messages, and the number of bytes of the whole records.
+        The bytes of the records. The scan ends where the fields that it reads are not in them,
+        or where the lengths in a chunk, a message or a message index are inconsistent.
+    numbers : (65536,)
+        Number of the topic of each channel, IGNORED or UNDECLARED.
+    found : (4, K)
+        Output: see Scan. Records beyond K are only counted.
+    totals : (5,)
+        Output: K, end, records, messages, undeclared, see Scan.
 
     """
-    count, at = 0, 0
+    count = at = records = messages = undeclared = 0
     while at + 9 <= len(data):
-        length = np.int64(0)
+        opcode, begin, length = np.int64(data[at]), at + 9, np.int64(0)
         for k in range(8):
             length |= np.int64(data[at + 1 + k]) << np.int64(8 * k)
-        opcode = data[at]
-        if length < 0 or length > len(data) - at - 9 or (opcode == 5 and length < 22):
+        # Fields up to this offset are read.
+        needed = 22 if opcode == 5 else 6 if opcode == 7 else 40 if opcode == 6 else 0
+        if opcode == 0 or length < needed or length > (1 << 60) or begin + needed > len(data):
             break
-        if only_messages and opcode != 5:
-            break
-        if 3 <= opcode <= 5:
-            if count < len(found):
-                begin = at + 9
-                if opcode == 5:
-                    time = np.int64(0)
+        if opcode == 6:
+            name = np.int64(data[begin + 28])  # length of the name of the compression
+            if data[begin + 29] or data[begin + 30] or data[begin + 31] or (
+                    begin + 40 + name > len(data)):
+                break
+            packed = np.int64(0)
+            for k in range(8):
+                packed |= np.int64(data[begin + 32 + name + k]) << np.int64(8 * k)
+            if packed != length - 40 - name:
+                break
+        elif opcode == 7:
+            entries = np.int64(0)
+            for k in range(4):
+                entries |= np.int64(data[begin + 2 + k]) << np.int64(8 * k)
+            if entries != length - 6:
+                break
+        records += 1
+        kind, first, skipped = -opcode, begin, 0
+        if opcode == 5:
+            messages += 1
+            kind = numbers[np.int64(data[begin]) + 256 * np.int64(data[begin + 1])]
+            undeclared += kind == -2
+            first, skipped = begin + 6, 22
+        if opcode != 5 or kind >= 0:
+            if count < found.shape[1]:
+                time = np.int64(0)
+                if first + 8 <= len(data):
                     for k in range(8):
-                        time |= np.int64(data[begin + 6 + k]) << np.int64(8 * k)
-                    found[count, 0] = np.int64(data[begin]) + 256 * np.int64(data[begin + 1])
-                    found[count, 1] = time if time >= 0 else np.int64(9223372036854775807)
-                    found[count, 2] = begin + 22
-                    found[count, 3] = length - 22
-                else:
-                    found[count, 0] = -np.int64(opcode)
-                    found[count, 1] = 0
-                    found[count, 2] = begin
-                    found[count, 3] = length
+                        time |= np.int64(data[first + k]) << np.int64(8 * k)
+                found[0, count] = kind
+                found[1, count] = time if time >= 0 else np.int64(9223372036854775807)
+                found[2, count] = begin + skipped
+                found[3, count] = length - skipped
             count += 1
-        at += 9 + int(length)
-    totals[0], totals[1] = count, at
+        at = int(begin + length)
+    totals[0], totals[1], totals[2], totals[3], totals[4] = (
+        count, at, records, messages, undeclared)
 
 
-def scanned(data: bytes, only_messages: bool) -> tuple[Integers, int, Bytes]:
-    """Return the messages (K, 4), the number of bytes of whole records, and all bytes."""
-    array, totals = np.frombuffer(data, np.uint8), np.empty(2, np.int64)
-    scan(array, only_messages, np.empty((0, _FOUND), np.int64), totals)
-    found = np.empty((totals[0], _FOUND), np.int64)
-    scan(array, only_messages, found, totals)
-    return found, int(totals[1]), array
+def scanned(data: bytes, numbers: Integers) -> Scan:
+    """Return the records in these bytes, see ``scan``."""
+    array, totals = np.frombuffer(data, np.uint8), np.empty(5, np.int64)
+    # For most chunks this is enough, and they are scanned once.
+    found = np.empty((4, min(len(data) // (HEAD + MESSAGE_HEAD), 8192) + 16), np.int64)
+    scan(array, numbers, found, totals)
+    count, end, records, messages, undeclared = totals.tolist()
+    if count > found.shape[1]:
+        found = np.empty((4, count), np.int64)
+        scan(array, numbers, found, totals)
+    kinds, times, starts, sizes = found[:, :count]
+    return Scan(kinds, times, starts, sizes, array, end, records, messages, undeclared)

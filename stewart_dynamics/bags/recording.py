@@ -23,13 +23,15 @@ import tempfile
 
 from stewart_dynamics.bags.blocks import of_good_length, Source
 from stewart_dynamics.bags.files import files_of, unpack
-from stewart_dynamics.bags.mcap_layout import MAGIC
-from stewart_dynamics.bags.mcap_recording import McapRecording
+from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
 from stewart_dynamics.errors import BagError, one_line
 from stewart_dynamics.messages.recorded import Messages
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'
+# Messages that are read of a file of any size. Of larger ones no more are read than they have
+# bytes: no recording is compressed as well, but files made to occupy the reader for hours are.
+_MESSAGES = 100_000
 
 
 class Recording:
@@ -87,12 +89,15 @@ class Recording:
             From topics in the bag to the names under which their messages are given.
 
         """
-        names = tuple(dict.fromkeys(keys.values()))
-        number = {topic: names.index(key) for topic, key in keys.items()}
         for file, source in self._sources:
-            for block, size in of_good_length(source.blocks(number)):
-                yield Messages(names, block.channels, block.times, block.data, block.starts,
-                               block.sizes), size
+            most, count = _MESSAGES + file.stat().st_size, 0
+            for block, size in of_good_length(source.blocks(keys)):
+                count += len(block.times)
+                if count > most:
+                    self.missing.append(f'{file.name}: more messages than bytes: those after '
+                                        f'{count - len(block.times)} are not read')
+                    break
+                yield block, size
             self.missing += [f'{file.name}: {what}' for what in source.missing]
             source.missing.clear()
             if source.unchecked:
@@ -122,7 +127,7 @@ class Recording:
             with unpacked.open('rb') as stream:
                 head = stream.read(len(_SQLITE))
             if head.startswith(MAGIC):
-                return McapRecording(unpacked)
+                return McapFile(unpacked)
             if not head.startswith((_SQLITE, _ROS_1)):
                 raise BagError(f'{file}: not a bag that can be read: not MCAP, not sqlite3, not '
                                'a bag of ROS 1')

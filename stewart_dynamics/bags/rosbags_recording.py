@@ -32,9 +32,9 @@ import rosbags.rosbag2
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics.bags.blocks import Block, block_of
-from stewart_dynamics.bags.mcap_layout import LARGEST_CHUNK
+from stewart_dynamics.bags.blocks import LARGEST_CHUNK
 from stewart_dynamics.errors import one_line
+from stewart_dynamics.messages.recorded import Messages
 
 # Messages in a block.
 _AT_ONCE = 4096
@@ -88,8 +88,10 @@ class RosbagsRecording:
             kinds.setdefault(of.topic, set()).add(self._kinds[of.id])
         return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
 
-    def blocks(self, topics: Mapping[str, int]) -> Iterator[tuple[Block, int]]:
+    def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
         """Yield the messages of these topics, see Source; an error ends them, and is noted."""
+        names = tuple(dict.fromkeys(keys.values()))
+        topics = {topic: names.index(key) for topic, key in keys.items()}
         wanted = [of for of in self._reader.connections if of.topic in topics]
         rows = self._reader.messages(connections=wanted) if wanted else iter(())
         count = unsound = 0
@@ -112,7 +114,7 @@ class RosbagsRecording:
             except Exception as exc:  # damaged bytes: rosbags raises any exception
                 self.missing.append(f'everything after {count} messages: {one_line(exc)}')
                 at_end = True
-            block = block_of(channels, times, messages)
+            block = Messages.of(names, channels, times, messages)
             yield block, int(block.sizes.sum())
         if unsound:
             self.missing.append(f'{unsound} rows that are not messages')

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Recorded messages as the replay passes them to ``setpoint_joining``."""
+"""Recorded messages in blocks, as bags are read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,35 +25,43 @@ from stewart_dynamics.arrays import Bytes, Integers, Stamps
 
 
 class Messages(NamedTuple):
-    """Recorded messages in their order, M of them."""
+    """M recorded messages in the order of time, and the bytes that contain them."""
 
     topics: tuple[str, ...]
-    """Keys of INPUT_TYPES."""
+    """Names under which the topics were asked for."""
     of_topic: Integers
-    """(M,): which of the topics."""
+    """(M,): index of the topic."""
     times: Stamps
     """(M,): when each was recorded [ns]."""
     data: Bytes
-    """Bytes in which all of them are."""
     starts: Integers
-    """(M,): where each begins in them."""
+    """(M,): start of each in the data."""
     sizes: Integers
-    """(M,): how long each is."""
+    """(M,): length of each [bytes]."""
+
+    @classmethod
+    def of(cls, topics: tuple[str, ...], of_topic: Sequence[int], times: Sequence[int],
+           messages: Sequence[bytes]) -> Messages:
+        """Join single messages."""
+        sizes = np.array([len(message) for message in messages], dtype=np.int64)
+        return cls(topics, np.array(of_topic, dtype=np.int64), np.array(times, dtype=np.int64),
+                   np.frombuffer(bytearray(b''.join(messages)), dtype=np.uint8),
+                   np.cumsum(sizes) - sizes, sizes)
 
     def chosen(self, which: Any) -> Messages:
-        """Return some of them: a slice, or an index or a mask (M,)."""
+        """Return some of the messages: a slice, or an index or a mask (M,)."""
         return self._replace(of_topic=self.of_topic[which], times=self.times[which],
                              starts=self.starts[which], sizes=self.sizes[which])
 
     def each(self) -> Iterator[tuple[str, int, bytes]]:
-        """Yield topic, time and bytes of one after the other."""
+        """Yield topic, time and bytes of each message."""
         for topic, time, start, size in zip(
                 self.of_topic.tolist(), self.times.tolist(), self.starts.tolist(),
                 self.sizes.tolist(), strict=True):
             yield self.topics[topic], time, self.data[start:start + size].tobytes()
 
     def places(self) -> dict[str, Integers]:
-        """Return where the messages of each topic are, of those that have any."""
+        """Return the indices of the messages of each topic that has any."""
         found = ((topic, np.flatnonzero(self.of_topic == n))
                  for n, topic in enumerate(self.topics))
         return {topic: places for topic, places in found if len(places)}

@@ -31,7 +31,7 @@ from mcap.records import (
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 from stewart_dynamics.arrays import Array, Bytes, Stamps
-from stewart_dynamics.bags.mcap_layout import MAGIC
+from stewart_dynamics.bags.mcap_file import MAGIC
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
