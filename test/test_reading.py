@@ -13,10 +13,12 @@
 # limitations under the License.
 
 
-"""Hexapods of others' files: what is read, what is said, and what is rejected."""
+"""Hexapods in files of other tools: parameters, remarks and rejections."""
 
+import os
 from pathlib import Path
 import re
+import time
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -24,6 +26,7 @@ import pytest
 from referees import random_parameters, rng
 
 from stewart_dynamics import Parameters, StewartError
+from stewart_dynamics.description import read_mjcf as loading
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
 from stewart_dynamics.description.reading import read_hexapod
@@ -94,7 +97,7 @@ def test_closed_files_of_others_are_read_by_how_bodies_are_connected(kind, tmp_p
         assert 'actuator.reflected_mass: not in the file: 0 kg' in said
         assert found.parameters['geometry.zero_length'] == pytest.approx(1.3, abs=1e-4)
     else:
-        assert 'limits.velocity_max: not in the file: not checked' in said
+        assert 'limits.velocity_max: not in the file: unlimited' in said
 
 
 def at_home(text, hexapod):
@@ -124,7 +127,7 @@ def test_an_open_urdf_whose_loops_gazebo_closes_is_read(tmp_path):
         assert found[name] == pytest.approx(p[name], abs=1e-12), name
 
 
-def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_this_is_said(tmp_path):
+def test_an_open_urdf_in_which_one_leg_carries_the_platform_is_read_and_reported(tmp_path):
     """As CAD programs write it: the other five legs end in the air."""
     p = Parameters.from_yaml(PLATFORM)
 
@@ -162,7 +165,7 @@ def changed(text, pattern, replacement):
     return new
 
 
-def test_a_start_outside_the_limits_is_said(tmp_path):
+def test_a_start_outside_the_limits_is_reported(tmp_path):
     p = Parameters.from_yaml(PLATFORM)
 
     def moved(text):
@@ -193,7 +196,7 @@ def test_a_start_outside_the_limits_is_said(tmp_path):
     ('<sdf version="1.9"><model name="m"><joint name="j" type="fixed"><parent>a</parent></joint>'
      '</model></sdf>', "joint 'j': no child"),
 ])
-def test_what_is_no_hexapod_is_rejected_in_one_line(text, error, tmp_path):
+def test_a_file_without_a_hexapod_is_rejected_in_one_line(text, error, tmp_path):
     path = tmp_path / 'file.xml'
     path.write_text(text, encoding='utf-8')
     with pytest.raises(StewartError, match=re.escape(error)) as caught:
@@ -202,7 +205,7 @@ def test_what_is_no_hexapod_is_rejected_in_one_line(text, error, tmp_path):
     assert str(path) in str(caught.value)
 
 
-def test_mujocos_own_words_are_given_for_an_mjcf_that_it_rejects(tmp_path):
+def test_an_mjcf_that_mujoco_rejects_is_rejected_with_the_reason_of_mujoco(tmp_path):
     pytest.importorskip('mujoco')
     path = tmp_path / 'file.xml'
     path.write_text('<mujoco><equality><connect relpose="1"/></equality></mujoco>')
@@ -234,7 +237,7 @@ def test_a_prismatic_joint_across_its_leg_is_rejected(tmp_path):
         read_hexapod(path)
 
 
-def test_a_negative_gear_is_said(tmp_path):
+def test_a_negative_gear_is_reported(tmp_path):
     pytest.importorskip('mujoco')
     path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
         text, '<motor name="leg_6"', '<motor name="leg_6" gear="-1"'))
@@ -252,7 +255,7 @@ def test_a_leg_without_a_joint_at_one_end_is_rejected(tmp_path):
         read_hexapod(path)
 
 
-def test_legs_that_are_cut_in_two_are_said(tmp_path):
+def test_legs_that_are_cut_in_two_are_rejected(tmp_path):
     """As CAD programs cut loops: one part hangs from the platform."""
     def cut(text):
         return changed(changed(
@@ -265,6 +268,101 @@ def test_legs_that_are_cut_in_two_are_said(tmp_path):
         read_hexapod(written(Parameters.from_yaml(PLATFORM), 'sdf', tmp_path, cut))
 
 
-def test_a_missing_file_is_said(tmp_path):
+@pytest.mark.parametrize('kind', ['urdf', 'sdf'])
+def test_parameters_that_no_format_has_elements_for_are_carried(kind, tmp_path):
+    given = {'actuator.screw_lead': 0.01, 'actuator.coulomb_velocity': [
+        1e-3 * n for n in range(1, 7)], 'limits.base_joint_angle_max': 0.7}
+    read = read_hexapod(written(Parameters.from_yaml(PLATFORM).replaced(given), kind, tmp_path))
+    for name, value in given.items():
+        assert read.parameters[name] == pytest.approx(np.broadcast_to(value, 6)), name
+
+
+def test_a_missing_file_is_rejected(tmp_path):
     with pytest.raises(StewartError, match='cannot be read: No such file'):
         read_hexapod(tmp_path / 'none.urdf')
+
+
+# Files that cost too much
+
+def chain_of_frames(count):
+    """Return a model with a chain of frames, the last of them first."""
+    return '<sdf version="1.9"><model name="m"><link name="a"/>' + ''.join(
+        f'<frame name="f{n}" attached_to="{f"f{n - 1}" if n else "a"}"/>'
+        for n in reversed(range(count))) + (
+            f'<joint name="j" type="fixed"><pose relative_to="f{count - 1}">1 0 0 0 0 0</pose>'
+            '<parent>world</parent><child>a</child></joint></model></sdf>')
+
+
+def chain_of_links(count, kind='fixed'):
+    """Return a URDF whose links carry each other."""
+    return '<robot name="x"><link name="l0"/>' + ''.join(
+        f'<link name="l{n}"/><joint name="j{n}" type="{kind}"><parent link="l{n - 1}"/>'
+        f'<child link="l{n}"/></joint>' for n in range(1, count)) + '</robot>'
+
+
+def star_of_links(count):
+    """Return a URDF in which one link carries all others, by joints of one axis."""
+    return '<robot name="x"><link name="l0"/>' + ''.join(
+        f'<link name="l{n}"/><joint name="j{n}" type="continuous"><parent link="l0"/>'
+        f'<child link="l{n}"/></joint>' for n in range(1, count)) + '</robot>'
+
+
+@pytest.mark.parametrize('text', [
+    chain_of_frames(20_000), chain_of_links(20_000), chain_of_links(20_000, 'continuous'),
+    star_of_links(20_000)], ids=['frames', 'fixed links', 'hinged links', 'star'])
+def test_large_models_take_time_in_proportion_to_their_size(text, tmp_path):
+    path = tmp_path / 'large.xml'
+    path.write_text(text)
+    begun = time.process_time()
+    with pytest.raises(StewartError, match='no hexapod'):
+        read_hexapod(path)
+    assert time.process_time() - begun < 20.0  # quadratic: minutes
+
+
+@pytest.mark.parametrize('encoding', ['utf-16', 'utf-16-le', 'iso-8859-1'])
+@pytest.mark.parametrize('text', [
+    '<?xml version="1.0" encoding="{}"?><!DOCTYPE a [<!ENTITY b "c">]><robot name="\u00fc"/>',
+    '<?xml version="1.0" encoding="{}"?><mujoco model="\u00fc"/>'])
+def test_other_encodings_than_utf_8_are_rejected(text, encoding, tmp_path):
+    path = tmp_path / 'file.xml'
+    path.write_bytes(text.format(encoding).encode(encoding))
+    with pytest.raises(StewartError, match='cannot be read: not UTF-8|not XML: not well'):
+        read_hexapod(path)
+
+
+def test_what_is_no_regular_file_of_bounded_size_is_rejected_at_once(tmp_path):
+    os.mkfifo(tmp_path / 'pipe')
+    with (tmp_path / 'sparse').open('wb') as file:
+        file.truncate(10 ** 11)
+    for path, why in ((tmp_path / 'pipe', 'not a regular file'), (tmp_path, 'Is a directory'),
+                      (Path('/dev/zero'), 'not a regular file'),
+                      (tmp_path / 'sparse', 'larger than 20000000 bytes')):
+        with pytest.raises(StewartError, match=why):
+            read_hexapod(path)
+
+
+@pytest.mark.parametrize(('text', 'why'), [
+    ('<worldbody><replicate count="100000000"><body><geom size="1"/></body></replicate>'
+     '</worldbody>', 'not loaded within'),
+    ('<include file="/dev/zero"/>', 'not loaded within|MuJoCo: '),
+    ('<include file="pipe"/>', 'not loaded within|MuJoCo: '),
+    ('<worldbody>' + '<body>' * 50_000 + '</body>' * 50_000 + '</worldbody>', 'MuJoCo: ')])
+def test_mujoco_is_given_bounded_time_and_memory(text, why, tmp_path, monkeypatch):
+    pytest.importorskip('mujoco')
+    monkeypatch.setattr(loading, '_TIME', 2)
+    monkeypatch.setattr(loading, '_WAIT', 6)
+    os.mkfifo(tmp_path / 'pipe')
+    (tmp_path / 'file.xml').write_text(f'<mujoco>{text}</mujoco>')
+    with pytest.raises(StewartError, match=why) as caught:
+        read_hexapod(tmp_path / 'file.xml')
+    assert '\n' not in str(caught.value)
+
+
+def test_mujoco_writes_its_warnings_nowhere(tmp_path, monkeypatch):
+    pytest.importorskip('mujoco')
+    monkeypatch.chdir(tmp_path)
+    path = written(Parameters.from_yaml(PLATFORM), 'xml', tmp_path, lambda text: changed(
+        text, '<worldbody>', '<worldbody><body pos="nan 0 0"><geom size="1"/></body>'))
+    with pytest.raises(StewartError):
+        read_hexapod(path)
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]

@@ -35,7 +35,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
 from stewart_dynamics.description.shapes import COLORS, Shape, shapes
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, numbers, text_of, without_limit)
+    add, CARRIED, carried, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 
 _TIMESTEP = 0.0005  # [s]
@@ -45,8 +45,6 @@ _SOLREF = (2.0 * _TIMESTEP, 1.0)
 _SOLIMP = (0.9999, 0.9999, 0.001)
 _TOLERANCE = 1e-12
 _NOT_IN_MJCF = ('limits.velocity_max',)
-_OF_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
-              'legs.piston.inertia')
 _COMMENT = 'It starts at the home pose. ctrl: the forces of the legs in N, a positive one pushes.'
 
 
@@ -71,16 +69,10 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     _loops(root, hexapod)
     _actuators(root, hexapod)
     custom = add(root, 'custom')
-    for each, text in {**carried(p, _carried(hexapod)), 'base_frame': hexapod.base}.items():
+    names = [*_NOT_IN_MJCF, *(each for each in LEG_BODIES if not p[each].all())]
+    for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
         add(custom, 'text', name=f'{CARRIED}.{each}', data=text)
     return text_of(root, _COMMENT)
-
-
-def _carried(hexapod: Hexapod) -> list[str]:
-    """Return the names of parameters that are not in the elements of the format."""
-    p = hexapod.parameters
-    return [*_NOT_IN_MJCF, *(name for name in _OF_BODIES if not p[name].all()),
-            *without_limit(p, ('limits.length_min', 'limits.length_max', 'limits.force_max'))]
 
 
 def _leg(base: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],

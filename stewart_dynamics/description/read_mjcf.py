@@ -18,6 +18,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+import subprocess
+import sys
+import tempfile
 from typing import Any
 
 import numpy as np
@@ -28,6 +31,23 @@ from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 
+_TIME = 30  # [s]
+_WAIT = 4 * _TIME
+_MEMORY = 8 << 30  # of addresses; libraries reserve some without using them [bytes]
+_LOAD = """
+import resource, sys
+source, model, time, memory = sys.argv[1:]
+for kind, most in ((resource.RLIMIT_CPU, int(time)), (resource.RLIMIT_AS, int(memory))):
+    _, hard = resource.getrlimit(kind)
+    resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))
+import mujoco
+try:
+    mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(source), model)
+except MemoryError:
+    sys.exit(2)
+except Exception as exc:
+    sys.exit(str(exc))
+"""
 _PREFIX = f'{CARRIED}.'
 
 
@@ -38,10 +58,7 @@ def read_mjcf(source: Path) -> Mechanism:
     except ModuleNotFoundError as exc:
         raise DescriptionError(
             f"{source}: MJCF is read by mujoco: pip install 'stewart_dynamics[mujoco]'") from exc
-    try:
-        model = mujoco.MjModel.from_xml_path(str(source))
-    except (ValueError, RuntimeError) as exc:
-        raise DescriptionError(f'{source}: MuJoCo: {one_line(exc)}') from exc
+    model = _loaded(mujoco, source)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mechanism = Mechanism(str(source), source.stem, _parts(model, data), [],
@@ -58,6 +75,32 @@ def read_mjcf(source: Path) -> Mechanism:
             text = bytes(model.text_data[at:at + model.text_size[n]])
             mechanism.carried[name.removeprefix(_PREFIX)] = text.rstrip(b'\0').decode()
     return mechanism
+
+
+def _loaded(mujoco: Any, source: Path) -> Any:
+    """
+    Return the model that MuJoCo's loader, in a process of its own, makes of a file.
+
+    A file can make the loader repeat a body a billion times or read a device; warnings go to a
+    MUJOCO_LOG.TXT in its working folder.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        model = Path(folder) / 'model.mjb'
+        try:
+            ended = subprocess.run(
+                [sys.executable, '-c', _LOAD, source.absolute(), model, str(_TIME), str(_MEMORY)],
+                cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=_WAIT,
+                check=False)
+        except subprocess.TimeoutExpired as exc:
+            raise DescriptionError(f'{source}: MuJoCo: not loaded within {_WAIT} s') from exc
+        if ended.returncode == 1:
+            why = one_line(ended.stderr.decode('utf-8', 'replace'))
+            raise DescriptionError(f'{source}: MuJoCo: {why}')
+        if ended.returncode:
+            raise DescriptionError(
+                f'{source}: MuJoCo: not loaded within {_TIME} s of processor time and '
+                f'{_MEMORY >> 30} GiB (exit code {ended.returncode})')
+        return mujoco.MjModel.from_binary_path(str(model))
 
 
 def _name(model: Any, body: int) -> str:

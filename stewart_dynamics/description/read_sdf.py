@@ -82,27 +82,31 @@ class _Model:
                           for each in model.findall(tag)}
         self._links = {link.get('name', '') for link in model.findall('link')}
         self._placements: dict[str, Placement] = {}
-        self._under_way: set[str] = set()
         self._model = HERE
         self._model = self._own(model)
 
     def place(self, name: str) -> Placement:
         """Return where a link, joint or frame is."""
-        if name in ('', _MODEL, WORLD):
-            return self._model if name != WORLD else HERE
-        if name not in self._placements:
-            if name not in self._elements or name in self._under_way:
+        waiting: dict[str, None] = {}  # frames, each relative to the next
+        while name not in ('', _MODEL, WORLD) and name not in self._placements:
+            if name not in self._elements or name in waiting:
                 raise DescriptionError(f'{self._source}: no frame {name!r}, or relative to itself')
-            self._under_way.add(name)
-            element = self._elements[name]
-            pose = element.find('pose')
-            default = self._text(element, 'child') if element.tag == 'joint' else element.get(
-                'attached_to', '') if element.tag == 'frame' else ''
-            relative = default if pose is None else pose.get('relative_to') or pose.get(
-                'frame') or default
-            self._placements[name] = self.place(relative).of(self._own(element))
-            self._under_way.discard(name)
-        return self._placements[name]
+            waiting[name] = None
+            name = self._relative_to(self._elements[name])
+        at = HERE if name == WORLD else self._placements.get(name, self._model)
+        for name in reversed(waiting):
+            at = self._placements[name] = at.of(self._own(self._elements[name]))
+        return at
+
+    def _relative_to(self, element: ET.Element) -> str:
+        """Return the frame in which the pose of an element is given."""
+        pose = element.find('pose')
+        given = '' if pose is None else pose.get('relative_to') or pose.get('frame')
+        if given:
+            return given
+        if element.tag == 'joint':
+            return self._text(element, 'child')
+        return element.get('attached_to', '') if element.tag == 'frame' else ''
 
     def part(self, link: ET.Element) -> Part:
         """Return a link as a body."""

@@ -67,7 +67,7 @@ def read_urdf(root: ET.Element, source: Path) -> Mechanism:
 
 
 def numbers_of(text: str | None, count: int, source: Path, what: str) -> Array:
-    """Return so many numbers of a text, or zeros where there is none."""
+    """Parse ``count`` finite numbers; return zeros if the text is missing."""
     if text is None:
         return np.zeros(count)
     try:
@@ -90,11 +90,11 @@ def unit(axis: Array, source: Path, what: str) -> Array:
 def _place(name: str, of_child: dict[str, ET.Element], placements: dict[str, Placement],
            source: Path) -> None:
     """Place a link and all links that carry it."""
-    chain = []
+    chain: dict[str, None] = {}
     while name not in placements and name in of_child:
         if name in chain:
             raise DescriptionError(f'{source}: link {name!r} carries itself')
-        chain.append(name)
+        chain[name] = None
         name = end_of(of_child[name], 'parent', source)
     at = placements.setdefault(name, HERE)
     for each in reversed(chain):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A hexapod from a file of another tool: URDF, SDFormat or MJCF, told by its root element."""
+"""A hexapod from a file of another tool: URDF, SDFormat or MJCF, by the name of its root."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
 from stewart_dynamics.description.recognition import Recognized, recognized
 from stewart_dynamics.errors import one_line
+from stewart_dynamics.whole_file import read_text
 
 _LARGEST = 20_000_000  # bytes
 _XACRO = 'http://www.ros.org/wiki/xacro'
@@ -50,20 +51,15 @@ def read_hexapod(path: Path) -> Recognized:
 
 
 def read_mechanism(path: Path) -> Mechanism:
-    """Return all that a file says of a mechanism."""
-    try:
-        if path.is_file() and path.stat().st_size > _LARGEST:
-            raise DescriptionError(f'{path}: larger than {_LARGEST} bytes')
-        text = path.read_bytes()
-    except OSError as exc:
-        raise DescriptionError(f'{path}: cannot be read: {exc.strerror}') from exc
-    if b'<!ENTITY' in text:  # which may grow without bound
+    """Return the mechanism that a file describes."""
+    text = read_text(path, _LARGEST, DescriptionError)
+    if '<!ENTITY' in text:  # which may grow without bound
         raise DescriptionError(f'{path}: has entities of its own: write their text out')
     try:
         root = ET.fromstring(text)
-    except (ET.ParseError, ValueError, LookupError) as exc:
+    except (ET.ParseError, ValueError) as exc:
         raise DescriptionError(f'{path}: not XML: {one_line(exc)}') from exc
-    if _XACRO.encode() in text and root.tag == 'robot':
+    if _XACRO in text and root.tag == 'robot':
         raise DescriptionError(f'{path}: is xacro: convert it with xacro first')
     if root.tag == 'mujoco':
         return read_mjcf(path)

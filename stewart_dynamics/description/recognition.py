@@ -33,7 +33,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, HERE, HINGE, Mechanism, Part, Placement, UNIVERSAL)
 from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
-from stewart_dynamics.description.xml_text import NOT_CHECKED
+from stewart_dynamics.description.xml_text import LIMITS, NOT_CHECKED
 from stewart_dynamics.errors import shown
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters, STANDARD_GRAVITY
 
@@ -44,7 +44,6 @@ _ACROSS = math.radians(45.0)
 _OFF_AXIS = 1e-3
 _UNEQUAL = 0.01
 _THICK = 0.05
-_LIMITS = ('length_min', 'length_max', 'velocity_max', 'force_max')
 
 
 class Recognized(NamedTuple):
@@ -152,12 +151,12 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
         'geometry.zero_length': max(zero, 0.0),
         'actuator.reflected_mass': slide.armature, 'actuator.viscous_friction': slide.damping,
         'actuator.coulomb_friction': slide.friction}
-    for name, value in zip(_LIMITS, [*ends, slide.velocity_max, slide.force_max], strict=True):
-        least = 0.0 if name == 'length_min' else np.finfo(float).tiny
+    for name, value in zip(LIMITS, [*ends, slide.velocity_max, slide.force_max], strict=True):
+        least = 0.0 if name == 'limits.length_min' else np.finfo(float).tiny
         if value is not None and value < least:
-            said.append(f'limits.{name}: {value:.3g}: cannot be: left out')
+            said.append(f'{name}: {value:.3g}: cannot be: left out')
             value = None
-        leg[f'limits.{name}'] = value
+        leg[name] = value
     for part, bodies, start, way in (('cylinder', chain.lower, root, along),
                                      ('piston', chain.upper, tip, -along)):
         leg |= _slender(part, bodies, start, way, length, said)
@@ -284,8 +283,8 @@ def _carried(mechanism: Mechanism) -> dict[str, Any]:
 
 def _missing(given: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """Return what the file does not have, one line each."""
-    said = [f'limits.{name}: not in the file: not checked' for name in _LIMITS
-            if f'limits.{name}' not in {**given, **mechanism.carried}]
+    said = [f'{name}: not in the file: unlimited' for name in LIMITS
+            if name not in {**given, **mechanism.carried}]
     if not (mechanism.carried or np.any(given['actuator.reflected_mass'])):
         said.append('actuator.reflected_mass: not in the file: 0 kg')
     return said

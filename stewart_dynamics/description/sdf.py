@@ -41,17 +41,14 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
 from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, numbers, text_of, without_limit)
+    add, CARRIED, carried, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 
 _VERSION = '1.9'
 _NAMESPACE = 'https://stewart-dynamics.example/sdf'
-_LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 _NOT_IN_SDF = ('gravity', 'geometry.zero_length', 'actuator.reflected_mass')
 # The tips add to it.
 _OF_PLATFORM = ('platform.mass', 'platform.center_of_mass', 'platform.inertia')
-_OF_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
-              'legs.piston.inertia')
 # Of a tip: its mass as a part of the platform's, and its radius of gyration [m].
 _TIP_MASS, _TIP_GYRATION = 1e-8, 0.1
 _COMMENT = 'Positions of joints are counted from the home pose.'
@@ -76,8 +73,7 @@ def sdf(hexapod: Hexapod, name: str) -> str:
     _shapes(platform, looks[hexapod.platform])
     for leg in hexapod.legs:
         _tip(model, hexapod, leg)
-    names = [*_NOT_IN_SDF, *_OF_PLATFORM, *(each for each in _OF_BODIES if not p[each].all()),
-             *without_limit(p, _LIMITS)]
+    names = [*_NOT_IN_SDF, *_OF_PLATFORM, *(each for each in LEG_BODIES if not p[each].all())]
     for each, text in {**carried(p, names), 'base_frame': hexapod.base}.items():
         add(model, f'{CARRIED}:parameter', name=each, value=text)
     return text_of(root, _COMMENT)

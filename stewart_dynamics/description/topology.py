@@ -22,7 +22,7 @@ are six chains with one slide each. Names are not used, but for the block of ste
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -90,23 +90,30 @@ class _Groups:
         for joint in mechanism.joints:
             if joint.kind == FIXED:
                 self._of[self.of(joint.parent)] = self.of(joint.child)
-        self.edges = [joint for joint in mechanism.joints
-                      if joint.kind != FIXED and self.of(joint.parent) != self.of(joint.child)]
+        self._members: dict[str, list[str]] = {}
+        for name in self._of:
+            self._members.setdefault(self.of(name), []).append(name)
+        self._at: dict[str, list[Joint]] = {}
+        for joint in mechanism.joints:
+            ends = self.of(joint.parent), self.of(joint.child)
+            if joint.kind != FIXED and ends[0] != ends[1]:
+                for end in ends:
+                    self._at.setdefault(end, []).append(joint)
 
     def of(self, name: str) -> str:
         """Return the group of a body."""
         while self._of[name] != name:
+            self._of[name] = self._of[self._of[name]]  # halves the path for the next search
             name = self._of[name]
         return name
 
     def members(self, group: str) -> list[str]:
         """Return the bodies of a group."""
-        return [name for name in self._of if self.of(name) == group]
+        return self._members[group]
 
     def at(self, group: str) -> list[Joint]:
         """Return the joints at a group."""
-        return [joint for joint in self.edges
-                if group in (self.of(joint.parent), self.of(joint.child))]
+        return self._at.get(group, [])
 
     def other(self, joint: Joint, group: str) -> str:
         """Return the group at the other end of a joint."""
@@ -115,12 +122,13 @@ class _Groups:
 
     def reached(self, start: str, without: Iterable[str], slides: bool = True) -> set[str]:
         """Return the groups that are connected to one while others are taken away."""
-        taken, found, waiting = set(without), {start}, deque([start])
+        taken, found, waiting = {*without, start}, {start}, deque([start])
         while waiting:
             group = waiting.popleft()
             for joint in self.at(group):
                 next_one = self.other(joint, group)
-                if next_one not in taken | found and (slides or joint.kind != SLIDE):
+                if next_one not in taken and (slides or joint.kind != SLIDE):
+                    taken.add(next_one)
                     found.add(next_one)
                     waiting.append(next_one)
         return found
@@ -142,11 +150,13 @@ def topology_of(mechanism: Mechanism) -> Topology:
     hubs.sort(key=lambda group: _baseness(mechanism, groups, group))
     base, platform = hubs[0], hubs[1]
     chains: dict[str, Chain] = {}
+    seen = {platform}
     for joint in groups.at(base):
         start = groups.other(joint, base)
-        if start == platform:
+        if start in seen:
             continue
         inside = groups.reached(start, (base, platform))
+        seen |= inside
         chain = _chain(mechanism, groups, base, platform, inside)
         if chain is not None:
             chains[chain.steps[chain.slide].joint.name] = chain
@@ -184,9 +194,13 @@ def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
     last bodies of the others are fixed to it; where they have one less, they end in ball joints.
     """
     ends = []
+    seen: set[str] = set()
     for joint in groups.at(base):
         start = groups.other(joint, base)
+        if start in seen:
+            continue
         inside = groups.reached(start, (base,))
+        seen |= inside
         distances = {start: 1}
         waiting = deque([start])
         while waiting:
@@ -235,9 +249,9 @@ def _hint(slides: list[Joint]) -> str:
 
 def _baseness(mechanism: Mechanism, groups: _Groups, group: str) -> tuple[int, int, float]:
     """Return what is smallest for the base: in the world, carried by nothing, low."""
-    members = set(groups.members(group))
-    carried = any(joint.child in members and joint.parent not in members
-                  and joint.child_anchor is None for joint in mechanism.joints)
+    members = groups.members(group)
+    carried = any(groups.of(joint.child) == group and joint.child_anchor is None
+                  for joint in groups.at(group))
     heights = [mechanism.parts[name].placement.position[2] for name in members
                if name in mechanism.parts]
     return int(WORLD not in members), int(carried), float(np.mean(heights))
@@ -262,8 +276,10 @@ def _chain(mechanism: Mechanism, groups: _Groups, base: str, platform: str, insi
     path, group = [platform], platform
     while group != base:
         group, joint = before[group]
-        steps.insert(0, Step(joint, groups.of(joint.parent) == group))
-        path.insert(0, group)
+        steps.append(Step(joint, groups.of(joint.parent) == group))
+        path.append(group)
+    steps.reverse()
+    path.reverse()
     at = [n for n, step in enumerate(steps) if step.joint.kind == SLIDE]
     if len(at) != 1:
         return None
@@ -275,10 +291,10 @@ def _chain(mechanism: Mechanism, groups: _Groups, base: str, platform: str, insi
 
 def _main(mechanism: Mechanism, groups: _Groups, group: str) -> Part:
     """Return the body of a group that its legs are at; the heaviest where there is none."""
-    ends = [end for joint in groups.at(group) for end in (joint.parent, joint.child)]
+    ends = Counter(end for joint in groups.at(group) for end in (joint.parent, joint.child))
     members = [mechanism.parts[name] for name in groups.members(group) if name in mechanism.parts]
     return max(members, key=lambda part: (
-        ends.count(part.name) > LEGS // 2, part.mass or 0.0, ends.count(part.name)))
+        ends[part.name] > LEGS // 2, part.mass or 0.0, ends[part.name]))
 
 
 def _shown(mechanism: Mechanism, groups: _Groups, group: str) -> str:

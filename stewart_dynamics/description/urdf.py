@@ -36,11 +36,10 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import Body, Hexapod, Leg, PASSIVE_RATE, UNLIMITED
 from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
 from stewart_dynamics.description.xml_text import (
-    add, CARRIED, carried, numbers, text_of, without_limit)
+    add, CARRIED, carried, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
 from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
 
-_LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 _NOT_IN_URDF = ('gravity', 'actuator.reflected_mass')
 _AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
 # Of the virtual joints of the platform, and the largest angles of their closed form.
@@ -87,7 +86,7 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str
         _leg(root, hexapod, leg, looks)
     p = hexapod.parameters
     block = add(root, CARRIED)
-    for each, text in carried(p, (*_NOT_IN_URDF, *without_limit(p, _LIMITS))).items():
+    for each, text in carried(p, _NOT_IN_URDF).items():
         add(block, 'parameter', name=each, value=text)
     for leg in hexapod.legs:
         add(block, 'loop', tip=leg.piston.name, platform=leg.ball)

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -28,8 +28,16 @@ from stewart_dynamics.parameters.table import Parameters
 
 CARRIED = 'stewart_dynamics'
 """Name of the block, or prefix of the elements, of parameters that a format has no place for."""
-_IF_GIVEN = ('geometry.base_joint_axes', 'geometry.platform_joint_axes',
-             'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
+LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
+"""Limits that joints have in URDF and SDFormat."""
+LEG_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',
+              'legs.piston.inertia')
+_GROUPS = ('actuator.', 'drive.', 'geometry.', 'legs.', 'limits.')
+# Parameters of these groups that formats have elements for.
+_IN_ELEMENTS = frozenset((
+    *LIMITS, *LEG_BODIES, 'legs.cylinder.center_of_mass', 'legs.piston.center_of_mass',
+    'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
+    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction'))
 NOT_CHECKED = 'none'
 """Value there of a limit that is not checked."""
 
@@ -56,12 +64,19 @@ def text_of(root: ET.Element, comment: str) -> str:
 
 
 def carried(parameters: Parameters, names: Iterable[str]) -> Mapping[str, str]:
-    """Return parameters as text, for a block of what a format has no place for."""
-    names = [*names, *(name for name in _IF_GIVEN if parameters[name] is not None)]
-    return {name: NOT_CHECKED if parameters[name] is None else numbers(parameters[name])
-            for name in names}
+    """
+    Return parameters as text, for a block of parameters that a format has no elements for.
+
+    These are the given ones that no format has elements for, those named, and limits that are not
+    set.
+    """
+    names = [*names, *(name for name in LIMITS if parameters[name] is None),
+             *(name for name in parameters.given
+               if name.startswith(_GROUPS) and name not in _IN_ELEMENTS)]
+    return {name: _text(parameters[name]) for name in names}
 
 
-def without_limit(parameters: Parameters, names: Sequence[str]) -> list[str]:
-    """Return which of these limits are not checked."""
-    return [name for name in names if parameters[name] is None]
+def _text(value: Any) -> str:
+    if value is None:
+        return NOT_CHECKED
+    return value if isinstance(value, str) else numbers(value)
