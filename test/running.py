@@ -57,6 +57,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.logging import get_logger
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
@@ -68,6 +69,7 @@ from referees import ROOT
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header
 from stewart_dynamics import Motion, Parameters, StewartPlatform
+from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
@@ -298,6 +300,8 @@ class Inside:
         self._done = done
         with ExitStack() as stack:
             self._said = stack.enter_context(_Stderr())
+            stack.enter_context(patch.object(
+                machine_code, 'announce', get_logger('inside').info))
             with patch.object(sys, 'argv', ['inside', *map(str, arguments)]):
                 rclpy.init(args=sys.argv, domain_id=domain)
                 try:
@@ -827,8 +831,17 @@ class DynamicsNode:
 
     def change(self, transition: int) -> bool:
         """Ask for a transition of the lifecycle, and return whether it is done."""
-        return bool(self.call('change_state', ChangeState.Request(
-            transition=Transition(id=transition))).success)
+        future = self.begin_change(transition)
+        self.until(future.done, 'change_state answers')
+        return bool(future.result().success)
+
+    def begin_change(self, transition: int) -> Future:
+        """Ask for a transition of the lifecycle, and return the future of its answer."""
+        if not self._known:
+            self.until_known()
+        client = self._clients['change_state']
+        self.until(client.service_is_ready, 'change_state is there')
+        return client.call_async(ChangeState.Request(transition=Transition(id=transition)))
 
     @property
     def state(self) -> str:

@@ -38,7 +38,7 @@ from std_msgs.msg import Float64MultiArray
 
 from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.parameters.files import read_yaml
+from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
 

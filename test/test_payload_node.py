@@ -199,3 +199,17 @@ def test_it_is_answered_when_the_node_is_deactivated(carried: Carried) -> None:
     assert node.change(Transition.TRANSITION_ACTIVATE)
     assert carried.identify().message == 'no measured legs'
     node.until_active()
+
+
+def test_requests_behind_deactivation_and_cleanup_are_answered(carried: Carried) -> None:
+    node = carried.node
+    carried.move()
+    for _ in range(5):  # a service of ROS keeps ten requests
+        futures = [
+            node.begin_change(Transition.TRANSITION_DEACTIVATE), carried.begin(),
+            node.begin_change(Transition.TRANSITION_CLEANUP), carried.begin(), carried.begin(),
+            node.begin_change(Transition.TRANSITION_CONFIGURE),
+            node.begin_change(Transition.TRANSITION_ACTIVATE), carried.begin()]
+        node.until(lambda waiting=futures: all(future.done() for future in waiting),
+                   'all are answered')
+    node.until_active()

@@ -54,7 +54,7 @@ from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.rclpy_workarounds import (
-    answer_impossible_transitions, OneShotTimer, set_parameters_together)
+    answer_impossible_transitions, OneShotTimer)
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints import base_wrench
@@ -118,7 +118,6 @@ class DynamicsNode(LifecycleNode):
         self.create_timer(TICK, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         answer_impossible_transitions(
             self, lambda text: self._log.write([LogLine(ERROR, text, text)]))
-        set_parameters_together(self)
         if machine_code.HINT:
             self.get_logger().warning(machine_code.HINT)
         if self._settings['autostart']:
@@ -204,7 +203,6 @@ class DynamicsNode(LifecycleNode):
         self._topics.make(self._settings, self._on_setpoint, self._on_base, {
             WRENCH: self._on_wrench, MEASURED_LEGS: self._on_measured_legs,
             planned.INPUT: self._on_trajectory})
-        self._payload.make()
         self._diagnostics_publisher = DiagnosticsPublisher(self, self._topics, self._log)
         self._exclusive = self._settings['setpoint.exclusive']
         self._configured = True
@@ -217,7 +215,6 @@ class DynamicsNode(LifecycleNode):
     def _close(self) -> None:
         self._configured = False
         self._topics.destroy()
-        self._payload.destroy()
 
     # -- setpoints: from the topic to the published answer ----------------------------------
 

@@ -40,6 +40,8 @@ class PayloadService:
     """
     Does the work on requests in pieces, one at each tick of a timer; there is one work at a time.
 
+    The service exists in all states of the node's lifecycle.
+
     Parameters
     ----------
     node : Node
@@ -54,23 +56,13 @@ class PayloadService:
     def __init__(self, node: Node, work: Callable[[], Iterator[Outcome | None] | Outcome],
                  done: Callable[[Outcome, float], None]) -> None:
         self.code = Preparation(*FUNCTIONS)
-        self._node, self._begin, self._done = node, work, done
+        self._begin, self._done = work, done
         self._timer = OneShotTimer(node, _PAUSE, self._on_timer)
         self._work: Iterator[Outcome | None] | None = None
         self._begun = 0.0
         self._waiting: list[Callable[[Any], None]] = []
-        self._service: Any = None
-
-    def make(self) -> None:
-        """Begin to take requests."""
-        self._service = create_later_service(
-            self._node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)
-
-    def destroy(self) -> None:
-        """Take no more."""
-        if self._service is not None:
-            self._node.destroy_service(self._service)
-            self._service = None
+        # Never destroyed before the node: a request that waits would have no answer then.
+        create_later_service(node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)
 
     def drop(self, reason: str) -> None:
         """End the work in progress without result, if there is any."""

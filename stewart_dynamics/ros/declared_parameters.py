@@ -16,14 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 import math
 import sys
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
     FloatingPointRange, ParameterDescriptor, ParameterType, SetParametersResult)
+from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -31,14 +33,16 @@ from rclpy.parameter import Parameter as RosParameter
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.rules import Parameter
-from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes
+from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value
 from stewart_dynamics.ros.arguments import given_parameters, parameter_files
-from stewart_dynamics.ros.rclpy_workarounds import describe_by, is_present, set_parameters_together
 
 _TYPES = {
     'string': (ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_STRING_ARRAY),
     'double': (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_DOUBLE_ARRAY),
     'bool': (ParameterType.PARAMETER_BOOL, ParameterType.PARAMETER_BOOL_ARRAY)}
+
+_NUMBERS = (
+    RosParameter.Type.NOT_SET, RosParameter.Type.DOUBLE, RosParameter.Type.DOUBLE_ARRAY)
 
 Kind = TypeVar('Kind', bound=ParameterSet)
 
@@ -71,7 +75,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
         if name in given:
             node.set_descriptor(name, unchecked)
             value = RosParameter(name, value=given[name])
-            if not is_present(node, value):
+            if not _is_present(node, value):
                 node.set_parameters([value])
             continue
         if node.has_parameter(name):
@@ -82,9 +86,7 @@ def declare_parameters(node: Node, kind: type[Kind]) -> Kind:
         node.declare_parameter(name, default, unchecked, ignore_override=True)
     if not isinstance(node, LifecycleNode):
         node.add_on_set_parameters_callback(partial(_reject_changes, kind))
-    set_parameters_together(node)
-    describe_by(node, lambda name: _descriptor(
-        kind.table[name], node) if name in kind.table else None)
+    _serve(node, kind)
     return parameters
 
 
@@ -131,3 +133,91 @@ def _descriptor(parameter: Parameter, node: Node) -> ParameterDescriptor:
         read_only=not has_lifecycle, dynamic_typing=len(parameter.sizes) > 1,
         floating_point_range=[FloatingPointRange(
             from_value=parameter.minimum, to_value=parameter.maximum)] if in_range else [])
+
+
+def _serve(node: Node, kind: type[ParameterSet]) -> None:
+    """
+    Answer the parameter services of ROS in place of rclpy, whose callbacks raise out of spin.
+
+    - A type in ``set_parameters`` that does not exist raises ValueError (in rclcpp:
+      https://github.com/ros2/rclcpp/issues/3257), and an undeclared name in
+      ``get_parameter_types`` TypeError: either ends the program.
+    - ``set_parameters`` sets one parameter after the other, as rcl_interfaces defines it: where
+      the second is rejected, the first stays set. Here all of one request are set or none.
+    - A read-only parameter in the request, as a dump has them, makes rclpy reject the whole
+      request even if its value is the present one. Here equal values are no change.
+    - rclpy checks a value by the descriptor that it holds before the node's own check is asked,
+      in its own words, and takes the bounds of a range as inclusive, so that ``more than 0``
+      cannot be described; it also writes the type of a value into the descriptor before it
+      rejects the value (``_apply_descriptor`` in
+      https://github.com/ros2/rclpy/blob/7.1.5/rclpy/rclpy/node.py).
+    """
+    def set_together(messages: Sequence[Any]) -> SetParametersResult:
+        try:
+            received = [_received(node, message) for message in messages]
+            return node.set_parameters_atomically(
+                [each for each in received if not _is_present(node, each)])
+        except (ParameterException, RuntimeError, TypeError, ValueError) as exc:
+            return SetParametersResult(successful=False, reason=str(exc))
+
+    def set_parameters(request: Any, response: Any) -> Any:
+        response.results = [set_together(request.parameters)] * len(request.parameters)
+        return response
+
+    def set_parameters_atomically(request: Any, response: Any) -> Any:
+        response.result = set_together(request.parameters)
+        return response
+
+    def get_parameter_types(request: Any, response: Any) -> Any:
+        response.types = [node.get_parameter(name).type_.value for name in request.names]
+        return response
+
+    def describe_parameters(request: Any, response: Any) -> Any:
+        response.descriptors = [
+            _descriptor(kind.table[name], node) if name in kind.table
+            else node.describe_parameter(name) for name in request.names]
+        return response
+
+    answers: dict[str, Callable[[Any, Any], Any]] = {
+        answer.__name__: answer for answer in (
+            set_parameters, set_parameters_atomically, get_parameter_types, describe_parameters)}
+    for service in node.services:
+        name = service.srv_name.rpartition('/')[2]
+        service.callback = answers.get(name, service.callback)
+
+
+def _received(node: Node, message: Any) -> RosParameter:
+    """
+    Return the parameter of a request, a number as one where ``ros2 param load`` has sent its text.
+
+    It sends 1e-05 as a text (https://github.com/ros2/rclpy/issues/1672), and the text None where
+    ``ros2 param dump`` has written null (https://github.com/ros2/ros2cli/issues/965).
+    """
+    try:
+        parameter: RosParameter = RosParameter.from_parameter_msg(message)
+    except ValueError as exc:
+        raise ValueError(
+            f'{message.name}: parameter type {message.value.type} does not exist') from exc
+    if (parameter.type_ != RosParameter.Type.STRING or not node.has_parameter(parameter.name)
+            or node.get_parameter(parameter.name).type_ not in _NUMBERS):
+        return parameter
+    if parameter.value == 'None':
+        return RosParameter(parameter.name)
+    with suppress(ParameterError):
+        value = read_value(parameter.value, parameter.name)
+        entries = value if isinstance(value, list) else [value]
+        if entries and all(isinstance(entry, float) for entry in entries):
+            return RosParameter(parameter.name, value=value)
+    return parameter
+
+
+def _is_present(node: Node, parameter: RosParameter) -> bool:
+    """Return whether a parameter has this type and value already."""
+    if not node.has_parameter(parameter.name):
+        return False
+    present = node.get_parameter(parameter.name)
+    if parameter.type_ != present.type_:
+        return False
+    if isinstance(parameter.value, str) or not hasattr(parameter.value, '__len__'):
+        return bool(parameter.value == present.value)
+    return list(parameter.value) == list(present.value)

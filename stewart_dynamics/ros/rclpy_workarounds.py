@@ -23,34 +23,26 @@ it passes without the workaround, the workaround can be removed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 import gc
 import os
 import sys
 from typing import Any, NoReturn
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
-from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNode
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.task import Future
 from rclpy.time_source import TimeSource
 
-from stewart_dynamics.errors import ParameterError, StewartError
-from stewart_dynamics.parameters.yaml_file import read_value
+from stewart_dynamics.errors import StewartError
 
 _PIECE, _LOOK = 10.0, 0.1  # [s]
 _NANOSECONDS = 1_000_000_000
-
-_NUMBERS = (
-    RosParameter.Type.NOT_SET, RosParameter.Type.DOUBLE, RosParameter.Type.DOUBLE_ARRAY)
 
 
 def answer_impossible_transitions(node: LifecycleNode, log: Callable[[str], None]) -> None:
@@ -137,102 +129,6 @@ class _Later:
     def _try(self) -> None:
         if self._response is not None and self._header is not None:
             self._send(self._response, self._header)
-
-
-def set_parameters_together(node: Node) -> None:
-    """
-    Set all parameters of one request or none, by either service; equal values are no change.
-
-    - ``set_parameters`` sets one parameter after the other, as rcl_interfaces defines it: where
-      the second is rejected, the first stays set.
-    - A ``ParameterValue.type`` that does not exist raises ValueError out of spin, which ends the
-      program (in rclcpp: https://github.com/ros2/rclcpp/issues/3257; in rclpy until
-      test_a_parameter_type_that_does_not_exist_is_rejected passes without this).
-    - ``ros2 param load`` sends 1e-05 as a text (https://github.com/ros2/rclpy/issues/1672), and
-      the text None where ``ros2 param dump`` has written null for a parameter without a value
-      (https://github.com/ros2/ros2cli/issues/965).
-    - A read-only parameter in the request, as a dump has them, makes rclpy reject the whole
-      request even if its value is the present one.
-    """
-    def set_together(messages: Sequence[Any]) -> SetParametersResult:
-        try:
-            received = [_received(node, message) for message in messages]
-            changes = [each for each in received if not is_present(node, each)]
-            return node.set_parameters_atomically(changes)
-        except (ParameterException, RuntimeError, TypeError, ValueError) as exc:
-            return SetParametersResult(successful=False, reason=str(exc))
-
-    def set_parameters(request: Any, response: Any) -> Any:
-        response.results = [set_together(request.parameters)] * len(request.parameters)
-        return response
-
-    def set_parameters_atomically(request: Any, response: Any) -> Any:
-        response.result = set_together(request.parameters)
-        return response
-
-    for service in node.services:
-        if service.srv_name.endswith('/set_parameters'):
-            service.callback = set_parameters
-        elif service.srv_name.endswith('/set_parameters_atomically'):
-            service.callback = set_parameters_atomically
-
-
-def _received(node: Node, message: Any) -> RosParameter:
-    """Return the parameter of a request, a number as one where rclpy has sent its text."""
-    try:
-        parameter: RosParameter = RosParameter.from_parameter_msg(message)
-    except ValueError as exc:
-        raise ValueError(
-            f'{message.name}: parameter type {message.value.type} does not exist') from exc
-    if (parameter.type_ != RosParameter.Type.STRING or not node.has_parameter(parameter.name)
-            or node.get_parameter(parameter.name).type_ not in _NUMBERS):
-        return parameter
-    if parameter.value == 'None':
-        return RosParameter(parameter.name)
-    with suppress(ParameterError):
-        value = read_value(parameter.value, parameter.name)
-        entries = value if isinstance(value, list) else [value]
-        if entries and all(isinstance(entry, float) for entry in entries):
-            return RosParameter(parameter.name, value=value)
-    return parameter
-
-
-def is_present(node: Node, parameter: RosParameter) -> bool:
-    """Return whether a parameter has this type and value already."""
-    if not node.has_parameter(parameter.name):
-        return False
-    present = node.get_parameter(parameter.name)
-    if parameter.type_ != present.type_:
-        return False
-    if isinstance(parameter.value, str) or not hasattr(parameter.value, '__len__'):
-        return bool(parameter.value == present.value)
-    return list(parameter.value) == list(present.value)
-
-
-def describe_by(
-        node: Node, describe: Callable[[str], ParameterDescriptor | None]) -> None:
-    """
-    Answer requests for a parameter's description by a function, None for rclpy's own answer.
-
-    rclpy checks a value by the descriptor that it holds before the node's own check is asked, in
-    its own words, and takes the bounds of a range as inclusive, so that ``more than 0`` cannot be
-    described; it also writes the type of a value into the descriptor before it rejects the value
-    (https://github.com/ros2/rclpy/blob/7.1.5/rclpy/rclpy/node.py, ``_apply_descriptor``). It can
-    be removed when test_a_value_out_of_range_is_left_to_the_node_s_own_check passes with
-    descriptors that are given to ``declare_parameter``.
-    """
-    def answer(request: Any, response: Any) -> Any:
-        response = describe_by_node(request, response)
-        if response.descriptors:  # none where a name is unknown
-            response.descriptors = [
-                describe(name) or known
-                for name, known in zip(request.names, response.descriptors, strict=True)]
-        return response
-
-    for service in node.services:
-        if service.srv_name.endswith('/describe_parameters'):
-            describe_by_node = service.callback
-            service.callback = answer
 
 
 class OneShotTimer:
