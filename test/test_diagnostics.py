@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -50,8 +51,10 @@ def output_of(setpoint: Setpoint = HOME, before: Singularity | None = None,
 CLEAR = output_of()
 
 
-def begun() -> DynamicsDiagnostics:
-    return DynamicsDiagnostics(PARAMETERS, TOPICS, (), BEGIN)
+def begun(**changes: Any) -> DynamicsDiagnostics:
+    parameters = PARAMETERS.replaced(
+        {name.replace('__', '.'): value for name, value in changes.items()})
+    return DynamicsDiagnostics(parameters, TOPICS, (), BEGIN)
 
 
 def answered(diagnostics: DynamicsDiagnostics, now: float, output: Output = CLEAR,
@@ -417,7 +420,7 @@ def test_a_crossing_is_one_line_in_the_log_with_stamp_and_time() -> None:
 
 
 def test_a_crossing_inside_stop_condition_hides_nothing_and_is_not_hidden() -> None:
-    diagnostics = begun()
+    diagnostics = begun(singularity__action='suppress_forces')
     inside = CLEAR._replace(condition=1e4, forces=None, singularity=Singularity(
         cause=Cause.CONDITION, stopped=True))
     answered(diagnostics, BEGIN, inside)
@@ -457,9 +460,9 @@ def test_a_pose_that_cannot_be_solved_is_an_error(setpoint: Setpoint) -> None:
 @pytest.mark.parametrize('suppressed', [False, True])
 def test_inside_the_stop_condition_is_an_error(suppressed: bool) -> None:
     stopped = Singularity(stopped=True, cause=Cause.CONDITION)
-    output = CLEAR._replace(singularity=stopped)
-    diagnostics = begun()
-    answered(diagnostics, BEGIN, output._replace(forces=None) if suppressed else output)
+    action = 'suppress_forces' if suppressed else 'warn'
+    diagnostics = begun(singularity__action=action)
+    answered(diagnostics, BEGIN, CLEAR._replace(singularity=stopped))
     of = status(diagnostics, 'singularity', BEGIN)
     assert of.level == ERROR
     assert 'stop_condition' in of.message
@@ -505,6 +508,33 @@ def test_an_exceeded_limit_is_an_error_with_the_excess(excess: Exceedance, words
     answered(diagnostics, BEGIN, CLEAR._replace(exceedances=(excess,)))
     of = status(diagnostics, 'limits', BEGIN)
     assert (of.level, of.message) == (ERROR, words)
+
+
+@pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
+@pytest.mark.parametrize('limited', [False, True])
+def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
+        action: str, limited: bool) -> None:
+    limits = {'limits__length_max': 1.4} if limited else {'limits__velocity_max': 0.5}
+    high = HOME._replace(stamp=HOME.stamp + 1_000_000,
+                         motion=(0.0, 0.0, 1e3, *HOME.motion[3:]))
+    step = Step(PARAMETERS.replaced({
+        'limits.action': action, **{k.replace('__', '.'): v for k, v in limits.items()}}))
+    first = step(HOME, None)
+    assert first is not None
+    output = step(high, first.state)
+    assert output is not None
+    diagnostics = begun(limits__action=action, **limits)
+    answered(diagnostics, BEGIN, output)
+    lines = [line.text for line in diagnostics.report.make(BEGIN)[1]]
+    of = status(diagnostics, 'limits', BEGIN)
+    assert of.level == ERROR
+    suppressed = '; forces suppressed' if action == 'suppress_forces' else ''
+    for text in (of.message, next(line for line in lines if line.startswith('limits: '))):
+        assert text.endswith(f'{suppressed}; likely mistake: position in mm')
+    values = dict(of.values)
+    assert values.get('jumps') == (None if limited else '1')
+    assert values.get('setpoints without forces, by limits.action') == (
+        '1' if suppressed else None)
 
 
 def test_of_a_clipped_force_the_demanded_one_is_reported() -> None:
@@ -621,7 +651,8 @@ PLAIN = re.compile(
     r'setpoints answered|crossings|condition number|worst condition number of the last second'
     r'|largest leg force under a unit load|its leg|rejected, .*|.*: (?:writers|readers)|dropped'
     r'|worst condition number since activation|leg of the largest force demanded'
-    r'|setpoints that exceed limits\.\w+|worst since activation, limits\.\w+'
+    r'|setpoints that exceed limits\.\w+|worst since activation, (limits\.\w+|jump)'
+    r'|jumps|setpoints without forces, by limits\.action'
     r'|incomplete')
 
 
@@ -649,14 +680,14 @@ def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
     diagnostics = begun()
     now, state = BEGIN, None
     _check_values(diagnostics, now)
-    for position, rotation, rates, pause in motions:
+    for stamp, (position, rotation, rates, pause) in enumerate(motions):
         now += pause
-        output = step(Setpoint(0, (*position, *rotation, *rates)), state)
+        output = step(Setpoint(stamp, (*position, *rotation, *rates)), state)
         if output is None:
             diagnostics.rejected(Rejection('setpoint', 'out of range'), '', now)
         else:
             answered(diagnostics, now, output)
-            state = output.singularity
+            state = output.state
         diagnostics.setpoints.found({POSE: 2}, {'leg_states': 1}, '/node', 1)
         _check_values(diagnostics, now)
 

@@ -56,6 +56,7 @@ MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
 FLAT = Sample((0.0, 0.0, 0.0))
 # Turned by 88 degrees; at 90 the hexapod is singular.
 TURNED = Sample((0.0, 0.0, 0.9), (0.0, 0.0, math.sin(0.768), math.cos(0.768)))
+LATER = 10_000_000_000  # the legs can be anywhere then [ns]
 LEAPING = Sample(accel=(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
 
 NOT_JOINED = 'dropped: not all topics had its stamp'
@@ -453,7 +454,7 @@ def test_forces_above_their_limit_are_clipped_and_reported(node: DynamicsNode) -
             f'{result.forces[worst] - 6000.0:.6g} N above limits.force_max, clipped') in message
     key = f'leg_{worst + 1}: force demanded (N)'
     assert node.values('limits')[key] == f'{result.forces[worst]:.6g}'
-    node.answer(MOVING)
+    node.answer(MOVING, stamp=node.stamp(LATER))
     node.until_status('limits', OK, '')
 
 
@@ -467,6 +468,26 @@ def test_other_limits_are_reported_and_the_answer_is_published(node: DynamicsNod
         node.until_status('limits', ERROR, text)
         assert 'clipped' not in node.status('limits').message
     node.answer(MOVING)
+    node.until_counted()
+
+
+def test_a_pose_in_millimetres_is_answered_without_forces(fresh: Fresh) -> None:
+    node = fresh('limits.action:=suppress_forces', 'limits.length_max:=[1.32]')
+    node.until_active()
+    node.answer()
+    forces = len(node.raw['leg_forces'])
+    millimetres = HOME._replace(position=(0.0, 0.0, 920.0))
+    state = node.state_of(node.send(millimetres))
+    assert len(state.effort) == 0
+    assert bits(state.velocity) == bits(node.result_of(millimetres).rates)
+    message = node.until_status('limits', ERROR, 'm above limits.length_max')
+    assert '; forces suppressed; likely mistake: position in mm' in message
+    assert node.values('limits')['jumps'] == '1'
+    # The hexapod has not moved: it follows from where it was.
+    node.answer()
+    assert len(node.raw['leg_forces']) == forces + 1
+    assert node.set_parameters(limits__action='warn').successful
+    node.until(lambda: len(node.state_of(node.send(millimetres)).effort) == 6, 'forces come')
     node.until_counted()
 
 
@@ -490,7 +511,7 @@ def test_angles_of_joints_above_their_limit_are_reported(shared: NodeProcess) ->
                 assert (words in message) is bool(angle > bound)
                 assert node.values('limits')[
                     f'leg_{leg + 1}: {joint} joint angle (rad)'] == f'{angle:.6g}'
-        node.answer(HOME)
+        node.answer(HOME, stamp=node.stamp(LATER))
         node.until_status('limits', OK, '')
 
 

@@ -90,9 +90,9 @@ def test_the_warning_is_sent_first_and_then_at_every_change() -> None:
         message = decoded(list(MESSAGES.of_output(output))).get('singularity_warning')
         if message is not None:
             sent.append(message.data)
-        changed = state is None or state.warning != output.singularity.warning
+        changed = state is None or state.singularity.warning != output.singularity.warning
         assert (message is not None) == changed == output.warning_changed
-        state = output.singularity
+        state = output.state
     assert sent == [False, True, False]
 
 
@@ -129,7 +129,7 @@ def test_many_messages_are_those_of_one_after_the_other(action: str) -> None:
     lacking = 0
     for n, motion in enumerate(motions.tolist()):
         output = answered(step, Setpoint(STAMP + n, tuple(motion)), NO_WRENCH, state)
-        state = output.singularity
+        state = output.state
         lacking += output.forces is None
         assert found[n] == dict(written.of_output(output))
     assert 0 < lacking < len(motions)
@@ -168,7 +168,7 @@ def _check_finite(step: Step, setpoint: Setpoint, wrench: Six) -> None:
     output = step(setpoint._replace(wrench=wrench), None)
     if output is None:
         return
-    after = step(setpoint._replace(wrench=wrench), output.singularity)
+    after = step(setpoint._replace(wrench=wrench), output.state)
     assert after is not None
     for of in (output, after):
         read = decoded(list(OutputMessages(step.parameters).of_output(of)))

@@ -94,7 +94,7 @@ def answers(parameters: Parameters, of: Iterable[Recorded],
         setpoint = setpoints.take(topic, data, lambda: when)  # noqa: B023
         if setpoint is not None:
             setpoint = setpoints.on_base(setpoint)
-            output = step(setpoint, found[-1][1].singularity if found else None)
+            output = step(setpoint, found[-1][1].state if found else None)
             assert output is not None
             found.append((setpoint, output))
     return found

@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
+from typing import Any
 
 from hypothesis import strategies as st
 import numpy as np
@@ -27,9 +29,9 @@ from referees import (
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.mechanics.limits import Exceedance
+from stewart_dynamics.mechanics.limits import Exceedance, JITTER, JUMP
 from stewart_dynamics.mechanics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
-from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, Step
+from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
 
 PARAMETERS = symmetric_parameters()
 STEP = Step(PARAMETERS)
@@ -53,7 +55,7 @@ def rows(parameters: Parameters, many: int) -> list[tuple[Setpoint, Six]]:
 
 
 def answered(step: Step, setpoint: Setpoint, wrench: Six = NO_WRENCH,
-             before: Singularity | None = None) -> Output:
+             before: State | None = None) -> Output:
     output = step(setpoint._replace(wrench=wrench), before)
     assert output is not None
     return output
@@ -84,7 +86,8 @@ def test_it_gives_what_the_library_gives_bit_for_bit() -> None:
 
 def test_it_keeps_no_state() -> None:
     given = [setpoint._replace(wrench=wrench) for setpoint, wrench in rows(PARAMETERS, 30)]
-    states = [None, Singularity(), Singularity(Cause.CONDITION, stopped=True, determinant=-1.0)]
+    states = [None, State(), State(Singularity(Cause.CONDITION, True, -1.0)),
+              State(stamp=STAMP - 1, lengths=(1.0,) * 6)]
     first = [STEP(setpoint, state) for setpoint in given for state in states]
     again = [STEP(setpoint, state) for setpoint in given for state in states]
     other = Step(PARAMETERS)
@@ -154,6 +157,128 @@ def test_several_limits_are_listed_together() -> None:
     limits = [exceedance.limit for exceedance in answered(step, setpoint, wrench).exceedances]
     assert limits == (['limits.length_max'] * 6 + ['limits.velocity_max'] * 6
                       + ['limits.force_max'] * 6)
+
+
+# Actions on limits, and jumps
+
+RATE = 0.5  # a leg's limit [m/s]
+
+
+def at(height: float, milliseconds: float, **changes: Any) -> Setpoint:
+    """Return a setpoint at rest at a height and a time."""
+    return HOME._replace(stamp=STAMP + round(milliseconds * 1e6),
+                         motion=(0.0, 0.0, height, *HOME.motion[3:]), **changes)
+
+
+def both_ways(step: Step, setpoints: Sequence[Setpoint]) -> list[Output]:
+    """Return the outputs one by one; many at once give the same forces, jumps and state."""
+    state, outputs = None, []
+    for setpoint in setpoints:
+        outputs.append(answered(step, setpoint, before=state))
+        state = outputs[-1].state
+    for cut in range(len(setpoints) + 1):
+        before = None
+        for which in (slice(0, cut), slice(cut, None)):
+            part, singles = setpoints[which], outputs[which]
+            if not part:
+                continue
+            many = step.many(Batch(
+                np.array([each.stamp for each in part]),
+                np.array([each.motion for each in part]), np.zeros((len(part), 6)),
+                np.array([each.restart for each in part]), np.zeros(len(part), dtype=np.int64),
+                stamped=np.array([each.stamped for each in part])), before)
+            before = many.state
+            assert before == singles[-1].state
+            assert many.jumped.tolist() == [jumped(each) for each in singles]
+            assert many.exceeding.tolist() == [bool(each.exceedances) for each in singles]
+            for row, each in zip(many.forces.tolist(), singles, strict=True):
+                assert each.forces == (None if math.isnan(row[0]) else tuple(row))
+    return outputs
+
+
+def jumped(output: Output) -> bool:
+    return any(each.limit == JUMP for each in output.exceedances)
+
+
+@pytest.mark.parametrize(('limit', 'values'), [
+    ('limits.length_min', (1.2, 0.8)), ('limits.length_max', (0.9, 1.2)),
+    ('limits.velocity_max', (1e-3, 1.0)), ('limits.base_joint_angle_max', (1e-3, 1.0)),
+    ('limits.platform_joint_angle_max', (1e-3, 1.0))])
+def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
+        limit: str, values: tuple[float, float]) -> None:
+    moving = HOME._replace(motion=(*HOME.motion[:12], 0.0, 0.0, 0.1, *REST[3:]))
+    leg = max(answered(STEP, moving).lengths)
+    exceeded, held = (value * leg if 'length' in limit else value for value in values)
+    tilted = moving._replace(motion=(0.05, *moving.motion[1:]))
+    for bound, suppressed in ((exceeded, True), (held, False)):
+        for action in ('warn', 'suppress_forces'):
+            step = Step(PARAMETERS.replaced({
+                'geometry.zero_length': leg, limit: bound, 'limits.action': action}))
+            output, = both_ways(step, [tilted])
+            assert bool(output.exceedances) is suppressed
+            assert (output.forces is None) is (suppressed and action == 'suppress_forces')
+            assert output.demanded_forces is not None
+
+
+def test_a_force_that_is_clipped_suppresses_nothing() -> None:
+    step = Step(PARAMETERS.replaced({'limits.force_max': 1.0, 'limits.action': 'suppress_forces'}))
+    output, = both_ways(step, [HOME])
+    assert output.exceedances
+    assert output.forces == pytest.approx([1.0] * 6)
+
+
+def test_a_pose_in_millimetres_is_never_answered_with_forces() -> None:
+    step = Step(PARAMETERS.replaced({
+        'limits.length_max': 1.32, 'limits.action': 'suppress_forces'}))
+    for scale in (1e3, 1e2, 10.0):
+        output, = both_ways(step, [at(0.92 * scale, 0.0)])
+        assert output.forces is None
+        assert {each.limit for each in output.exceedances} == {'limits.length_max'}
+
+
+@pytest.mark.parametrize('action', ['warn', 'suppress_forces'])
+def test_a_setpoint_that_the_legs_cannot_reach_in_time_is_a_jump(action: str) -> None:
+    step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE, 'limits.action': action}))
+    # Legs are steep: 1 mm of height is 0.7 to 1 mm of a leg. One outlier, then on as before.
+    outputs = both_ways(step, [at(1.0, 0), at(1.0005, 1), at(1.1, 2), at(1.001, 3), at(1.0, 4)])
+    assert [jumped(each) for each in outputs] == [False, False, True, False, False]
+    assert [each.forces is None for each in outputs] == [
+        False, False, action == 'suppress_forces', False, False]
+    worst = outputs[2].exceedances[0]
+    lengths = [each.lengths[worst.leg] for each in outputs]
+    assert worst.value == pytest.approx((lengths[2] - lengths[1]) / (1e-3 + JITTER))
+    assert worst.bound == RATE
+    assert 'limits.velocity_max' in worst.words(PARAMETERS['joints'])
+
+
+def test_after_a_jump_setpoints_are_followed_once_the_legs_can_be_there() -> None:
+    step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE}))
+    start, end = (answered(STEP, at(height, 0)).lengths for height in (1.0, 1.1))
+    needed = 1e3 * (max(end) - max(start)) / RATE
+    outputs = both_ways(step, [at(1.0, 0), *(at(1.1, time) for time in range(1, 300, 10))])
+    followed = [time for time, each in zip(range(1, 300, 10), outputs[1:], strict=True)
+                if not jumped(each)]
+    assert needed - 2.0 < followed[0] < needed + 10.0
+    assert followed == list(range(followed[0], 300, 10))
+
+
+def test_a_restart_and_a_stamp_of_arrival_are_no_jumps() -> None:
+    step = Step(PARAMETERS.replaced({'limits.velocity_max': RATE, 'setpoint.timeout': 0.1}))
+    outputs = both_ways(step, [
+        at(1.0, 0), at(1.1, -500, restart=True), at(1.12, -499.9, stamped=False),
+        at(2.0, -499.8, stamped=False), at(1.1201, -499.8)])
+    assert [jumped(each) for each in outputs] == [False, False, False, True, False]
+    assert not jumped(answered(STEP, at(1e3, 1), before=answered(STEP, at(1.0, 0)).state))
+
+
+def test_a_motion_at_the_rate_limit_is_no_jump() -> None:
+    times = np.arange(0.0, 1000.0, 7.0)
+    heights = 1.0 + 0.1 * np.sin(2e-3 * math.pi * times)
+    free = [answered(STEP, at(height, time)) for height, time in zip(heights, times, strict=True)]
+    fastest = np.abs(np.diff([each.lengths for each in free], axis=0)).max() / 7e-3
+    step = Step(PARAMETERS.replaced({'limits.velocity_max': fastest}))
+    outputs = both_ways(step, [at(h, t) for h, t in zip(heights, times, strict=True)][:20])
+    assert not any(map(jumped, outputs))
 
 
 # Near a singularity
@@ -233,7 +358,7 @@ rotations = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(
 
 def test_a_restart_is_no_crossing() -> None:
     before = Singularity(Cause.CONDITION, True, -0.2, crossings=1)
-    output = STEP(HOME._replace(restart=True), before)
+    output = STEP(HOME._replace(restart=True), State(before))
     assert output is not None
     assert output.singularity.crossings == 1
     assert not output.singularity.warning

@@ -113,7 +113,7 @@ class Samples:
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         flags = np.zeros(many, dtype=bool)
         outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags,
-                          self.joint_angles)
+                          flags, self.joint_angles)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs
@@ -310,7 +310,8 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             'gaps': sum(step > gap for step in steps),
             'gaps_s': math.fsum(step for step in steps if step > gap),
             'restarts': sum(s.restarts.tolist()), 'base_unknown': len(unknown),
-            'base_unknown_first_at_s': t[unknown[0]] if len(unknown) else None},
+            'base_unknown_first_at_s': t[unknown[0]] if len(unknown) else None,
+            'jumps': 0, 'jumps_first_at_s': None},
         'legs': legs, 'limits': limits, 'limits_not_checked': not_checked,
         'singularity': {
             'determinant_nearest_m3': s.det[nearest], 'determinant_nearest_at_s': t[nearest],
@@ -523,7 +524,7 @@ def test_without_a_setpoint_there_is_nothing() -> None:
     assert found['setpoints'] == {
         'answered': 0, 'first_stamp_ns': None, 'last_stamp_ns': None, 'duration_s': 0.0,
         'gaps': 0, 'gaps_s': 0.0, 'restarts': 0, 'base_unknown': 0,
-        'base_unknown_first_at_s': None}
+        'base_unknown_first_at_s': None, 'jumps': 0, 'jumps_first_at_s': None}
     assert set(found['base_wrench']['moment'].values()) == {None}
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)

@@ -34,9 +34,15 @@ LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
 BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
     'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
 LIMITS = OF_RESULTS + OF_JOINTS
+# Not a limit with a parameter of its own: a setpoint too far from the last one for VELOCITY_MAX.
+JUMP = 'jump'
 
 # A value exceeds a limit only by more than this part of it: rounding errors are below.
 TOLERANCE = 1e-9
+
+# Stamps of setpoints may be off by this time [s]: a leg may move so much longer at its rate limit
+# before a setpoint counts as a jump.
+JITTER = 1e-3
 
 # Thresholds in a row, in the order of OF_RESULTS.
 _SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
@@ -44,8 +50,9 @@ _SHORTEST, _LONGEST, _FASTEST, _STRONGEST = consecutive(6, 6, 6, 6)
 QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
               VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N'),
               BASE_ANGLE_MAX: ('base joint angle', 'rad'),
-              PLATFORM_ANGLE_MAX: ('platform joint angle', 'rad')}
-"""Of each limit: what it limits, and the unit."""
+              PLATFORM_ANGLE_MAX: ('platform joint angle', 'rad'),
+              JUMP: ('mean rate from the last setpoint', 'm/s')}
+"""Quantity and unit of each limit."""
 
 ANGLES = {BASE_ANGLE_MAX: BASE_JOINT_ANGLES, PLATFORM_ANGLE_MAX: PLATFORM_JOINT_ANGLES}
 """Where in a row of joint angles the values of a limit are."""
@@ -55,7 +62,7 @@ class Exceedance(NamedTuple):
     """A limit that a leg exceeds."""
 
     limit: str
-    """One of LIMITS."""
+    """One of LIMITS, or JUMP."""
     leg: int
     value: float
     bound: float
@@ -65,8 +72,9 @@ class Exceedance(NamedTuple):
         quantity, unit = QUANTITIES[self.limit]
         excess = abs(abs(self.value) - self.bound)
         how = 'below' if self.limit == LENGTH_MIN else 'above'
+        limit = VELOCITY_MAX if self.limit == JUMP else self.limit
         return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {excess:.6g} {unit} '
-                f'{how} {self.limit}')
+                f'{how} {limit}')
 
 
 class Limits:
@@ -122,6 +130,15 @@ class Limits:
             _add_exceeding(found, limit, values, bounds, thresholds)
         return tuple(found)
 
+    def jumps(self, lengths: Six, followed: Six, elapsed: float) -> tuple[Exceedance, ...]:
+        """Return the legs that cannot move from one length to another within a time [s]."""
+        bounds = self.bounds[VELOCITY_MAX].tolist()
+        thresholds = self.thresholds[LIMITS.index(VELOCITY_MAX)].tolist()
+        return tuple(
+            Exceedance(JUMP, leg, (new - old) / elapsed, bounds[leg])
+            for leg, (new, old) in enumerate(zip(lengths, followed, strict=True))
+            if abs(new - old) > thresholds[leg] * elapsed)
+
     def exceeded_angles(self, angles: Sequence[float]) -> tuple[Exceedance, ...]:
         """Return all of OF_JOINTS that the joint angles (JOINT_ANGLES,) of one sample exceed."""
         found: list[Exceedance] = []
@@ -143,13 +160,28 @@ def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
 
 
 @inlined
-def any_exceeded(thresholds: Array, result: Array) -> bool:
-    """Return whether a row of a result exceeds one of OF_RESULTS (24,); nan never does."""
-    exceeded = False
+def any_exceeded(thresholds: Array, result: Array) -> tuple[bool, bool]:
+    """
+    Return whether a row of a result exceeds a limit of lengths or rates, and one of forces.
+
+    Thresholds are those of OF_RESULTS (24,); nan exceeds none.
+    """
+    moving, loaded = False, False
     for leg in range(6):
         if (result[LENGTHS.start + leg] < thresholds[_SHORTEST.start + leg]
                 or result[LENGTHS.start + leg] > thresholds[_LONGEST.start + leg]
-                or abs(result[RATES.start + leg]) > thresholds[_FASTEST.start + leg]
-                or abs(result[FORCES.start + leg]) > thresholds[_STRONGEST.start + leg]):
-            exceeded = True
-    return exceeded
+                or abs(result[RATES.start + leg]) > thresholds[_FASTEST.start + leg]):
+            moving = True
+        if abs(result[FORCES.start + leg]) > thresholds[_STRONGEST.start + leg]:
+            loaded = True
+    return moving, loaded
+
+
+@inlined
+def jumps(thresholds: Array, lengths: Array, followed: Array, elapsed: float) -> bool:
+    """Return whether a leg cannot move from one length to another (6,) within a time [s]."""
+    found = False
+    for leg in range(6):
+        if abs(lengths[leg] - followed[leg]) > thresholds[_FASTEST.start + leg] * elapsed:
+            found = True
+    return found

@@ -267,8 +267,7 @@ class DynamicsNode(LifecycleNode):
         setpoint = self._setpoints.on_base(setpoint)
         if self._restarting:
             setpoint = setpoint._replace(restart=True)
-        output = self._models.step(setpoint, None if self._last is None
-                                   else self._last.singularity)
+        output = self._models.step(setpoint, None if self._last is None else self._last.state)
         self._restarting = output is None and setpoint.restart
         if output is None:
             self._setpoints.reject('setpoint', OUT_OF_RANGE, f'stamp {setpoint.stamp} ns')
@@ -437,6 +436,7 @@ class DynamicsNode(LifecycleNode):
         if self._active:
             self._measured_legs.step = models.external_wrench
             self._diagnostics.singularity.parameters = parameters
+            self._diagnostics.limits.parameters = parameters
             self._markers.use(parameters)
         return SetParametersResult(successful=True)
 

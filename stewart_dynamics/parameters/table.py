@@ -123,6 +123,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
           'geometry.platform_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
           maximum=math.pi),
+    Parameter('limits.action', 'string', 'action while a length, rate or joint angle limit is '
+              'exceeded, or a setpoint is too far from the last one for limits.velocity_max: warn '
+              'only, or publish no forces', '', 'warn', choices=('warn', 'suppress_forces'),
+              while_active=True),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),

@@ -37,7 +37,6 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
 from stewart_dynamics.mechanics.limits import OF_JOINTS
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
-from stewart_dynamics.mechanics.singularity import Singularity
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_report import Report
@@ -59,7 +58,7 @@ from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.outputs import OutputMessages
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
-from stewart_dynamics.setpoints.step import Batch, Outputs, Step
+from stewart_dynamics.setpoints.step import Batch, Outputs, State, Step
 from stewart_dynamics.whole_file import write_json
 
 _SECOND = 1_000_000_000
@@ -170,7 +169,7 @@ class _Run:
         self._setpoints = Setpoints(parameters, self._rejected, self._notice)
         self._step = Step(parameters)
         self._base_wrench = BaseWrench(parameters)
-        self._state: Singularity | None = None
+        self._state: State | None = None
         self._restarting = False
         self._stamp: int | None = None
         self._elapsed = 0, 0  # [s], [ns]
@@ -301,7 +300,7 @@ class _Run:
         self._restarting = bool(restarts[-1] > restarts_answered.max(initial=0))
         if not len(setpoints.stamps):
             return 0
-        self._state = outputs.singularity()
+        self._state = outputs.state
         if self._first_time is None:
             self._first_time = int(setpoints.times[0])
         base_wrenches = self._base_wrench.many(setpoints)

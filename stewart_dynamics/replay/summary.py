@@ -96,6 +96,8 @@ class Summary:
         self._answered = self._restarts = self._gaps = self._unsolved = self._suppressed = 0
         self._without_force = self._base_unknown = 0
         self._base_unknown_at: float | None = None
+        self._jumps = 0
+        self._jumped_at: float | None = None
         self._seconds = self._gap_seconds = 0.0
         self._shortest = Extreme(6, np.negative)
         self._longest = Extreme(6, np.positive)
@@ -168,6 +170,10 @@ class Summary:
             self._base_unknown += int(unknown.sum())
             if self._base_unknown_at is None:
                 self._base_unknown_at = float(seconds[unknown.argmax()])
+        if outputs.jumped.any():
+            self._jumps += int(outputs.jumped.sum())
+            if self._jumped_at is None:
+                self._jumped_at = float(seconds[outputs.jumped.argmax()])
         self._without_force += int(without.sum())
         self._unsolved += int(unsolved.sum())
         self._suppressed += int((with_nan(outputs.forces) & ~without).sum())
@@ -233,14 +239,16 @@ class Summary:
                 'duration_s': self._seconds, 'gaps': self._gaps, 'gaps_s': self._gap_seconds,
                 'restarts': self._restarts,
                 'base_unknown': self._base_unknown,
-                'base_unknown_first_at_s': self._base_unknown_at},
+                'base_unknown_first_at_s': self._base_unknown_at,
+                'jumps': self._jumps, 'jumps_first_at_s': self._jumped_at},
             'legs': {name: self._leg(n) for n, name in enumerate(self._legs)},
             'limits': limits,
             'limits_not_checked': not_checked,
             'singularity': self._singularity(),
             'force_breakdown': self._force_breakdown(),
             'base_wrench': self._base_wrench.values(),
-            'limit_met': bool(limits or not_checked) or self._warnings.count > 0,
+            'limit_met': bool(
+                limits or not_checked or self._jumps) or self._warnings.count > 0,
         }
 
     def _leg(self, leg: int) -> dict[str, float | None]:

@@ -22,7 +22,7 @@ import math
 import textwrap
 from typing import Any
 
-from stewart_dynamics.mechanics.limits import FORCE_MAX
+from stewart_dynamics.mechanics.limits import FORCE_MAX, LIMITS
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
@@ -79,7 +79,7 @@ def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> li
     if found['quasi_static']:
         lines.append('velocities are not known: the forces are those at rest; rates, power and '
                      'energy are not known')
-    lines += _limit_lines(found, any(clipped), any(name.startswith('limits.') and bound is not None
+    lines += _limit_lines(found, any(clipped), any(name in LIMITS and bound is not None
                                                    for name, bound in parameters.items()))
     lines += [*_joint_lines(found['legs']), *_base_lines(found)]
     lines += ['', *_singularity_lines(found['singularity'])]
@@ -138,6 +138,10 @@ def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) ->
         lines.append(f'{each["limit"]}, {each["bound"]:g}, exceeded by {each["leg"]} in '
                      f'{plural(each["setpoints"], "setpoint")} from t = '
                      f'{each["first_at_s"]:.2f} s on: {each["worst"]:.6g} at worst')
+    if found['setpoints']['jumps']:
+        lines.append(f'{plural(found["setpoints"]["jumps"], "jump")}, first at t = '
+                     f'{found["setpoints"]["jumps_first_at_s"]:.2f} s: the legs cannot follow '
+                     'within limits.velocity_max')
     for name in found['limits_not_checked']:
         lines.append(f'{name} could not be checked' + (
             ' ' + '; '.join(f'in {plural(number, "setpoint")}: {why}' for number, why in (

@@ -105,12 +105,12 @@ class Setpoints:
         sample = self._joining.take(topic, data, now)
         if sample is None:
             return None
-        stamp, values, restart = sample
+        stamp, values, restart, stamped = sample
         # Zeros for what the topics do not give.
         motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
         if restart:
             self.base.restarted(stamp)
-        return Setpoint(stamp, motion, self.wrench, restart)
+        return Setpoint(stamp, motion, self.wrench, restart, stamped=stamped)
 
     def on_base(self, setpoint: Setpoint) -> Setpoint:
         """Return the setpoint with the base's motion at its stamp."""
@@ -148,7 +148,8 @@ class Setpoints:
             np.array([each.restart for each in setpoints], dtype=bool),
             np.array(times, dtype=np.int64),
             np.array([each.base for each in setpoints], dtype=float).reshape(-1, BASE)
-            if self.base.topics else None)
+            if self.base.topics else None,
+            np.array([each.stamped for each in setpoints], dtype=bool))
 
     def end(self, why: str) -> None:
         """Drop and count what still waits: no more messages come."""

@@ -46,6 +46,8 @@ class JoinedSample(NamedTuple):
     """Topic by topic, in the order of topics."""
     restart: bool
     """Time has jumped back before it."""
+    stamped: bool = True
+    """The stamp is that of the samples, not the time of arrival."""
 
 
 class SampleJoining:
@@ -267,7 +269,7 @@ class SampleJoining:
             return None
         self._unstamped_first = self._unstamped_first or next(iter(self._unstamped))
         self._unstamped.clear()
-        return JoinedSample(now(), sum(sound, ()), False)
+        return JoinedSample(now(), sum(sound, ()), False, stamped=False)
 
     def _drop_unstamped(self) -> None:
         for topic, values in self._unstamped.items():

@@ -32,7 +32,8 @@ from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
-from stewart_dynamics.mechanics.limits import ANGLES, any_exceeded, Exceedance, Limits, OF_RESULTS
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, any_exceeded, Exceedance, JITTER, jumps, Limits, OF_RESULTS)
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
@@ -57,11 +58,23 @@ class Setpoint(NamedTuple):
     """Time has jumped back before it: earlier setpoints do not matter for it."""
     base: tuple[float, ...] | None = None
     """A row of the base's motion; one of nan: it is not known. None: the base is still."""
+    stamped: bool = True
+    """The stamp is that of its messages, not the time of their arrival."""
 
     @property
     def base_known(self) -> bool:
         """Return whether the base is still, or its motion is known."""
         return self.base is None or self.base[0] == self.base[0]
+
+
+class State(NamedTuple):
+    """What the step needs to know of the setpoints before; the first setpoint follows State()."""
+
+    singularity: Singularity | None = None
+    stamp: int = 0
+    """Stamp of the last setpoint that was not a jump [ns]."""
+    lengths: Six | None = None
+    """Leg lengths of that setpoint [m]; None: there is none."""
 
 
 class Output(NamedTuple):
@@ -73,7 +86,7 @@ class Output(NamedTuple):
     demanded_forces: Six | None
     """As the dynamics have them; none where J_inv cannot be solved or the base is not known."""
     forces: Six | None
-    """As published: clipped to limits.force_max; none where suppressed or none are demanded."""
+    """As published, clipped to limits.force_max; None where suppressed or not demanded."""
     unit_load_forces: Six
     determinant: float
     determinant_rate: float
@@ -83,6 +96,8 @@ class Output(NamedTuple):
     exceedances: tuple[Exceedance, ...]
     joint_angles: tuple[float, ...] = ()
     """A row of joint angles [rad], nan those without a limit; empty where none has one."""
+    state: State = State()
+    """For the next setpoint."""
 
     @property
     def solvable(self) -> bool:
@@ -105,6 +120,8 @@ class Batch(NamedTuple):
     """When the message that completed each came (N,) [ns]."""
     bases: Array | None = None
     """Rows of the base's motion (N, 12); one of nan: it is not known. None: the base is still."""
+    stamped: Flags | None = None
+    """(N,): the stamp is that of its messages, not the time of arrival. None: all are."""
 
     @property
     def base_known(self) -> Flags:
@@ -135,8 +152,12 @@ class Outputs(NamedTuple):
     """(N,): the singularity warning is another than before."""
     exceeding: Flags
     """(N,): a limit is exceeded."""
+    jumped: Flags
+    """(N,): the legs cannot follow from the last setpoint that was not a jump."""
     joint_angles: Array
     """Rows of joint angles (N, 12) [rad], or (N, 0), as in Output."""
+    state: State = State()
+    """For the next setpoint."""
 
     @property
     def lengths(self) -> Array:
@@ -188,70 +209,86 @@ class Outputs(NamedTuple):
         """(N,): inside stop_condition."""
         return self.states[:, STOPPED] > 0.0
 
-    def singularity(self, n: int = -1) -> Singularity:
-        """Return the state after one of them."""
-        return Singularity.of(self.states[n].tolist())
 
-
-# The settings as numbers, those of the warning first; whether to suppress, the thresholds of the
-# limits, what forces are clipped to.
-_THRESHOLDS, _SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(THRESHOLDS, 1, 24, 6)
+# The settings as numbers, those of the warning first; whether to suppress inside stop_condition
+# and while a limit is exceeded, the thresholds of the limits, what forces are clipped to.
+_THRESHOLDS, _SUPPRESS, _LIMITS_SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(
+    THRESHOLDS, 1, 1, 24, 6)
 
 # One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
-_RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING = consecutive(RESULT, 6, STATE, 1, 1)
-(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _RESTART, _IS_STAMP, _BASE_KNOWN,
- _WRITTEN, _TILE) = consecutive(CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 1, 1, 1,
-                                _EXCEEDING.stop, inverse_dynamics.TILE)
+_RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING, _JUMPED = consecutive(RESULT, 6, STATE, 1, 1, 1)
+(_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _FOLLOWED, _ELAPSED, _RESTART, _IS_STAMP,
+ _BASE_KNOWN, _WRITTEN, _TILE) = consecutive(
+     CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 6, 1, 1, 1, 1, _JUMPED.stop,
+     inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
-_GIVES = Struct(f'{_EXCEEDING.stop}d')
+_GIVES = Struct(f'{_JUMPED.stop}d')
 
 
 @inlined
-def _watch(settings: Array, limits: Array, is_stamp: bool, base_known: bool, state: Array,
-           restart: bool, result: Array, forces: Array) -> tuple[bool, bool]:
-    """Write what becomes of a result, see Outputs; return whether it is answered and exceeds."""
+def _check(settings: Array, limits: Array, is_stamp: bool, base_known: bool, state: Array,
+           restart: bool, followed: Array, elapsed: float, result: Array, forces: Array,
+           ) -> tuple[bool, bool, bool]:
+    """
+    Check a result and write the forces to publish.
+
+    Return whether it is answered, exceeds a limit, and is a jump; see Outputs.
+    """
     finite = is_stamp
     for k in range(RESULT):
         finite = finite and math.isfinite(result[k])
     if not finite:
-        return False, False
+        return False, False, False
     if restart:
         forget(state)
     condition = result[CONDITION]
     advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
             condition)
     solved = condition < UNSOLVABLE_CONDITION and base_known
-    published = solved and not (state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
     for leg in range(6):
         if not solved:
             result[FORCES.start + leg] = np.nan
+    moving, loaded = any_exceeded(limits, result)
+    jumped = jumps(limits, result[LENGTHS], followed, elapsed)
+    suppressed = ((state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
+                  or ((moving or jumped) and settings[_LIMITS_SUPPRESS.start] > 0.0))
+    for leg in range(6):
         force, most = result[FORCES.start + leg], settings[_FORCE_MAX.start + leg]
-        forces[leg] = min(max(force, -most), most) if published else np.nan
-    return True, any_exceeded(limits, result)
+        forces[leg] = min(max(force, -most), most) if solved and not suppressed else np.nan
+    return True, moving or loaded or jumped, jumped
 
 
-@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'b1[::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'f8[:,::1]', 'b1[::1]', 'b1[::1]')
-def _watch_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: Flags,
-                state: Array, results: Array, forces: Array, states: Array, answered: Flags,
-                exceeding: Flags) -> None:
-    """Go through results in their order and write what becomes of them, see Outputs."""
+@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'b1[::1]', 'f8[::1]', 'f8[::1]', 'i8[::1]',
+             'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'b1[::1]', 'b1[::1]', 'b1[::1]')
+def _check_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: Flags,
+                slack: Array, state: Array, followed_at: Stamps, followed: Array, results: Array,
+                forces: Array, states: Array, answered: Flags, exceeding: Flags, jumped: Flags,
+                ) -> None:
+    """Check results in their order, see Outputs; ``followed`` and its stamp are updated."""
     limits = settings[_LIMITS]
     restart = False
     for n in range(len(results)):
         # Where this one cannot be answered, the next one is the restart.
         restart = restart or restarts[n]
         is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
-        answered[n], exceeding[n] = _watch(
-            settings, limits, is_stamp, bases_known[n], state, restart, results[n], forces[n])
+        elapsed = math.inf
+        if is_stamp and not restart and stamps[n] > followed_at[0]:
+            elapsed = (stamps[n] - followed_at[0]) * 1e-9 + slack[n]
+        answered[n], exceeding[n], jumped[n] = _check(
+            settings, limits, is_stamp, bases_known[n], state, restart, followed, elapsed,
+            results[n], forces[n])
         restart = restart and not answered[n]
+        if answered[n] and not jumped[n]:
+            followed_at[0] = stamps[n]
+            for leg in range(6):
+                followed[leg] = results[n, LENGTHS.start + leg]
         for k in range(STATE):
             states[n, k] = state[k]
 
 
 @entry_point('f8[::1]')
 def _one(numbers: Array) -> None:
-    """Do with one setpoint what solve and watch do with many."""
+    """Do with one setpoint what solve and check do with many."""
     settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
     for n in range(STATE):
@@ -259,16 +296,17 @@ def _one(numbers: Array) -> None:
     inverse_dynamics.solve_one(
         numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], numbers[_BASE], result,
         numbers[_TILE])
-    written[_ANSWERED.start], written[_EXCEEDING.start] = _watch(
+    written[_ANSWERED.start], written[_EXCEEDING.start], written[_JUMPED.start] = _check(
         settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0,
-        numbers[_BASE_KNOWN.start] > 0.0, state, numbers[_RESTART.start] > 0.0, result,
-        written[_FORCES])
+        numbers[_BASE_KNOWN.start] > 0.0, state, numbers[_RESTART.start] > 0.0,
+        numbers[_FOLLOWED], numbers[_ELAPSED.start], result, written[_FORCES])
 
 
 # The machine code that a batch needs.
-FUNCTIONS = inverse_dynamics.solve, _watch_many
+FUNCTIONS = inverse_dynamics.solve, _check_many
 
 _FIRST = Singularity()
+_NO_LENGTHS = (math.nan,) * 6  # which no setpoint is far from
 
 
 class Step:
@@ -293,14 +331,19 @@ class Step:
         self._settings = settings = self._numbers[_SETTINGS]
         settings[_THRESHOLDS] = thresholds(parameters)
         settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
+        self._limits_suppress = parameters['limits.action'] == 'suppress_forces'
+        settings[_LIMITS_SUPPRESS] = self._limits_suppress
         settings[_LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
         settings[_FORCE_MAX] = self._limits.force_max
+        # How much longer than their stamps say the time between two setpoints may be [s].
+        self._slack = JITTER + parameters['setpoint.sync_tolerance']
+        self._slack_of_arrival = JITTER + parameters['setpoint.timeout']
         self._solve = _one.bound(self._numbers)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._angles_of_one = (
             None if self._angles is None else self._angles.of_one(self._numbers[_MOTION]))
 
-    def __call__(self, setpoint: Setpoint, before: Singularity | None) -> Output | None:
+    def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
         Return the output, or None where numbers overflow, the stamp's own among them.
 
@@ -308,55 +351,82 @@ class Step:
         ----------
         setpoint : Setpoint
             A finite one, its rotation a rotation.
-        before : Singularity, optional
-            The output's before this one; none for the first.
+        before : State, optional
+            Of the output before this one; None for the first.
 
         """
         stamp = setpoint.stamp
+        singularity, followed_at, followed = before or State()
+        elapsed = math.inf
+        if stamp > followed_at and not setpoint.restart:
+            elapsed = (stamp - followed_at) * 1e-9 + (
+                self._slack if setpoint.stamped else self._slack_of_arrival)
         _GIVEN.pack_into(
             self._memory, 8 * _MOTION.start, *setpoint.motion, *setpoint.wrench,
-            *(setpoint.base or NO_BASE), *(before or _FIRST).numbers, setpoint.restart,
+            *(setpoint.base or NO_BASE), *(singularity or _FIRST).numbers,
+            *(followed or _NO_LENGTHS), elapsed, setpoint.restart,
             -STAMPS_END <= stamp < STAMPS_END, setpoint.base_known)
         self._solve()
         written = _GIVES.unpack_from(self._memory, 8 * _WRITTEN.start)
         if not written[_ANSWERED.start]:
             return None
         lengths, rates, demanded = written[LENGTHS], written[RATES], written[FORCES]
-        forces = written[_FORCES]
-        singularity = Singularity.of(written[_AFTER])
+        forces = written[_FORCES] if written[_FORCES.start] == written[_FORCES.start] else None
+        after = Singularity.of(written[_AFTER])
         solved = demanded[0] == demanded[0]
+        jumped = written[_JUMPED.start] > 0.0
         exceedances = self._limits.exceeded(
             lengths, rates, demanded if solved else None) if written[_EXCEEDING.start] else ()
+        if jumped and followed:
+            exceedances += self._limits.jumps(lengths, followed, elapsed)
         angles: tuple[float, ...] = ()
         if self._angles_of_one is not None:
             angles = self._angles_of_one()
-            exceedances += self._limits.exceeded_angles(angles)
+            exceeded = self._limits.exceeded_angles(angles)
+            exceedances += exceeded
+            if exceeded and self._limits_suppress:
+                forces = None
         return Output(
-            stamp, lengths, rates, demanded if solved else None,
-            forces if forces[0] == forces[0] else None, written[UNIT_LOAD_FORCES],
-            written[DETERMINANT], written[DETERMINANT_RATE], written[CONDITION], singularity,
-            before is None or singularity.warning != before.warning, exceedances, angles)
+            stamp, lengths, rates, demanded if solved else None, forces,
+            written[UNIT_LOAD_FORCES], written[DETERMINANT], written[DETERMINANT_RATE],
+            written[CONDITION], after,
+            singularity is None or after.warning != singularity.warning, exceedances, angles,
+            State(after, followed_at, followed) if jumped else State(after, stamp, lengths))
 
-    def many(self, setpoints: Batch, before: Singularity | None) -> Outputs:
+    def many(self, setpoints: Batch, before: State | None) -> Outputs:
         """Return what setpoints give one after the other; see the call for one."""
         results = self._platform.solve(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
-        many = len(results)
-        state = np.array((before or _FIRST).numbers)
-        forces, states = np.empty((many, 6)), np.empty((many, STATE))
-        answered, exceeding = np.empty(many, dtype=bool), np.empty(many, dtype=bool)
-        _watch_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
-                    state, results, forces, states, answered, exceeding)
+        n_setpoints = len(results)
+        singularity, stamp, lengths = before or State()
+        state = np.array((singularity or _FIRST).numbers)
+        followed_at, followed = np.array([stamp]), np.array(lengths or _NO_LENGTHS)
+        forces, states = np.empty((n_setpoints, 6)), np.empty((n_setpoints, STATE))
+        answered, exceeding, jumped = (np.empty(n_setpoints, dtype=bool) for _ in range(3))
+        slack = np.full(n_setpoints, self._slack)
+        if setpoints.stamped is not None:
+            slack[~setpoints.stamped] = self._slack_of_arrival
+        _check_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
+                    slack, state, followed_at, followed, results, forces, states, answered,
+                    exceeding, jumped)
         stamps, motions = setpoints.stamps, setpoints.motions
         if not answered.all():
             stamps, motions, results, forces = (
                 stamps[answered], motions[answered], results[answered], forces[answered])
-            states, exceeding = states[answered], exceeding[answered]
+            states, exceeding, jumped = states[answered], exceeding[answered], jumped[answered]
         warnings = states[:, CAUSE] > 0.0
         changed = np.empty(len(states), dtype=bool)
-        changed[:1] = before is None or warnings[:1] != before.warning
+        changed[:1] = singularity is None or warnings[:1] != singularity.warning
         changed[1:] = warnings[1:] != warnings[:-1]
         angles = np.empty((len(states), 0)) if self._angles is None else self._angles(motions)
         for name in self._limits.of_joints:
-            exceeding |= self._limits.exceeds(name, angles[:, ANGLES[name]]).any(axis=1)
-        return Outputs(answered, stamps, results, forces, states, changed, exceeding, angles)
+            exceeded = self._limits.exceeds(name, angles[:, ANGLES[name]]).any(axis=1)
+            exceeding |= exceeded
+            if self._limits_suppress:
+                forces[exceeded] = np.nan
+        if len(states):
+            singularity = Singularity.of(states[-1].tolist())
+        a, b, c, d, e, f = followed.tolist()
+        return Outputs(
+            answered, stamps, results, forces, states, changed, exceeding, jumped, angles,
+            State(singularity, int(followed_at[0]), None if a != a else (a, b, c, d, e, f)))

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from stewart_dynamics.mechanics.limits import ANGLES, Exceedance, FORCE_MAX, LIMITS, QUANTITIES
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
@@ -26,6 +27,9 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
 
 _NAME = 'limits'
+
+# Legs that are this many times longer than they can be, with positions in mm for m.
+_MILLIMETRES = 1000.0
 
 
 class _Limit:
@@ -39,12 +43,12 @@ class _Limit:
         self.worst: Exceedance | None = None
 
     def see(self, exceeded: Sequence[Exceedance], words: Callable[[Exceedance], str],
-            now: float) -> None:
+            consequence: str, now: float) -> None:
         """Note which legs exceed it with a setpoint."""
         if not exceeded:
             self.held.see(FINE, now)
             return
-        self.held.see(Level(ERROR, ', '.join(map(words, exceeded))), now)
+        self.held.see(Level(ERROR, ', '.join(map(words, exceeded)) + consequence), now)
         self.setpoints += 1
         worst = self.worst
         self.worst = max([*exceeded, worst] if worst else exceeded, key=_amount)
@@ -57,7 +61,7 @@ class LimitsDiagnostics:
     Parameters
     ----------
     parameters : Parameters
-        Names of the legs, and which limits are given.
+        Names of the legs, limits and ``limits.action``; may be replaced at any time.
     answers : Answers
         The setpoints that were answered.
 
@@ -65,10 +69,11 @@ class LimitsDiagnostics:
 
     def __init__(self, parameters: Parameters, answers: Answers) -> None:
         self._joints: tuple[str, ...] = parameters['joints']
-        self._parameters = parameters
+        self.parameters = parameters
         self._answers = answers
         self._output: Output | None = None
-        self._limits = {name: _Limit() for name in LIMITS}
+        self._limits = {name: _Limit() for name in (*LIMITS, JUMP)}
+        self._suppressed = 0
         self._exceeding = False
         self._held = False  # one of them may be held
         self._largest_force, self._its_leg = 0.0, 0
@@ -86,9 +91,16 @@ class LimitsDiagnostics:
         if output.exceedances or self._exceeding:
             self._held = True
             self._exceeding = bool(output.exceedances)
+            suppressed = output.forces is None and output.demanded_forces is not None and (
+                self.parameters['limits.action'] == 'suppress_forces')
+            self._suppressed += suppressed
+            mistake = self._mistake(output)
             for name, limit in self._limits.items():
+                consequence = mistake if name in (LENGTH_MAX, JUMP) else ''
+                if suppressed and name != FORCE_MAX:
+                    consequence = f'; forces suppressed{consequence}'
                 limit.see([each for each in output.exceedances if each.limit == name],
-                          self._words, now)
+                          self._words, consequence, now)
 
     def level(self, now: float) -> int:
         """Return the present level."""
@@ -112,7 +124,7 @@ class LimitsDiagnostics:
                        zip(self._joints, output.demanded_forces, strict=True)]
         if output.joint_angles:
             values += [(f'{leg}: {quantity} ({unit})', f'{angle:.6g}')
-                       for limit, where in ANGLES.items() if self._parameters[limit] is not None
+                       for limit, where in ANGLES.items() if self.parameters[limit] is not None
                        for quantity, unit in [QUANTITIES[limit]]
                        for leg, angle in zip(
                            self._joints, output.joint_angles[where], strict=True)]
@@ -122,8 +134,11 @@ class LimitsDiagnostics:
                 ('leg of the largest force demanded', self._joints[self._its_leg])]
         for name, limit in self._limits.items():
             if limit.worst is not None:
-                values += [(f'setpoints that exceed {name}', str(limit.setpoints)),
+                values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
+                            str(limit.setpoints)),
                            (f'worst since activation, {name}', self._words(limit.worst))]
+        if self._suppressed:
+            values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
         found = [limit.held.at(now).message for limit in self._limits.values()]
         message = '; '.join(filter(None, found)) or 'all held'
         return Status(_NAME, self.level(now), message + self._answers.age(now), tuple(values))
@@ -139,6 +154,15 @@ class LimitsDiagnostics:
             return state
         return Level(state.level, f'{name}: no longer exceeded; {limit.setpoints} setpoints since '
                      f'activation, worst: {self._words(limit.worst)}')
+
+    def _mistake(self, output: Output) -> str:
+        """Return the likely mistake where legs are too long, as words to append."""
+        longest = self.parameters['limits.length_max']
+        reference = output.state.lengths if longest is None else longest.tolist()
+        if reference and all(0.3 < length / (_MILLIMETRES * most) < 1.5 for length, most in zip(
+                output.lengths, reference, strict=True)):
+            return '; likely mistake: position in mm'
+        return ''
 
     def _words(self, exceedance: Exceedance) -> str:
         clipped = ', clipped' if exceedance.limit == FORCE_MAX else ''

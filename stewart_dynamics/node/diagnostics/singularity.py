@@ -32,7 +32,8 @@ def singularity_state(output: Output, parameters: Parameters) -> Level:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
     state = output.singularity
     if state.stopped:
-        is_suppressed = output.forces is None and output.demanded_forces is not None
+        is_suppressed = output.demanded_forces is not None and (
+            parameters['singularity.action'] == 'suppress_forces')
         suppressed = ': forces suppressed' if is_suppressed else ''
         return Level(ERROR, f'inside stop_condition{suppressed}: '
                      + _condition(output, parameters, 'stop_condition'))
