@@ -106,6 +106,23 @@ def random_parameters(random: np.random.Generator, actuators: bool = True) -> Pa
     return Parameters(given)
 
 
+def scaled(parameters: Parameters, size: float) -> Parameters:
+    """Return a hexapod of another size of the same materials, without limits: alike in time."""
+    def times(power: float, *names: str) -> dict[str, Array]:
+        return {name: np.ravel(parameters[name]) * size ** power for name in names}
+
+    return Parameters({
+        **times(1.0, 'geometry.base_joints', 'geometry.platform_joints',
+                'platform.center_of_mass', 'legs.cylinder.center_of_mass',
+                'legs.piston.center_of_mass', 'geometry.zero_length'),
+        **times(2.5, 'actuator.viscous_friction'),
+        **times(3.0, 'legs.cylinder.mass', 'legs.piston.mass', 'actuator.reflected_mass',
+                'actuator.coulomb_friction'),
+        **times(5.0, 'platform.inertia', 'legs.cylinder.inertia', 'legs.piston.inertia'),
+        'platform.mass': parameters['platform.mass'] * size ** 3,
+        'gravity': parameters['gravity']})
+
+
 def size_of(parameters: Parameters) -> float:
     """Return the mean distance of the base joints from their center [m]."""
     base = parameters['geometry.base_joints']

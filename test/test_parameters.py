@@ -194,6 +194,9 @@ BAD = {
         'visualisation_rate', 'unknown parameter', 'do you mean visualization_rate?']),
     'unknown name in a group': ('warn_condition', 'warn_conditions', [
         'singularity.warn_conditions', 'unknown', 'do you mean singularity.warn_condition?']),
+    'unknown name of which there are two': ('visualization_rate: 25.0', 'limits.angle_max: 0.5', [
+        'limits.angle_max: unknown parameter; do you mean limits.base_joint_angle_max or '
+        'limits.platform_joint_angle_max?']),
     'unknown name like no other': ('visualization_rate: 25.0', 'qqq: 25.0', [
         'qqq: unknown parameter']),
     'integer for a double': ('mass: 150.0', 'mass: 150', [

@@ -22,7 +22,8 @@ import math
 
 import numpy as np
 import pytest
-from referees import random_direction, random_parameters, rng, rotation_about, size_of
+from referees import (
+    random_direction, random_parameters, rng, rotation_about, scaled, size_of)
 from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
@@ -188,25 +189,6 @@ def test_a_rate_exceeded_between_points_alone_is_found(whose: str, acceleration:
         {'limits.velocity_max': [1.01 * extremes[whose]]})).accepted
 
 
-def scaled(parameters: Parameters, size: float) -> Parameters:
-    """Return a hexapod of another size of the same materials, which no singularity stops."""
-    def times(power: float, *names: str) -> dict[str, Array]:
-        return {name: np.ravel(parameters[name]) * size ** power for name in names}
-
-    changed = {
-        **times(1.0, 'geometry.base_joints', 'geometry.platform_joints',
-                'platform.center_of_mass', 'legs.cylinder.center_of_mass',
-                'legs.piston.center_of_mass'),
-        **times(2.5, 'actuator.viscous_friction'),
-        **times(3.0, 'legs.cylinder.mass', 'legs.piston.mass', 'actuator.reflected_mass',
-                'actuator.coulomb_friction'),
-        **times(5.0, 'platform.inertia', 'legs.cylinder.inertia', 'legs.piston.inertia')}
-    return Parameters({
-        **changed, 'platform.mass': parameters['platform.mass'] * size ** 3,
-        'gravity': parameters['gravity'], 'singularity.stop_condition': 1e11,
-        'singularity.warn_condition': 1e11})
-
-
 def random_trajectory(parameters: Parameters, random: np.random.Generator) -> tuple[Array, Motion]:
     """Return 2 to 5 points, 1e-4 to 0.2 of the size apart, at rest or not; 3 mm/s^2 and more."""
     size, points = size_of(parameters), int(random.integers(2, 6))
@@ -240,7 +222,8 @@ def test_no_force_or_rate_is_missed_by_a_hundredth(
             0.5, 1.5, 6)}
     if weightless:
         change['gravity'] = np.zeros(3)
-    parameters = scaled(parameters.replaced(change), size)
+    parameters = scaled(parameters.replaced(change), size).replaced({
+        'singularity.stop_condition': 1e11, 'singularity.warn_condition': 1e11})
     platform = StewartPlatform(parameters)
     for _ in range(10):
         times, motion = random_trajectory(parameters, random)

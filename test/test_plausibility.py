@@ -23,12 +23,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from referees import random_parameters, ROOT, symmetric_parameters
+from referees import random_parameters, ROOT, scaled, symmetric_parameters
 
 from stewart_dynamics import Motion, ParameterError, Parameters, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.parameters.table import inertia_matrix, PARAMETERS
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -69,7 +70,8 @@ HEXAPODS = {
     # the same with both frames' z down, as in aerospace
     'flight simulator, z down': hexapod(
         ring(1.65, 10.5), np.roll(ring(1.6, 3.6, 60.0), 1, axis=0), 4000.0, 9000.0,
-        gravity=[0.0, 0.0, 9.80665], platform__center_of_mass=[0.1, 0.0, -1.2],
+        gravity=[0.0, 0.0, 9.80665], geometry__platform_side='negative',
+        platform__center_of_mass=[0.1, 0.0, -1.2],
         limits__length_min=2.08, limits__length_max=3.33),
     # on a desk, under a mirror
     'micro hexapod': hexapod(
@@ -84,7 +86,8 @@ HEXAPODS = {
     # the secondary mirror of a large telescope, hanging; its reference is the mirror's vertex
     'telescope': hexapod(
         ring(0.9, 8.0, height=0.4), np.roll(ring(0.7, 8.0, 60.0, height=2.5), 1, axis=0), 2500.0,
-        2800.0, platform__center_of_mass=[0.0, 0.0, 1.9], gravity=[0.0, 5.0, 8.4]),
+        2800.0, platform__center_of_mass=[0.0, 0.0, 1.9], gravity=[0.0, 5.0, 8.4],
+        geometry__platform_side='positive'),
     # a cabin on six cables from towers on a circle of 300 m, which meet it in pairs
     'cable robot': hexapod(
         ring(300.0, 30.0), np.roll(ring(6.5, 2.0, 60.0), 1, axis=0), 30000.0, 3e5,
@@ -113,15 +116,47 @@ def test_the_hexapod_of_the_package_gives_none() -> None:
     assert likely_mistakes(symmetric_parameters()) == ()
 
 
+@pytest.mark.parametrize('file', ['ship_hexapod', 'telescope'])
+def test_files_of_the_package_give_none(file: str) -> None:
+    assert likely_mistakes(Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml')) == ()
+
+
 def test_random_hexapods_give_none() -> None:
     for seed in range(100):
         assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
+
+
+@pytest.mark.parametrize('power', [2.0, 3.0])
+@pytest.mark.parametrize('size', [1e-3, 1e-2, 1.0, 1e3])
+def test_hexapods_of_any_size_give_none(size: float, power: float) -> None:
+    """Forces of actuators grow with the square of the size, or as weights with the third power."""
+    limits = {'limits.length_min': 1.0, 'limits.length_max': 1.0, 'limits.force_max': power,
+              'limits.velocity_max': 0.5 * power - 0.5, 'actuator.coulomb_friction': power}
+    found = scaled(PLATFORM, size).replaced({
+        name: PLATFORM[name] * size ** exponent for name, exponent in limits.items()
+        if power == 3.0 or size <= 1.0 or name != 'limits.force_max'})
+    assert likely_mistakes(found) == ()
+    for seed in range(10):
+        assert likely_mistakes(scaled(
+            random_parameters(np.random.default_rng(seed)), 0.3 * size)) == ()
+
+
+def test_lengths_in_mm_throughout_have_no_other_cause() -> None:
+    names = [name for name, each in PARAMETERS.items() if each.unit == 'm' and name in
+             PLATFORM.given]
+    found = likely_mistakes(PLATFORM.replaced({name: 1e3 * PLATFORM[name] for name in names}))
+    assert all('in mm' in mistake for mistake in found), found
+    assert not any('in g?' in mistake for mistake in found), found
 
 
 # Mistakes: what is changed in the package's hexapod, and the warnings, word for word
 
 BASE, TOP = PLATFORM['geometry.base_joints'], PLATFORM['geometry.platform_joints']
 INERTIA = PLATFORM['platform.inertia']
+HOME = StewartPlatform(PLATFORM).home_pose().position
+FROM_BASE = PLATFORM['platform.center_of_mass'] + HOME
+OF_BASE = (inertia_matrix(INERTIA) + PLATFORM['platform.mass'] * (
+    FROM_BASE @ FROM_BASE * np.eye(3) - np.outer(FROM_BASE, FROM_BASE)))[np.triu_indices(3)]
 NO_LIMITS: dict[str, Any] = {'limits.length_min': (), 'limits.length_max': ()}
 QUARTER = from_euler([0.0, 0.0, np.pi / 2.0])
 SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
@@ -181,8 +216,33 @@ SLIPS: dict[str, tuple[dict[str, Any], list[str]]] = {
     'a piston longer than the leg': (
         {'legs.piston.center_of_mass': [0.4, 0.4, 0.4, 0.4, 1.7, 0.4]}, [
             'legs.piston.center_of_mass: 1.7 m from the platform joint, but no leg is over 1.65']),
-    'a piston with the other sign': ({'legs.piston.center_of_mass': -0.9}, [
+    'a piston far behind its joint': ({'legs.piston.center_of_mass': -0.9}, [
         'legs.piston.center_of_mass: -0.9 m from the platform joint']),
+    'a piston with the other sign': ({'legs.piston.center_of_mass': -0.4}, [
+        'legs.piston.center_of_mass: -0.4 m: behind the platform joint: a sign? It counts from '
+        'this joint toward the base']),
+    'friction in mN': ({'actuator.coulomb_friction': [40.0, 40.0, 40e3, 40.0, 40.0, 40.0]}, [
+        'actuator.coulomb_friction: 4e+04 N: leg_3 cannot move with limits.force_max, '
+        '6e+03 N: in mN?']),
+    'base and platform exchanged': (
+        {'geometry.base_joints': TOP, 'geometry.platform_joints': BASE}, [
+            'geometry.platform_joints: 0.9 m from their center, the base joints only 0.6 m: base '
+            'and platform exchanged?']),
+    'gravity with the other sign': ({'gravity': [0.0, 0.0, 9.80665]}, [
+        'gravity: [0, 0, 9.81] m/s^2 pulls the platform away from the base: a sign? For a '
+        'hexapod that hangs, or whose axes point down, set geometry.platform_side']),
+    'platform joints in the base frame': ({'geometry.platform_joints': TOP + HOME}, [
+        'geometry.platform_joints: [0, 0, 1.18] m is their center, where it is at home in the '
+        'base frame, but platform.center_of_mass is 1.06 m away from it: are the joints given in '
+        'the base frame?']),
+    'a center of mass from the origin of the base': (
+        {'platform.center_of_mass': PLATFORM['platform.center_of_mass'] + HOME}, [
+            'platform.center_of_mass: [0.02, -0.01, 1.3] m is where the platform is at home in '
+            "the base frame: from the base's origin?"]),
+    'an inertia about the origin of the base': ({'platform.inertia': OF_BASE}, [
+        'platform.inertia: radii of gyration of 1.33 m and more across the axis of the hexapod, '
+        '0.384 m about it, and the base is 1.3 m from the center of mass at home: about the '
+        "base's origin?"]),
     'a piston in kg mm^2': ({'legs.piston.inertia': 0.32e6}, [
         'legs.piston.inertia: 3.2e+05 kg m^2, a radius of gyration of 231 m, but no leg is over '
         '1.65 m: in g mm^2 or kg mm^2?']),
@@ -350,6 +410,52 @@ def test_home_is_where_the_mean_leg_is_halfway_between_its_limits() -> None:
     assert np.allclose(rotations, np.eye(3), atol=1e-12)
     lengths = StewartPlatform(hexapod).inverse_kinematics(Pose(positions, rotations))
     assert np.allclose(np.mean(lengths, axis=1), 1.3, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(('changes', 'side'), [
+    ({}, 1.0), ({'geometry.platform_side': 'positive'}, 1.0),
+    ({'geometry.platform_side': 'negative'}, -1.0)])
+def test_the_side_of_the_platform_is_a_parameter(changes: dict[str, Any], side: float) -> None:
+    """Home, its first guess and the axes from which joints' angles are measured are there."""
+    parameters = PLATFORM.replaced(changes)
+    home = StewartPlatform(parameters).home_pose()
+    assert side * home.position[2] > 0.9
+    assert np.allclose(home.position, homes(parameters)[0][0])
+    at_home = StewartPlatform(parameters).joint_angles(home)
+    assert max(np.abs(angles).max() for angles in at_home) < 1e-6
+
+
+def uneven_base() -> Array:
+    """Return base joints off their plane, which stays level: the sides differ in their lengths."""
+    plane = np.column_stack([np.ones(6), BASE[:, :2]])
+    heights = np.array([0.4, -0.2, 0.3, 0.0, -0.4, 0.1])
+    heights -= plane @ np.linalg.lstsq(plane, heights)[0]
+    return np.column_stack([BASE[:, :2], heights])
+
+
+def test_the_side_of_the_platform_is_given_by_limits_of_length() -> None:
+    base = uneven_base()
+    for mirror, side in ((1.0, 1.0), (-1.0, -1.0)):
+        turned = Parameters({
+            **{name: PLATFORM[name] for name in ('platform.mass', 'platform.inertia')},
+            'geometry.base_joints': (base * [1.0, 1.0, mirror]).ravel(),
+            'geometry.platform_joints': TOP.ravel()})
+        level = Pose([0.0, 0.0, mirror * 1.0], np.eye(3))
+        lengths = StewartPlatform(turned).inverse_kinematics(level)
+        limited = turned.replaced({'limits.length_min': lengths - 0.005,
+                                   'limits.length_max': lengths + 0.005})
+        assert side * StewartPlatform(limited).home_pose().position[2] > 0.7
+
+
+def test_home_on_the_given_side_must_be_within_the_limits() -> None:
+    base = uneven_base()
+    parameters = PLATFORM.replaced({'geometry.base_joints': base.ravel()})
+    lengths = StewartPlatform(parameters).inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
+    limited = parameters.replaced({
+        'limits.length_min': lengths - 0.005, 'limits.length_max': lengths + 0.005,
+        'geometry.platform_side': 'negative'})
+    with pytest.raises(ParameterError, match='on the negative side of the base'):
+        StewartPlatform(limited).home_pose()
 
 
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))

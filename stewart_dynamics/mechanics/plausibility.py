@@ -64,8 +64,10 @@ _SMALLEST_LEG_GYRATION = 0.01
 # The reflected mass of a rotor and screw is 10 to 200 % of the mass that a leg carries. The number
 # of their inertia in kg m^2 is 1e4 to 1e6 times smaller, in kg cm^2 10 to 100 times.
 _SMALLEST_REFLECTED_MASS = 1e-3
-# No electric motor reaches its speed within a millisecond under its peak torque (the mechanical
-# time constants of those with ironless rotors are 1 to 5 ms), and no screw drive 30 g.
+# No electric motor of a hexapod whose joints are 1 m from their center, or more, reaches its speed
+# within a millisecond under its peak torque (the mechanical time constants of those with ironless
+# rotors are 1 to 5 ms), and no screw drive 30 g. Forces fall with the square of the size, masses
+# with its third power: small drives accelerate more.
 _SHORTEST_START = 1e-3  # [s]
 _LARGEST_ACCELERATION = 300.0  # [m/s^2]
 # Data of an actuator; where they are given its inertia is known.
@@ -85,7 +87,17 @@ _ROUNDING = 0.02
 _FARTHEST_CENTER = 10.0
 
 _LARGEST_GRAVITY = 100.0  # [m/s^2]; Jupiter has 25
-_FASTEST = 100.0  # [m/s]; a hundred times what hexapods reach
+# A hundred times what hexapods with joints 1 m from their center reach [m/s]; larger ones more.
+_FASTEST = 100.0
+
+# The base joints of hexapods are as far from their center as the platform joints, or farther.
+_LARGEST_PLATFORM_RATIO = 1.2
+# Share of gravity that pulls the platform away from the base.
+_HANGING = 0.5
+# Points are in the base frame if they are this near to home, in terms of its height.
+_AT_HOME = 0.2
+# The center of mass of a piston behind its joint, in terms of the longest leg.
+_BEHIND = 0.02
 
 _TILT = math.radians(15.0)
 
@@ -108,10 +120,12 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
         shape = shape_of(parameters)
         sizes = [*_sizes(parameters, shape)]
         found = [*sizes, *_inertia(parameters, shape),
-                 *_reflected_mass(parameters), *_others(parameters, shape)]
+                 *_reflected_mass(parameters, shape), *_others(parameters, shape)]
         if geometry:
             reach = reach_of(parameters, shape)
-            found += _legs(parameters, shape, reach)
+            found += _legs(parameters, shape, reach, bool(sizes))
+            if not sizes:
+                found += _frames(parameters, shape, reach)
             odd = tuple(_symmetry(parameters))
             if len(odd) == 1:
                 found += odd
@@ -164,7 +178,51 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
                f'{away:.3g} m from the middle of the platform joints, but {size}: in mm?')
 
 
-def _reflected_mass(p: Parameters) -> Iterator[str]:
+def _frames(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+    """Yield what is given in the frame of the other body, or on its other side."""
+    away = shape.axes[2] * reach.side  # from the base to the platform
+    if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
+        yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '
+               f'base joints only {shape.base_radius:.3g} m: base and platform exchanged?')
+    size = float(np.linalg.norm(p['gravity']))
+    if not reach.certain and p['base.source'] == 'fixed' and (
+            p['gravity'] @ away > _HANGING * size > 0.0):
+        yield (f'gravity: {_listed(p["gravity"])} m/s^2 pulls the platform away from the base: a '
+               'sign? For a hexapod that hangs, or whose axes point down, set '
+               'geometry.platform_side')
+    center = p['platform.center_of_mass']
+    middle = p['geometry.platform_joints'].mean(axis=0)
+    home = home_of(p, shape, reach)
+    height = abs(float(home.heights[0]))
+    from_base = p['geometry.base_joints'].mean(axis=0) + height * away
+    if home.length is None:
+        return  # heights are guesses
+    if np.linalg.norm(middle - from_base) < _AT_HOME * height and (
+            np.linalg.norm(center) < 0.5 * np.linalg.norm(center - middle)):
+        yield (f'geometry.platform_joints: {_listed(middle.round(9) + 0.0)} m is their center, '
+               'where it is at home in the base frame, but platform.center_of_mass is '
+               f'{np.linalg.norm(center - middle):.3g} m away from it: are the joints given in '
+               'the base frame?')
+    in_base_frame = bool(np.linalg.norm(center - from_base) < _AT_HOME * height
+                         and np.linalg.norm(middle) < 0.5 * height)
+    if in_base_frame:
+        yield (f'platform.center_of_mass: {_listed(center)} m is where the platform is at home '
+               "in the base frame: from the base's origin? It is from that of the platform frame")
+    inertia = inertia_matrix(p['platform.inertia'])
+    axial = math.sqrt(max(float(away @ inertia @ away), 0.0) / p['platform.mass'])
+    across = shape.axes[:2] @ inertia @ shape.axes[:2].T
+    least = math.sqrt(max(float(np.linalg.eigvalsh(across)[0]), 0.0) / p['platform.mass'])
+    reference = abs(height + float((center - middle) @ away))
+    if in_base_frame:
+        reference = abs(float(center @ away))
+    if least > 0.9 * reference > 0.45 * height and axial < 0.6 * least:
+        yield (f'platform.inertia: radii of gyration of {least:.3g} m and more across the axis of '
+               f'the hexapod, {axial:.3g} m about it, and the base is {reference:.3g} m from '
+               "the center of mass at home: about the base's origin? It is about the center of "
+               'mass')
+
+
+def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
     name = 'actuator.reflected_mass'
     if name not in p.given:
         given = [each for each in _OF_AN_ACTUATOR if each in p.given]
@@ -184,7 +242,8 @@ def _reflected_mass(p: Parameters) -> Iterator[str]:
     acceleration = force / p[name]
     at = int(np.argmax(acceleration))
     start = 0.0 if rate is None else rate[at] / acceleration[at]
-    if acceleration[at] > _LARGEST_ACCELERATION and start < _SHORTEST_START:
+    size = min(shape.radius, 1.0)
+    if acceleration[at] > _LARGEST_ACCELERATION / size and start < _SHORTEST_START * size:
         yield (f'{name}: {p[name][at]:.3g} kg: limits.force_max alone would accelerate it by '
                f'{acceleration[at]:.3g} m/s^2, more than any motor: the inertia of the rotor in '
                'kg cm^2? It is J (2 pi / lead)^2 in kg')
@@ -200,12 +259,18 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     if most is not None and gravity <= _LARGEST_GRAVITY and weight > most.sum():
         yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
                f'platform, {weight:.3g} N: in kN?')
+    friction = p['actuator.coulomb_friction']
+    if most is not None and weight <= most.sum() and np.any(friction >= most):
+        at = int(np.argmax(friction - most))
+        yield (f'actuator.coulomb_friction: {friction[at]:.3g} N: {p["joints"][at]} cannot move '
+               f'with limits.force_max, {most[at]:.3g} N: in mN?')
     fastest = p['limits.velocity_max']
-    if fastest is not None and fastest.max() > _FASTEST:
+    if fastest is not None and fastest.max() > _FASTEST * max(shape.radius, 1.0):
         yield f'limits.velocity_max: {fastest.max():.3g} m/s: in mm/s?'
 
 
-def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
+def _legs(p: Parameters, shape: Shape, reach: Reach, wrong_size: bool) -> Iterator[str]:
+    """Yield mistakes of the legs; where joints or lengths have a wrong unit, no others of them."""
     low, high = p['limits.length_min'], p['limits.length_max']
     if low is not None and high is not None and np.any(low < _SMALLEST_LENGTH_RATIO * high):
         yield (f'limits.length_min: {_listed(np.unique(low))} m, limits.length_max: '
@@ -218,6 +283,8 @@ def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
                f'{shape.base_radius:.3g} m from their center, the platform joints '
                f'{shape.platform_radius:.3g} m: different units?')
         return  # any of them may be wrong, so that the other checks would report it again
+    if wrong_size:
+        return
     if high is not None and np.any(p['geometry.zero_length'] > high) and not is_too_long(
             p, 'geometry.zero_length', shape):
         yield (f'limits.length_max: {_listed(np.unique(high))} m, less than geometry.zero_length, '
@@ -233,6 +300,9 @@ def _legs(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
         if outside.any():
             yield (f'{name}: {centers[np.argmax(outside)]:.3g} m from the {joint} joint, but no '
                    f'leg is over {longest:.3g} m: in mm?')
+        elif part == 'piston' and np.any(centers < -_BEHIND * longest):
+            yield (f'{name}: {centers.min():.3g} m: behind the platform joint: a sign? It counts '
+                   'from this joint toward the base')
         gyration = np.sqrt(np.divide(p[f'legs.{part}.inertia'], masses, where=masses > 0.0,
                                      out=np.zeros(6)))
         at = int(np.argmax(gyration))

@@ -20,6 +20,7 @@ from collections.abc import Iterator, Mapping
 import difflib
 from itertools import chain
 from pathlib import Path
+import re
 from types import MappingProxyType
 from typing import Any, ClassVar, TYPE_CHECKING
 
@@ -33,6 +34,9 @@ from stewart_dynamics.parameters.yaml_file import (
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+# Parameters with all words of an unknown name that are suggested; more are no help.
+_MOST_SUGGESTED = 3
 
 
 class ParameterSet(Mapping[str, Any]):
@@ -194,12 +198,15 @@ class ParameterSet(Mapping[str, Any]):
 
     @classmethod
     def declared(cls, name: str, source: str = 'parameters') -> Parameter:
-        """Return the declaration of a parameter; ParameterError suggests the most similar name."""
+        """Return the declaration of a parameter; ParameterError suggests similar names."""
         if isinstance(name, str) and name in cls.table:
             return cls.table[name]
         text = shown_name(name)
-        near = difflib.get_close_matches(text, cls.table, n=1)
-        hint = f'; do you mean {near[0]}?' if near else ''
+        words = set(re.findall('[a-z]+', text))
+        near = [each for each in cls.table if words <= set(re.findall('[a-z]+', each))]
+        if not words or not 1 <= len(near) <= _MOST_SUGGESTED:
+            near = difflib.get_close_matches(text, cls.table, n=1)
+        hint = f'; do you mean {" or ".join(near)}?' if near else ''
         raise ParameterError(f'{source}: {text}: unknown parameter{hint}')
 
     def _check_together(self, source: str) -> None:

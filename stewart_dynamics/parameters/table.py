@@ -57,6 +57,9 @@ def _meshes() -> Iterator[Parameter]:
                     1.0, minimum=0.0, above=True)
 
 
+AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'
+"""Values of geometry.platform_side."""
+
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
     Parameter('platform_frame', 'string', 'frame that moves with the platform',
@@ -76,6 +79,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'angle of each platform joint is measured, from the base toward the platform, of '
               'any length, platform axes; default: along the leg at the home pose', '', (),
               sizes=(18,)),
+    Parameter('geometry.platform_side', 'string', 'side of the base joints on which the platform '
+              'is: positive where the base axis nearest to the normal of their plane points, '
+              'usually z, or negative; auto: positive, unless only the other side has a level '
+              'pose within the limits of length', '', AUTO, choices=(AUTO, POSITIVE, NEGATIVE)),
     _legs('geometry.zero_length', 'length of a leg at which its published position is zero', 'm',
           minimum=0.0),
     Parameter('platform.mass', 'double', 'mass of the platform with its payload', 'kg',

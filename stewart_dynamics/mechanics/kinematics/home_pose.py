@@ -20,6 +20,11 @@ the normal of their plane, at the height where the mean leg is halfway between t
 length, or has the zero length where there are no limits. Where no level pose with parallel axes
 has all legs within their limits, the platform is turned about the normal by the smallest angle
 that brings them there.
+
+A pose and its mirror image at the plane of the base joints have nearly the same lengths. The side
+is that of ``geometry.platform_side``: ``positive`` where the base axis nearest to the normal
+points, usually z, or ``negative``. By default, ``auto``, it is ``positive`` unless all legs can be
+within their limits on the other side alone.
 """
 
 from __future__ import annotations
@@ -29,11 +34,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import AUTO, NEGATIVE, Parameters, POSITIVE
 
 # Largest length, in larger radii: legs have 1 to 10, legs given in mm 1000 times that.
 _LENGTH_RATIO = 100.0
@@ -68,13 +73,17 @@ class Reach(NamedTuple):
     """The angle nearest to 0 at which all legs are within them at some height; else None."""
     longest: float
     """The longest leg to be expected [m]."""
+    side: float
+    """1 where the platform is where the normal points, else -1."""
+    certain: bool
+    """The parameters give the side; otherwise it is assumed."""
 
 
 class Home(NamedTuple):
     """The height of the platform at home."""
 
     heights: Array
-    """Above the base joints' center, negative below it, the most likely first (N,) [m]."""
+    """Along the normal from the base joints' center, the most likely first (N,) [m]."""
     yaw: float
     """Turn about the normal [rad]."""
     length: float | None
@@ -91,7 +100,7 @@ class Home(NamedTuple):
 
 def home_pose(parameters: Parameters) -> Pose:
     """
-    Return the home pose, on that side of the base where the normal's largest part is positive.
+    Return the home pose.
 
     Raises
     ------
@@ -105,7 +114,8 @@ def home_pose(parameters: Parameters) -> Pose:
         home = home_of(parameters, shape, reach)
         if reach.yaw is None:
             raise ParameterError('home pose: no level pose has all legs between '
-                                 'limits.length_min and limits.length_max')
+                                 'limits.length_min and limits.length_max on the '
+                                 f'{POSITIVE if reach.side > 0.0 else NEGATIVE} side of the base')
         if home.length is None:
             raise ParameterError(
                 'home pose: limits.length_min and limits.length_max, or geometry.zero_length, '
@@ -118,9 +128,8 @@ def homes(parameters: Parameters) -> tuple[Array, Array]:
     """
     Return possible home poses, the most likely first.
 
-    Positions (N, 3) [m] and rotations (N, 3, 3). The normal of the base joints' plane may point up
-    or down, so half of them are on its other side; if the parameters do not give the height, there
-    are several.
+    Positions (N, 3) [m] and rotations (N, 3, 3). Half of them are on the other side of the base;
+    if the parameters do not give the height, there are several on each.
     """
     with np.errstate(all='ignore'):
         shape = shape_of(parameters)
@@ -167,35 +176,40 @@ def reach_of(p: Parameters, shape: Shape) -> Reach:
     offset = turned.swapaxes(-1, -2) - shape.base
     along = offset[..., 2]
     across = np.linalg.norm(offset[..., :2], axis=-1)
-    reached = np.zeros(len(_YAWS), dtype=bool)
-    for side in (1.0, -1.0):  # above the base, and below it
+    reached_on: dict[float, Flags] = {}
+    for side in (1.0, -1.0):
         # The height of a leg is that of the platform plus the platform joint's own.
         least = np.sqrt(np.maximum(low ** 2 - across ** 2, 0.0)) - side * along
         most = np.where(high >= across, np.sqrt(np.abs(high ** 2 - across ** 2)), -np.inf)
-        reached |= least.max(axis=-1) <= (most - side * along).min(axis=-1)
+        reached_on[side] = least.max(axis=-1) <= (most - side * along).min(axis=-1)
+    given = p['geometry.platform_side']
+    certain = given != AUTO or bool(reached_on[1.0].any() != reached_on[-1.0].any())
+    side = -1.0 if given == NEGATIVE or (
+        given == AUTO and certain and reached_on[-1.0].any()) else 1.0
+    reached = reached_on[side]
     angles = np.abs((_YAWS + np.pi) % (2.0 * np.pi) - np.pi)
     yaw = float(_YAWS[np.argmin(np.where(reached, angles, np.inf))]) if reached.any() else None
     if longest is not None and not is_too_long(p, 'limits.length_max', shape):
-        return Reach(yaw, float(longest.max()))
-    return Reach(yaw, math.hypot(HEIGHTS[-1] * shape.radius, float(across.max())))
+        return Reach(yaw, float(longest.max()), side, certain)
+    return Reach(yaw, math.hypot(HEIGHTS[-1] * shape.radius, float(across.max())), side, certain)
 
 
 def home_of(p: Parameters, shape: Shape, reach: Reach) -> Home:
     """Return the possible heights of the platform at home."""
-    yaw = reach.yaw or 0.0
+    yaw, sides = reach.yaw or 0.0, (reach.side, -reach.side)
     low, high = p['limits.length_min'], p['limits.length_max']
     length = float(np.mean(p['geometry.zero_length'] if low is None or high is None
                            else 0.5 * (low + high)))
     legs = shape.platform @ turns_about(2, np.array([yaw]))[0].T - shape.base  # at no height
     if mean_norm(legs) < length < _LENGTH_RATIO * shape.radius:
-        heights = [side * _height(shape, side, legs, length) for side in (1.0, -1.0)]
+        heights = [side * _height(shape, side, legs, length) for side in sides]
         return Home(np.array(heights), yaw, length)
-    heights = [side * height * shape.radius for side in (1.0, -1.0) for height in HEIGHTS]
+    heights = [side * height * shape.radius for side in sides for height in HEIGHTS]
     return Home(np.array(heights), yaw, None)
 
 
 def _height(shape: Shape, side: float, legs: Array, length: float) -> float:
-    """Return the height above or below the base at which the mean leg has a length."""
+    """Return the distance from the base at which the mean leg has a length, on one side."""
     raised = legs.copy()
     low, high = 0.0, length + shape.base_radius + shape.platform_radius
     for _ in range(60):

@@ -132,7 +132,8 @@ def likely_mistakes(parameters: Parameters) -> Iterator[str]:
         joint, angle = parameters['joints'][leg], at_home[leg]
         if angle > _AWAY:
             yield (f'{axes}: at home {joint} is {angle:.3g} rad from it: does it point from the '
-                   'platform to the base, or are the legs in another order?')
+                   'platform to the base, is the platform on the other side of the base '
+                   '(geometry.platform_side), or are the legs in another order?')
         elif bounds is not None and angle > bounds[leg]:
             yield (f'{limit}: {bounds[leg]:.3g} rad, but at home {joint} is {angle:.3g} rad from '
                    f'its axis in {axes}')
