@@ -275,12 +275,12 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     motion = random_motions(samples)
     rows, no_wrench = motion.rows, np.zeros((1, WRENCH))
     results, c_results = (np.empty((samples, RESULT)) for _ in range(2))
-    tile = np.empty(inverse_dynamics.TILE)
+    sound, tile = np.empty(samples, dtype=bool), np.empty(inverse_dynamics.TILE)
     c, tree = PlainC(), Tree(parameters)
 
     wrenches = np.random.default_rng(20260102).normal(0.0, 500.0, (samples, WRENCH))
     for name, wrench in ('plain C under a wrench', wrenches), ('plain C', no_wrench):
-        inverse_dynamics.solve(numbers, rows, wrench, STILL, results, tile)
+        inverse_dynamics.solve(numbers, rows, wrench, STILL, results, sound, tile)
         c.function(*c.arguments(numbers, rows, wrench, c_results))
         check(name, c_results, results)
     forces = results[:, FORCES]
@@ -294,8 +294,8 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
     row, result = rows[:1].copy(), np.empty((1, RESULT))
     q, v, a, _ = tree.state(one)
     single = [
-        Contestant(STEP, repeated('solve()', solve=inverse_dynamics.solve_sample.bound(
-            numbers, row[0], no_wrench[0], STILL[0], result[0], np.empty(1), tile)), RNEA),
+        Contestant(STEP, repeated('solve()', solve=inverse_dynamics.solve.bound(
+            numbers, row, no_wrench, STILL, result, sound[:1], tile)), RNEA),
         Contestant(RNEA, repeated(
             'rnea(model, data, q, v, a)', rnea=pin.rnea, model=tree.model, data=tree.data,
             q=q, v=v, a=a), RNEA),
@@ -310,7 +310,8 @@ def contestants(samples: int) -> tuple[list[Contestant], list[Contestant]]:
             arguments=c.arguments(numbers, row, no_wrench, result)), RNEA)]
     batch = [
         Contestant(BATCH, once(
-            samples, inverse_dynamics.solve, numbers, rows, no_wrench, STILL, results, tile),
+            samples, inverse_dynamics.solve, numbers, rows, no_wrench, STILL, results, sound,
+            tile),
             PLAIN_C),
         Contestant(PLAIN_C, once(
             samples, c.function, *c.arguments(numbers, rows, no_wrench, c_results)), PLAIN_C),

@@ -61,7 +61,8 @@ def contestants(platform: StewartPlatform) -> list[Contestant]:
     """Return each call, on a base that is still and on one that moves."""
     motion, base = random_motions(SAMPLES), random_base(SAMPLES)
     one, its_base = (type(many).of_rows(many.rows[0].copy()) for many in (motion, base))
-    results, tile = np.empty((SAMPLES, RESULT)), np.empty(inverse_dynamics.TILE)
+    results, sound = np.empty((SAMPLES, RESULT)), np.empty(SAMPLES, dtype=bool)
+    tile = np.empty(inverse_dynamics.TILE)
     numbers, rows, no_wrench = platform.constants, motion.rows, np.zeros((1, 6))
     forces = platform.solve(rows)[:, FORCES].copy()
     work, moved = np.empty(forward_dynamics.WORK), rows.copy()
@@ -73,7 +74,8 @@ def contestants(platform: StewartPlatform) -> list[Contestant]:
                 call, solve=platform.inverse_dynamics, back=platform.forward_dynamics,
                 motion=one, forces=forces[0], base=moving), name))
     for name, call in ((BATCH, lambda bases: once(
-            SAMPLES, inverse_dynamics.solve, numbers, rows, no_wrench, bases, results, tile)),
+            SAMPLES, inverse_dynamics.solve, numbers, rows, no_wrench, bases, results, sound,
+            tile)),
             ('`forward_dynamics.solve`, a sample, one core', lambda bases: once(
                 SAMPLES, forward_dynamics.solve, numbers, moved, forces, no_wrench, bases,
                 work))):

@@ -23,7 +23,7 @@ from __future__ import annotations
 from importlib import import_module
 import time
 
-from stewart_dynamics.compilation.entry_point import EntryPoint, prepare
+from stewart_dynamics.compilation.functions import EntryPoint, prepare
 from stewart_dynamics.compilation.machine_code import folder_to_write, HINT
 
 MODULES = (

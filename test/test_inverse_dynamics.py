@@ -549,7 +549,8 @@ given = np.load({source!r})
 results = np.empty((len(given['rows']), RESULT))
 with np.errstate(all='ignore'):
     inverse_dynamics.solve(given['constants'], given['rows'], given['wrenches'], given['bases'],
-                           results, np.empty(inverse_dynamics.TILE))
+                           results, np.empty(len(results), dtype=bool),
+                           np.empty(inverse_dynamics.TILE))
 np.save({target!r}, results)
 """
 

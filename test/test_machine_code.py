@@ -12,28 +12,29 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The machine code on disk: damaged files are replaced, and where none can be written none is."""
+"""Machine code on disk: only sound files are loaded, all others are ignored and replaced."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 import tempfile
-from threading import Thread
+from threading import Event, Thread
+import time
 from typing import Any
 
 import numpy as np
 import pytest
 from referees import ROOT
 
-from stewart_dynamics.compilation import entry_point, machine_code
-from stewart_dynamics.compilation.entry_point import EntryPoint, prepare
-from stewart_dynamics.compilation.functions import entry_point as marked
+from stewart_dynamics.compilation import machine_code
+from stewart_dynamics.compilation.functions import (
+    entry_point, EntryPoint, Preparation, prepare)
 from stewart_dynamics.compilation.machine_code import COMPILED
-from stewart_dynamics.compilation.preparation import Preparation
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
 
@@ -44,6 +45,10 @@ from stewart_dynamics.compilation.functions import entry_point
 def {name}(matrix, factor, shift, doubled, sums):
     for n in range(len(sums)):
         sums[n] = {sign} * factor * matrix[n, shift:].sum() * (2.0 if doubled else 1.0)
+
+@entry_point('f8[::1]', 'i8')
+def chosen(numbers, n):
+    numbers[0] = (1.0, 2.0)[n]
 """
 SIGNS = {'scaled_sums': 1.0, 'negative_sums': -1.0}
 
@@ -57,7 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
         patch.setenv('STEWART_DYNAMICS_CACHE_DIR', str(folder / 'kept'))
-        entry_point.prepare([imported(name) for name in SIGNS])
+        prepare([imported(name) for name in SIGNS])
     return folder
 
 
@@ -76,27 +81,28 @@ def kept(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def announced(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return what is announced in the test."""
+    """Return the lines that are announced in the test."""
     texts: list[str] = []
     monkeypatch.setattr(machine_code, 'announce', texts.append)
     return texts
 
 
-def is_kept(module: str, name: str) -> bool:
-    """Return whether the machine code of a function is on disk and valid."""
-    return any(machine_code._kept(folder, module, name) for folder in machine_code._folders())
+def is_kept(module: str) -> bool:
+    """Return whether the machine code of a module is on disk and may be used."""
+    return any(machine_code._kept(folder, module) for folder in machine_code._folders())
 
 
 def imported(name: str) -> EntryPoint:
     """Return the function of a module, imported anew."""
     sys.modules.pop(name, None)
+    machine_code._engines.pop(name, None)
     function: EntryPoint = getattr(__import__(name), name)
     return function
 
 
 def file_of(kept: Path, name: str = 'scaled_sums') -> Path:
-    """Return the one file of a function."""
-    file, = kept.glob(f'{name}.{name}.*.code')
+    """Return the file of a module."""
+    file, = kept.glob(f'{name}.*.code')
     return file
 
 
@@ -112,12 +118,10 @@ def check(function: EntryPoint, sign: float = 1.0) -> None:
 
 
 def test_machine_code_is_loaded_by_the_next_process(kept: Path, announced: list[str]) -> None:
-    assert is_kept('scaled_sums', 'scaled_sums')
+    assert is_kept('scaled_sums')
     check(imported('scaled_sums'))
     check(imported('negative_sums'), -1.0)
     assert announced == []
-    (kept / 'new').touch()
-    assert file_of(kept).stat().st_mode == (kept / 'new').stat().st_mode
 
 
 @pytest.mark.parametrize('damage', [
@@ -131,7 +135,7 @@ def test_machine_code_is_loaded_by_the_next_process(kept: Path, announced: list[
 def test_a_damaged_file_is_not_used(kept: Path, damage: Callable[[bytes], bytes]) -> None:
     file = file_of(kept)
     file.write_bytes(damage(file.read_bytes()))
-    assert not is_kept('scaled_sums', 'scaled_sums')
+    assert not is_kept('scaled_sums')
     assert not imported('scaled_sums').load()
 
 
@@ -142,7 +146,7 @@ def test_a_flipped_bit_anywhere_is_found(kept: Path) -> None:
         flipped = bytearray(whole)
         flipped[place // 8] ^= 1 << (place % 8)
         file.write_bytes(flipped)
-        assert not is_kept('scaled_sums', 'scaled_sums'), f'bit {place}'
+        assert not is_kept('scaled_sums'), f'bit {place}'
 
 
 def test_a_damaged_file_is_replaced(kept: Path, announced: list[str]) -> None:
@@ -150,15 +154,15 @@ def test_a_damaged_file_is_replaced(kept: Path, announced: list[str]) -> None:
     whole = file.read_bytes()
     file.write_bytes(whole[:-1])
     check(imported('scaled_sums'))
-    assert announced == ['compiling scaled_sums.scaled_sums for this processor: this takes '
+    assert announced == ['compiling scaled_sums for this processor: this takes '
                          'seconds, only this once']
     assert file.read_bytes() == whole
     assert len(list(kept.iterdir())) == 2
 
 
-def test_the_file_of_another_function_is_not_used(kept: Path) -> None:
+def test_the_file_of_another_module_is_not_used(kept: Path) -> None:
     file_of(kept).write_bytes(file_of(kept, 'negative_sums').read_bytes())
-    assert not is_kept('scaled_sums', 'scaled_sums')
+    assert not is_kept('scaled_sums')
 
 
 def test_a_changed_source_is_compiled_anew(kept: Path, folder: Path) -> None:
@@ -167,15 +171,15 @@ def test_a_changed_source_is_compiled_anew(kept: Path, folder: Path) -> None:
     try:
         source.write_text(text.replace('1.0 * factor', '1.5 * factor'))
         machine_code._source.cache_clear()
-        assert not is_kept('scaled_sums', 'scaled_sums')
-        assert is_kept('negative_sums', 'negative_sums')
+        assert not is_kept('scaled_sums')
+        assert is_kept('negative_sums')
     finally:
         source.write_text(text)
     machine_code._source.cache_clear()
-    assert is_kept('scaled_sums', 'scaled_sums')
+    assert is_kept('scaled_sums')
 
 
-def test_where_no_file_can_be_written_the_function_works_with_a_warning(
+def test_if_no_file_can_be_written_the_function_works_with_a_warning(
         kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('STEWART_DYNAMICS_CACHE_DIR', str(file_of(kept) / 'within'))
     with pytest.warns(RuntimeWarning, match=(
@@ -188,11 +192,13 @@ def test_a_read_only_installation_is_used_and_the_users_cache_for_what_it_lacks(
         kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv('STEWART_DYNAMICS_CACHE_DIR')
     installed = tmp_path / 'installed'
-    (installed / '__pycache__').parent.mkdir()
+    installed.mkdir()
+    for path in machine_code.PACKAGE.iterdir():
+        if path.name != '__pycache__':
+            (installed / path.name).symlink_to(path)
     kept.rename(installed / '__pycache__')
     file_of(installed / '__pycache__', 'negative_sums').unlink()
-    (installed / 'compilation').symlink_to(Path(machine_code.__file__).parent)
-    monkeypatch.setattr(machine_code, '_PACKAGE', installed)
+    monkeypatch.setattr(machine_code, 'PACKAGE', installed)
     monkeypatch.setattr(os, 'access', lambda path, mode: installed not in path.parents)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
     assert imported('scaled_sums').load()
@@ -200,19 +206,55 @@ def test_a_read_only_installation_is_used_and_the_users_cache_for_what_it_lacks(
     assert file_of(tmp_path / 'cache' / 'installed', 'negative_sums').exists()
 
 
-def test_two_processes_that_start_on_an_empty_cache_both_work(
-        kept: Path, folder: Path, announced: list[str]) -> None:
+def test_a_module_is_compiled_once_for_all_its_functions_and_threads(
+        kept: Path, announced: list[str]) -> None:
     file_of(kept).unlink()
-    functions = [imported('scaled_sums') for _ in range(2)]
-    threads = [Thread(target=function.prepare) for function in functions]
+    functions = [imported('scaled_sums'), vars(sys.modules['scaled_sums'])['chosen']]
+    threads = [Thread(target=prepare, args=[functions]) for _ in range(2)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert len(announced) == 2
-    for function in functions:
-        check(function)
+    check(functions[0])
+    assert functions[1].compiled
+    assert len(announced) == 1
     assert len(list(kept.iterdir())) == 2
+
+
+def test_two_processes_that_start_on_an_empty_cache_both_work(kept: Path, folder: Path) -> None:
+    file_of(kept).unlink()
+    code = (f'import sys; sys.path[:0] = {[str(folder), str(ROOT / "test")]!r}\n'
+            'from test_machine_code import check, imported\n'
+            "check(imported('scaled_sums')); assert imported('scaled_sums').compiled")
+    programs = [subprocess.Popen([sys.executable, '-c', code]) for _ in range(2)]
+    assert [program.wait() for program in programs] == [0, 0]
+    assert len(list(kept.iterdir())) == 2
+
+
+def test_an_exception_in_compiled_code_is_an_error(kept: Path) -> None:
+    imported('scaled_sums')
+    chosen, numbers = vars(sys.modules['scaled_sums'])['chosen'], np.zeros(1)
+    chosen(numbers, 1)
+    assert numbers[0] == 2.0
+    with pytest.raises(RuntimeError, match=r'^scaled_sums.chosen: an exception in compiled code'):
+        chosen(numbers, 2)
+
+
+def test_code_that_would_call_python_or_numba_is_not_kept(kept: Path, folder: Path) -> None:
+    """The loader of another process does not find such functions, and would end the program."""
+    (folder / 'allocating.py').write_text("""\
+import numpy as np
+from stewart_dynamics.compilation.functions import entry_point
+
+@entry_point('f8[::1]')
+def allocating(numbers):
+    numbers[:] = np.sort(np.zeros(len(numbers)) + 1.0)
+""")
+    numbers = np.zeros(3)
+    with pytest.warns(RuntimeWarning, match='^allocating cannot be compiled: '):
+        imported('allocating')(numbers)
+    assert numbers.tolist() == [1.0, 1.0, 1.0]
+    assert not list(kept.glob('allocating*'))
 
 
 def test_a_function_that_does_not_compile_runs_uncompiled_with_a_warning(
@@ -226,7 +268,7 @@ def dictionary(numbers):
 """)
     numbers = np.zeros(1)
     with pytest.warns(RuntimeWarning, match=(
-            r'^dictionary\.dictionary cannot be compiled: .*: the dynamics run uncompiled')):
+            r'^dictionary cannot be compiled: .*: the dynamics run uncompiled')):
         imported('dictionary')(numbers)
     assert numbers[0] == 3.0
 
@@ -262,7 +304,7 @@ def test_the_compiler_reads_nothing_from_the_present_folder_and_may_print(
     function = imported('scaled_sums')
     check(function)
     assert function.compiled
-    assert is_kept('scaled_sums', 'scaled_sums')
+    assert is_kept('scaled_sums')
 
 
 @pytest.mark.parametrize('wrong', [
@@ -275,7 +317,7 @@ def test_an_array_of_another_layout_is_an_error(kept: Path, wrong: Any) -> None:
         imported('scaled_sums')(wrong, 1.0, 0, False, np.empty(3))
 
 
-def test_what_is_needed_later_is_compiled_in_the_background(
+def test_preparation_compiles_in_the_background(
         kept: Path, announced: list[str]) -> None:
     assert Preparation(imported('scaled_sums')).ready
     file_of(kept).unlink()
@@ -299,11 +341,106 @@ def test_without_a_compiler_a_function_is_plain_python() -> None:
                    env={**os.environ, 'NUMBA_DISABLE_JIT': '1'})
 
 
-@marked('f8[:,::1]', 'f8', 'i8', 'b1', 'f8[::1]')
+@entry_point('f8[:,::1]', 'f8', 'i8', 'b1', 'f8[::1]')
 def plain_sums(matrix: Any, factor: float, shift: int, doubled: bool, sums: Any) -> None:
     """Write the sums of the rows."""
     for n in range(len(sums)):
         sums[n] = factor * matrix[n, shift:].sum() * (2.0 if doubled else 1.0)
+
+
+def test_the_code_is_for_this_processor_whatever_numba_is_told(
+        kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Code for another processor, kept under this one's name, would end later starts."""
+    file = file_of(kept)
+    whole = file.read_bytes()
+    for name, text in (('CPU_NAME', 'skylake-avx512'), ('CPU_FEATURES', '+avx512f,+avx512vl'),
+                       ('OPT', '0'), ('BOUNDSCHECK', '1'), ('DEBUGINFO', '1')):
+        monkeypatch.setenv(f'NUMBA_{name}', text)
+    (tmp_path / '.numba_config.yaml').write_text('opt: 0\ncpu_name: skylake-avx512\n')
+    monkeypatch.chdir(tmp_path)
+    file.unlink()
+    check(imported('scaled_sums'))
+    assert file.read_bytes() == whole
+
+
+@pytest.mark.parametrize('mode', [0o775, 0o757])
+@pytest.mark.parametrize('whose', ['file', 'folder'])
+def test_code_that_others_can_write_is_not_run(kept: Path, whose: str, mode: int) -> None:
+    assert is_kept('scaled_sums')
+    (file_of(kept) if whose == 'file' else kept).chmod(mode)
+    assert not is_kept('scaled_sums')
+    if whose == 'folder':
+        with pytest.warns(RuntimeWarning, match='on disk .other users can write to it.: every'):
+            check(imported('scaled_sums'))
+
+
+@pytest.mark.parametrize('whose', ['file', 'folder'])
+def test_code_of_another_user_is_not_run(kept: Path, whose: str) -> None:
+    path = file_of(kept) if whose == 'file' else kept
+    try:
+        os.chown(path, 12345, -1)
+    except PermissionError:
+        pytest.skip('only root can give files to others')
+    assert not is_kept('scaled_sums')
+
+
+def test_kept_code_can_be_written_by_its_user_only_whatever_the_umask(
+        kept: Path, announced: list[str]) -> None:
+    file_of(kept).unlink()
+    before = os.umask(0)
+    try:
+        check(imported('scaled_sums'))
+    finally:
+        os.umask(before)
+    assert file_of(kept).stat().st_mode & 0o777 == 0o644
+
+
+@pytest.mark.parametrize('kind', ['pipe', 'link to a device', 'sparse file', 'folder', 'link'])
+def test_what_is_no_file_of_ours_neither_blocks_nor_fails(kept: Path, kind: str) -> None:
+    file = file_of(kept)
+    file.rename(kept / 'other')
+    if kind == 'pipe':
+        os.mkfifo(file)
+    elif kind == 'link to a device':
+        file.symlink_to('/dev/zero')
+    elif kind == 'link':
+        file.symlink_to('other')
+    elif kind == 'folder':
+        file.mkdir()
+    else:
+        with open(file, 'wb') as sparse:
+            sparse.truncate(20 << 30)
+    assert not is_kept('scaled_sums')
+
+
+def test_a_fork_while_threads_load_code_does_not_hang(
+        kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loading = Event()
+    target_machine = machine_code.target_machine
+
+    def slowly() -> Any:
+        loading.set()
+        time.sleep(0.3)
+        return target_machine()
+
+    monkeypatch.setattr(machine_code, 'target_machine', slowly)
+    function = imported('scaled_sums')
+    thread = Thread(target=prepare, args=[[function]])
+    thread.start()
+    assert loading.wait(60.0)
+    monkeypatch.setattr(machine_code, 'target_machine', target_machine)
+    child = os.fork()
+    if not child:
+        signal.alarm(20)  # a child that hangs ends
+        try:
+            check(function)
+            check(imported('negative_sums'), -1.0)
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    thread.join()
+    assert os.waitpid(child, 0)[1] == 0
+    check(function)
 
 
 def test_all_functions_that_are_called_are_compiled_at_installation() -> None:

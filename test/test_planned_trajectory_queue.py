@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stewart_dynamics.compilation.preparation import Preparation
+from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.node.planned_queue import LENGTH, PlannedTrajectoryQueue
 from stewart_dynamics.planned.messages import Outcome
 

@@ -13,19 +13,21 @@
 # limitations under the License.
 
 """
-The program that compiles one function; ``machine_code`` starts it.
+The program that compiles the entry points of one module; ``machine_code`` starts it.
 
-It writes a file: a line with the modules that it has read, on which the machine code depends, and
-an object file with one symbol, named as the function, of the type ``int (const int64_t
-*arguments)``. The arguments are integers: those of the function as they are, floats by their bits,
-an array as the address of its data and its shape. No memory is allocated, and nothing of Python or
-numba is called.
+It writes a file: a line with the source files that it has read, on which the machine code depends,
+and an object file. A function is a symbol there, of the type ``void (int64_t *block)``, named by
+its module and its own name; ``functions.EntryPoint`` lays out the block, whose first number
+becomes 0 after an exception. Only C's mathematical functions are called from there, nothing of
+Python or numba, and no memory is allocated.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import gc
 from importlib import import_module
+import math
 import os
 from pathlib import Path
 import sys
@@ -33,118 +35,89 @@ from threading import Thread
 import time
 from typing import Any, cast
 
-from llvmlite import ir
+from llvmlite import binding as llvm
 import numba
-from numba.core import codegen, cpu, sigutils, types as numba_types
-from numba.core.compiler_lock import global_compiler_lock
-from numba.np import arrayobj
+from numba.extending import register_jitable
+import numpy as np
 
-from stewart_dynamics.compilation import functions
+from stewart_dynamics.compilation.functions import CALLED, EntryPoint
+from stewart_dynamics.compilation.machine_code import PACKAGE, target_machine
 
-# What is used of numba here has no types, or others.
-_numba: Any = numba
-_sigutils: Any = sigutils
-_arrayobj: Any = arrayobj
-_library_class: Any = codegen.JITCodeLibrary
-_context_class: Any = cpu.CPUContext
+_POLL_SECONDS = 0.2
 
-_INTEGER = ir.IntType(64)
-_LOOK = 0.2  # [s]
+_numba: Any = numba  # it has no types
+_SIGNATURE = 'void(CPointer(voidptr))'
 
 
-# Machine code is made of the whole alone, by _object_file, not of each function that it calls.
-_library_class._finalize_specific = lambda library: None
-_context_class.get_executable = lambda *_: [].append  # a builtin function, each time another
+def object_file(module: str) -> bytes:
+    """Return the object file of a module's entry points, for this processor."""
+    entries = [each for each in vars(import_module(module)).values()
+               if isinstance(each, EntryPoint) and each.function.__module__ == module]
+    for function, inline in (CALLED | {each.function: False for each in entries}).items():
+        # error_model 'numpy': a division by zero gives inf or nan; an exception would be a branch
+        # that keeps a loop from becoming vector code.
+        register_jitable(error_model='numpy', forceinline=inline, no_cfunc_wrapper=True,
+                         _nrt=False)(function)
+    whole = llvm.parse_assembly('')
+    for entry in entries:
+        callback = _numba.cfunc(_SIGNATURE, error_model='numpy')(_from_block(entry))
+        part = llvm.parse_assembly(callback.inspect_llvm())
+        part.get_function(callback.native_name).name = f'{module}.{entry.function.__name__}'
+        whole.link_in(part)
+    for function in whole.functions:
+        if not function.is_declaration and not function.name.startswith(f'{module}.'):
+            function.linkage = 'internal'
+    machine = target_machine()
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = True
+    passes = llvm.create_pass_builder(machine, options)
+    passes.getModulePassManager().run(whole, passes)
+    for function in whole.functions:
+        if function.is_declaration and not function.name.startswith('llvm.'):
+            if not hasattr(math, function.name):
+                raise SystemExit(f'needs {function.name}, which machine code cannot call')
+    return cast('bytes', machine.emit_object(whole))
 
 
-def _njit(function: Any, **options: Any) -> Any:
-    # error_model 'numpy': a division by zero gives inf or nan and no exception, which would be a
-    # branch that keeps a loop from becoming vector code. No wrappers that only Python calls, and
-    # without _nrt nothing can allocate memory.
-    dispatcher = _numba.njit(
-        error_model='numpy', no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False,
-        **options)(function)
-    template = dispatcher.get_call_template
-    # Of a function that is called with 0 .. 5, numba would make six.
-    dispatcher.get_call_template = lambda types, named: template(
-        tuple(map(numba_types.unliteral, types)), named)
-    return dispatcher
-
-
-def object_file(module: str, name: str) -> bytes:
-    """Return the object file of a function, for this processor."""
-    functions.use_compiler(_njit)
-    dispatcher = getattr(import_module(module), name)
-    types = cast('tuple[Any, ...]', _sigutils.normalize_signature(
-        f'({", ".join(dispatcher.types)},)')[0])
-    # Each function is optimized once, where all it calls is known: in the library of the entry.
-    level, _numba.config.OPT = _numba.config.OPT, 0
-    dispatcher.compile(types)
-    _numba.config.OPT = level
-    with global_compiler_lock:
-        return _object_file(f'{module}.{name}', dispatcher.overloads[types], types)
-
-
-def _object_file(symbol: str, compiled: Any, types: tuple[Any, ...]) -> bytes:
-    context = compiled.target_context
-    library = context.codegen().create_library(symbol)
-    library.add_ir_module(_entry(library.create_ir_module(symbol), compiled, context, types))
-    library.add_linking_library(compiled.library)
-    library.finalize()
-    return cast('bytes', context.codegen()._tm.emit_object(library._final_module))
-
-
-def _entry(module: Any, compiled: Any, context: Any, types: tuple[Any, ...]) -> Any:
-    """Write the function that takes the arguments from memory, and return the module."""
-    function = ir.Function(
-        module, ir.FunctionType(ir.IntType(32), [_INTEGER.as_pointer()]), module.name)
-    builder = ir.IRBuilder(function.append_basic_block())
-    given = 0
-
-    def argument() -> Any:
-        nonlocal given
-        given += 1
-        return builder.load(builder.gep(function.args[0], [_INTEGER(given - 1)]))
-
-    values = []
-    for kind in types:
-        if isinstance(kind, numba_types.Array):
-            array = _arrayobj.make_array(kind)(context, builder)
-            item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
-            data = builder.inttoptr(argument(), context.get_data_type(kind.dtype).as_pointer())
-            shape = [argument() for _ in range(kind.ndim)]
-            strides = [_INTEGER(item)]
-            for length in reversed(shape[1:]):
-                strides.insert(0, builder.mul(strides[0], length))
-            _arrayobj.populate_array(array, data=data, shape=shape, strides=strides,
-                                     itemsize=_INTEGER(item), meminfo=None)
-            values.append(array._getvalue())
-        elif isinstance(kind, numba_types.Float):
-            values.append(builder.bitcast(argument(), ir.DoubleType()))
-        elif kind == numba_types.boolean:
-            values.append(builder.icmp_signed('!=', argument(), _INTEGER(0)))
+def _from_block(entry: EntryPoint) -> Callable[[Any], None]:
+    """Return the function that takes an entry point's arguments from a block, see its class."""
+    place, arguments = 1, []
+    for dtype, dimensions in entry.arguments:
+        if dimensions:
+            shape = ''.join(f'integers[{place + n}], ' for n in range(1, dimensions + 1))
+            arguments.append(f'carray(block[{place}], ({shape}), np.{dtype.name})')
         else:
-            values.append(argument())
-    status, _ = context.call_conv.call_function(
-        builder, context.declare_function(module, compiled.fndesc), compiled.fndesc.restype,
-        types, values)
-    builder.ret(status.code)
-    return module
+            arguments.append({'f': f'floats[{place}]', 'i': f'integers[{place}]',
+                              'b': f'integers[{place}] != 0'}[dtype.kind])
+        place += 1 + dimensions
+    names = {'carray': _numba.carray, 'np': np, 'function': entry.function}
+    exec(f"""
+def from_block(block):
+    integers = carray(block[0], ({place},), np.int64)
+    floats = carray(block[0], ({place},), np.float64)
+    try:
+        function({', '.join(arguments)})
+    except Exception:
+        integers[0] = 0
+""", names)
+    return cast('Callable[[Any], None]', names['from_block'])
 
 
 def _end_with(parent: int) -> None:
-    """End when the program that started this one does."""
+    """End this process when the program that started it has ended."""
     while os.getppid() == parent:
-        time.sleep(_LOOK)
+        time.sleep(_POLL_SECONDS)
     os._exit(1)
 
 
-def main(parent: int, module: str, name: str, target: str) -> None:
-    """Compile a function of a module into a file; end when the parent process ends."""
+def main(parent: int, module: str, target: str) -> None:
+    """Compile a module into a file; end when the parent process ends."""
     gc.disable()  # the process ends soon, and the collector takes a tenth of the time
     Thread(target=_end_with, args=[parent], daemon=True).start()
-    code = object_file(module, name)
+    code = object_file(module)
     packages = 'stewart_dynamics', module.partition('.')[0]
-    read = ' '.join(each for each in sys.modules if each.partition('.')[0] in packages)
-    Path(f'{target}.new').write_bytes(read.encode() + b'\n' + code)
+    read = [str(each.__file__) for name, each in sys.modules.items()
+            if name.partition('.')[0] in packages and each.__file__]
+    paths = '\t'.join(path.removeprefix(f'{PACKAGE}{os.sep}') for path in read)
+    Path(f'{target}.new').write_bytes(paths.encode() + b'\n' + code)
     Path(f'{target}.new').rename(target)

@@ -13,44 +13,49 @@
 # limitations under the License.
 
 """
-Decorators of the functions that are compiled.
+Marks of the functions that are compiled, and how Python calls their machine code.
 
-numba compiles them, in a process of its own (``compiler``); a program loads the machine code
-(``machine_code``) without the half second that the import of numba takes. Where nothing can be
-compiled they run as the plain Python that they are, and give the same bits: no fast-math flag is
-set, so the compiler may neither reorder a sum nor fuse a product into it, and a sample computed in
-a vector lane equals the same sample computed alone.
+numba compiles all entry points of a module at once, in a process of its own (``compiler``);
+programs load the machine code (``machine_code``) and never import numba. Where nothing can be
+compiled, the functions run as plain Python and give the same bits: no fast-math flag is set, so
+the compiler may neither reorder a sum nor fuse a product into it, and a sample computed in a
+vector lane equals the same sample computed alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+import ctypes
+from functools import partial, update_wrapper
+import os
+from struct import pack, unpack
+from threading import Thread
 from typing import Any, cast, TypeVar
 
-from stewart_dynamics.compilation.entry_point import EntryPoint
+import numpy as np
 
-__all__ = ['compiled', 'entry_point', 'inlined', 'use_compiler']
+from stewart_dynamics.compilation import machine_code
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
-# What makes numba's functions; none in a program that only calls machine code.
-_njit: Callable[..., Any] | None = None
+CALLED: dict[Callable[..., Any], bool] = {}
+"""The functions that compiled functions call, and whether each of them is inlined."""
 
-
-def use_compiler(njit: Callable[..., Any]) -> None:
-    """Have the functions of modules that are imported from now on compiled by numba."""
-    global _njit
-    _njit = njit
+DTYPES = {'b1': np.dtype(bool), 'u1': np.dtype(np.uint8), 'i8': np.dtype(np.int64),
+          'f8': np.dtype(np.float64)}
+"""Types that entry points take, as numba writes them."""
 
 
 def inlined(function: Function) -> Function:
     """Mark a part of a loop's body; it is inlined, so that the loop becomes vector code."""
-    return function if _njit is None else cast('Function', _njit(function, forceinline=True))
+    CALLED[function] = True
+    return function
 
 
 def compiled(function: Function) -> Function:
     """Mark a function that compiled functions call."""
-    return function if _njit is None else cast('Function', _njit(function))
+    CALLED[function] = False
+    return function
 
 
 def entry_point(*types: str) -> Callable[[Callable[..., None]], EntryPoint]:
@@ -60,14 +65,156 @@ def entry_point(*types: str) -> Callable[[Callable[..., None]], EntryPoint]:
     Parameters
     ----------
     types : str
-        Of the arguments, as numba writes them: ``f8[:,::1]`` is a matrix of floats in C order.
+        Types of the arguments: ``f8``, ``i8`` or ``b1``; arrays in C order with ``[::1]`` or
+        ``[:,::1]``, those of bytes begin with ``u1``.
 
     """
-    def decorator(function: Callable[..., None]) -> EntryPoint:
-        if _njit is None:
-            return EntryPoint(function, types)
-        dispatcher = _njit(function)
-        dispatcher.types = types
-        return cast('EntryPoint', dispatcher)
+    return lambda function: EntryPoint(function, types)
 
-    return decorator
+
+class EntryPoint:
+    """
+    A function of arrays and numbers that returns nothing.
+
+    Its machine code is loaded, or compiled, at the first call.
+
+    Parameters
+    ----------
+    function : callable
+        The same in plain Python.
+    types : sequence of str
+        Types of the arguments, see ``entry_point``.
+
+    """
+
+    def __init__(self, function: Callable[..., None], types: Sequence[str]) -> None:
+        self.function = function
+        self.arguments = [(DTYPES[text[:2]], text.count('[') + text.count(',')) for text in types]
+        """Data type and number of dimensions of each argument; a number has none."""
+        self._address = 0
+        self._call: Callable[..., object] | None = None
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> None:
+        """Call it; other threads run meanwhile."""
+        (self._call or self._prepared())(*arguments)
+
+    def bound(self, *arguments: Any) -> Callable[[], object]:
+        """
+        Return a function without arguments that calls it with these, which stay where they are.
+
+        It takes a tenth of the time of a call, and other threads wait for it: for single samples.
+        """
+        prepared = self._prepared()
+        if not self._address:
+            return partial(prepared, *arguments)
+        call: Any = partial(ctypes.PYFUNCTYPE(None)(self._address), self._block(arguments))
+        call.arguments = arguments  # their memory must live as long as the call
+        return cast('Callable[[], object]', call)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether a call runs machine code."""
+        self._prepared()
+        return self._address != 0
+
+    def load(self) -> bool:
+        """Load the machine code if it is on disk; return whether a call compiles nothing."""
+        return machine_code.load(self.function.__module__)
+
+    def _prepared(self) -> Callable[..., object]:
+        if self._call is None:
+            module = self.function.__module__
+            machine_code.prepare(module)
+            self._address = machine_code.address(module, self.function.__name__)
+            if self._address:
+                self._native = ctypes.CFUNCTYPE(None)(self._address)  # lets other threads run
+                self._call = self._call_native
+            else:
+                self._call = np.errstate(all='ignore')(self.function)
+        return self._call
+
+    def _call_native(self, *arguments: Any) -> None:
+        block = self._block(arguments)
+        self._native(block)
+        if not block[0]:
+            raise RuntimeError(f'{self.function.__module__}.{self.function.__name__}: '
+                               'an exception in compiled code')
+
+    def _block(self, arguments: Sequence[Any]) -> Any:
+        """
+        Return the arguments as the machine code takes them: 64-bit integers in one block.
+
+        The first is the block's own address; an array is its address and its shape, a number
+        itself, a float its bits.
+        """
+        numbers = [0]
+        for argument, (dtype, dimensions) in zip(arguments, self.arguments, strict=True):
+            if dimensions:
+                if (argument.dtype != dtype or argument.ndim != dimensions
+                        or not argument.flags.c_contiguous):
+                    raise TypeError(
+                        f'{self.function.__module__}.{self.function.__name__}: an array of '
+                        f'{argument.dtype}, shape {argument.shape}: must be of {dtype}, '
+                        f'{dimensions} dimensions, in C order')
+                numbers += (argument.ctypes.data, *argument.shape)
+            else:
+                numbers.append(unpack('q', pack('d', argument))[0] if dtype.kind == 'f'
+                               else int(argument))
+        block = (ctypes.c_int64 * len(numbers))(*numbers)
+        block[0] = ctypes.addressof(block)
+        return block
+
+
+def prepare(functions: Iterable[EntryPoint]) -> None:
+    """Load the machine code of functions; compile missing modules side by side."""
+    modules = {each.function.__module__ for each in functions}
+    missing = [each for each in modules if not machine_code.load(each)]
+    remaining = iter(missing)  # shared by the threads
+    errors: list[RuntimeWarning] = []
+
+    def work() -> None:
+        for module in remaining:
+            try:
+                machine_code.prepare(module)
+            except RuntimeWarning as exc:  # where warnings are errors
+                errors.append(exc)
+
+    # Daemons instead of a pool: an interrupted program would wait for a pool.
+    threads = [Thread(target=work, daemon=True) for _ in missing[:os.cpu_count()]]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    if errors:
+        raise errors[0]
+
+
+class Preparation:
+    """
+    Machine code that may be needed later: loaded if it is on disk, else compiled on demand.
+
+    Parameters
+    ----------
+    functions : EntryPoint
+        The functions that the later task calls.
+
+    """
+
+    def __init__(self, *functions: EntryPoint) -> None:
+        self._functions = functions
+        self._thread: Thread | None = None
+        self.ready = all(function.load() for function in functions)
+        """Whether nothing remains to be compiled."""
+
+    def begin(self) -> None:
+        """Start to compile missing functions in a thread, once."""
+        if self._thread is None and not self.ready:
+            self._thread = Thread(target=self._run, daemon=True)
+            self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            prepare(self._functions)
+        finally:  # functions that cannot be compiled run uncompiled
+            self.ready = True

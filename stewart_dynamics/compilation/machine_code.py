@@ -13,41 +13,40 @@
 # limitations under the License.
 
 """
-Machine code on disk: a file for each function, with a digest that is checked before it is loaded.
+Machine code on disk: one file for each module, checked before it is loaded.
 
-After a power cut, a disk error or an update, a file that does not match its digest is ignored and
-written anew after the compilation. What cannot be written is used all the same, with a
-RuntimeWarning.
+A file is used if its digest matches its content, the sources of the modules that it was compiled
+from, the versions of numba and llvmlite, and this processor; and if nobody but this user or root
+can have written it. Any other file is ignored, and replaced after the compilation.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 import hashlib
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import distributions
 from importlib.util import find_spec
 import json
 import os
 from pathlib import Path
+import stat
 import subprocess
 import sys
 from tempfile import TemporaryDirectory
-from threading import Thread
-from typing import Any, TypeVar
+from threading import Lock, RLock
+from typing import Any
 from uuid import uuid4
 import warnings
 
-NOT_KEPT = ('the compiled dynamics cannot be kept on disk{reason}: every start takes seconds; let '
-            'STEWART_DYNAMICS_CACHE_DIR name a folder that can be written to')
+NOT_KEPT = ('the compiled dynamics cannot be kept on disk ({reason}): every start takes seconds; '
+            'let STEWART_DYNAMICS_CACHE_DIR name a folder that can be written to')
 _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a thousand times '
                'slower, a millisecond or more for each setpoint')
-
-Result = TypeVar('Result')
-
-_PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[1]
 _COMPILER = """
 import sys
 import json
@@ -55,12 +54,11 @@ sys.path, *arguments = json.loads(sys.argv[1])
 from stewart_dynamics.compilation.compiler import main
 main(*arguments)
 """
+# The compiler optimizes the whole by itself. Users' settings of numba would be kept on disk.
+_NUMBA_SETTINGS = {'NUMBA_OPT': '1', 'NUMBA_LOOP_VECTORIZE': '0'}
+_LARGEST = 1 << 24  # bytes of a file; those of the package have less than 200 kB
 _DIGEST = hashlib.sha256
 _DIGEST_SIZE = 32
-
-
-class CompilationError(Exception):
-    """The compiler has failed."""
 
 
 def _hint() -> str:
@@ -72,192 +70,203 @@ def _hint() -> str:
 
 
 HINT = _hint()
-"""Why nothing is compiled, and what that costs; empty where functions are compiled."""
+"""Why nothing is compiled, and the consequence; empty where functions are compiled."""
 COMPILED = not HINT
 
-
-def _print(text: str) -> None:
-    print(f'stewart_dynamics: {text}', file=sys.stderr, flush=True)
-
-
-announce: Callable[[str], object] = _print
+announce: Callable[[str], object] = partial(
+    print, 'stewart_dynamics:', file=sys.stderr, flush=True)
 """Called with a line when a compilation begins; a program may put a function of its own here."""
 
-
-def kept_address(module: str, name: str) -> int | None:
-    """
-    Load the machine code of a function from the disk, and return where it is in memory.
-
-    0 where nothing is compiled; None where it has to be compiled first.
-    """
-    if not COMPILED:
-        return 0
-
-    def loaded() -> int | None:
-        for folder in _folders():
-            if code := _kept(folder, module, name):
-                return _load(code, f'{module}.{name}')
-        return None
-
-    return _uninterrupted(loaded)
+# Machine code in memory by module; None for modules that run uncompiled.
+_engines: dict[str, Any] = {}
+# One thread at a time uses LLVM, and one compiles a module. A fork waits for LLVM; other threads
+# and what they hold do not exist in the child.
+_llvm = RLock()
+_compiling: dict[str, Lock] = defaultdict(Lock)
 
 
-def _uninterrupted(function: Callable[[], Result]) -> Result:
-    """
-    Return what a function returns, called in a thread of its own.
+def _after_fork() -> None:
+    _compiling.clear()
+    _llvm.release()
 
-    What a handler of signals raises comes in the main thread: within llvmlite it would leave
-    objects half made, which Python reports when it deletes them.
-    """
-    result: Future[Result] = Future()
 
-    def call() -> None:
+os.register_at_fork(
+    before=_llvm.acquire, after_in_parent=_llvm.release, after_in_child=_after_fork)
+
+
+def address(module: str, name: str) -> int:
+    """Return where a function of a prepared module is in memory; 0 if it runs uncompiled."""
+    engine = _engines.get(module)
+    return engine.get_function_address(f'{module}.{name}') if engine else 0
+
+
+def load(module: str) -> bool:
+    """Load a module's machine code from the disk; return False if it must be compiled first."""
+    return not COMPILED or module in _engines or any(
+        _load(module, code) for folder in _folders() if (code := _kept(folder, module)))
+
+
+def prepare(module: str) -> None:
+    """Load a module's machine code, or compile it, which takes seconds."""
+    with _compiling[module]:
+        if load(module):
+            return
+        announce(f'compiling {module} for this processor: this takes seconds, only this once')
         try:
-            result.set_result(function())
-        except BaseException as exc:
-            result.set_exception(exc)
-
-    Thread(target=call, daemon=True).start()
-    return result.result()
-
-
-def compiled_address(module: str, name: str) -> int:
-    """Compile a function, and return where it is in memory; 0 where that is not possible."""
-    announce(f'compiling {module}.{name} for this processor: this takes seconds, only this once')
-    try:
-        answer = _compile(module, name)
-    except CompilationError as exc:
-        warnings.warn(f'{exc}: {_UNCOMPILED}', RuntimeWarning, stacklevel=2)
-        return 0
-    address = _uninterrupted(lambda: _load(answer, f'{module}.{name}'))
-    _keep(module, name, answer)
-    return address
+            code = _compile(module)
+        except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
+            warnings.warn(f'{module} cannot be compiled: {exc}: {_UNCOMPILED}', RuntimeWarning,
+                          stacklevel=2)
+            _engines[module] = None
+            return
+        _load(module, code)
+        _keep(module, code)
 
 
-def _compile(module: str, name: str) -> bytes:
-    """Return what the compiler writes: the modules it has read, and the object file."""
-    # The compiler reads this copy of the package, whatever the present folder is.
-    paths = [str(_PACKAGE.parent), *(os.path.abspath(path) for path in sys.path if path)]
-    said = ''
-    try:
-        with TemporaryDirectory() as folder:
-            target = Path(folder, 'answer')
-            arguments = json.dumps([paths, os.getpid(), module, name, str(target)])
-            # In a session of its own: what a terminal sends to this process is not for it. What it
-            # prints is not its answer: numba and the start of Python can be told to print.
-            done = subprocess.run(
-                [sys.executable, '-I', '-c', _COMPILER, arguments], stdin=subprocess.DEVNULL,
-                capture_output=True, check=False, start_new_session=True)
-            said = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
-            return target.read_bytes()
-    except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
-        raise CompilationError(f'{module}.{name} cannot be compiled: {said or exc}') from exc
-
-
-def _load(answer: bytes, symbol: str) -> int:
-    """Return where the function of an object file is in memory."""
+def target_machine() -> Any:
+    """Return this processor as LLVM's target: the one that is compiled for, and no other."""
     from llvmlite import binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(''), machine)
-    engine.add_object_file(llvm.ObjectFileRef.from_data(answer.partition(b'\n')[2]))
-    engine.finalize_object()
-    _ENGINES.append(engine)
-    return int(engine.get_function_address(symbol))
+    triple, cpu, features = _processor()
+    return llvm.Target.from_triple(triple).create_target_machine(
+        cpu, features, opt=3, reloc='static' if triple.startswith('x86') else 'default', jit=True)
 
 
-# They own the memory.
-_ENGINES: list[Any] = []
+def _load(module: str, code: bytes) -> bool:
+    """Load an object file, and return True."""
+    def engine() -> Any:
+        from llvmlite import binding as llvm
+
+        with _llvm:
+            engine = llvm.create_mcjit_compiler(llvm.parse_assembly(''), target_machine())
+            engine.add_object_file(llvm.ObjectFileRef.from_data(code.partition(b'\n')[2]))
+            engine.finalize_object()
+            return engine
+
+    # In a thread: signal handlers raise in the main thread, and would leave llvmlite's objects
+    # half made.
+    _engines[module] = ThreadPoolExecutor(1).submit(engine).result()
+    return True
+
+
+def _compile(module: str) -> bytes:
+    """Return the compiler's answer: the names of the modules that it has read; an object file."""
+    # The compiler reads this copy of the package, whatever the present folder is.
+    paths = [str(PACKAGE.parent), *(os.path.abspath(path) for path in sys.path if path)]
+    with TemporaryDirectory() as folder:
+        target = Path(folder, 'answer')
+        settings = {name: text for name, text in os.environ.items() if name[:6] != 'NUMBA_'}
+        # In a session of its own, since signals of a terminal are not for it; its answer is a
+        # file, since the start of Python can be told to print.
+        done = subprocess.run(
+            [sys.executable, '-I', '-c', _COMPILER,
+             json.dumps([paths, os.getpid(), module, str(target)])],
+            cwd=folder, env=settings | _NUMBA_SETTINGS, stdin=subprocess.DEVNULL,
+            capture_output=True, check=False, start_new_session=True)
+        try:
+            return target.read_bytes()
+        except OSError as exc:
+            text = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
+            raise OSError(text or f'{exc}') from exc
 
 
 # -- files ----------------------------------------------------------------------------------------
 
 def _folders() -> Iterator[Path]:
-    """Yield where machine code may be: in the package, and in the user's cache."""
+    """Yield the folders for machine code: in the package, and in the user's cache."""
     if named := os.environ.get('STEWART_DYNAMICS_CACHE_DIR'):
         yield Path(named)
         return
-    yield _PACKAGE / '__pycache__'
+    yield PACKAGE / '__pycache__'
     with suppress(RuntimeError):  # there is no home
-        yield Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / _PACKAGE.name
+        yield Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / PACKAGE.name
 
 
-def _kept(folder: Path, module: str, name: str) -> bytes:
-    """Return what was kept of a function; empty where it is missing or does not match."""
+def _check_writers(status: os.stat_result) -> None:
+    """Raise PermissionError if another user than root can have written a file or a folder."""
+    if status.st_uid not in (0, os.geteuid()) or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(1, 'other users can write to it')
+
+
+def _kept(folder: Path, module: str) -> bytes:
+    """Return the code of a module on disk; empty if it is missing or not to be used."""
+    opened = []
     try:
-        content = (folder / _file_name(module, name)).read_bytes()
+        opened.append(os.open(folder, os.O_RDONLY | os.O_DIRECTORY))
+        # Neither the opening of a pipe nor a link to a device may block.
+        opened.append(os.open(_file_name(module), os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK,
+                              dir_fd=opened[0]))
+        for each in opened:
+            _check_writers(status := os.fstat(each))
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
+            return b''
+        with open(opened[1], 'rb', closefd=False) as file:
+            content = file.read(_LARGEST)
     except OSError:
         return b''
-    answer = content[_DIGEST_SIZE:]
-    return answer if content[:_DIGEST_SIZE] == _digest(module, name, answer) else b''
+    finally:
+        for each in opened:
+            os.close(each)
+    code = content[_DIGEST_SIZE:]
+    return code if content[:_DIGEST_SIZE] == _digest(module, code) else b''
 
 
 def folder_to_write() -> Path:
-    """Return the first folder for machine code that can be written to, or else the last."""
+    """Return the first folder for machine code that is ours to write to, or else the last."""
     folder = Path()
     for folder in _folders():
         with suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            break
+            folder.mkdir(parents=True, exist_ok=True, mode=0o755)
+            _check_writers(folder.stat())
+            if os.access(folder, os.W_OK):
+                break
     return folder
 
 
-def _keep(module: str, name: str, answer: bytes) -> None:
-    """Write what the compiler gave; RuntimeWarning where that is not possible."""
-    path = folder_to_write() / _file_name(module, name)
+def _keep(module: str, code: bytes) -> None:
+    """Write the code of a module; RuntimeWarning if that is not possible."""
+    folder = folder_to_write()
+    path = folder / _file_name(module)
     # Renamed when it is complete: other processes read and write the same file.
     new = path.with_name(f'{path.name}.tmp.{uuid4().hex[:16]}')
     try:
-        new.write_bytes(_digest(module, name, answer) + answer)
+        _check_writers(folder.stat())
+        with open(new, 'xb', opener=lambda name, flags: os.open(name, flags, 0o644)) as file:
+            file.write(_digest(module, code) + code)
         new.replace(path)
     except OSError as exc:
         with suppress(OSError):
             new.unlink(missing_ok=True)
-        warnings.warn(NOT_KEPT.format(reason=f' ({exc.strerror})'), RuntimeWarning, stacklevel=2)
+        warnings.warn(NOT_KEPT.format(reason=exc.strerror), RuntimeWarning, stacklevel=3)
 
 
-def _file_name(module: str, name: str) -> str:
-    return f'{module}.{name}.{_DIGEST(_processor()).hexdigest()[:16]}.code'
+def _file_name(module: str) -> str:
+    return f'{module}.{_DIGEST(repr(_processor()).encode()).hexdigest()[:16]}.code'
 
 
-def _digest(module: str, name: str, answer: bytes) -> bytes:
-    """Return the digest of code and of everything on which it depends."""
-    digest = _DIGEST(f'{module}.{name} {_versions()}'.encode() + _processor() + answer)
-    for each in answer.partition(b'\n')[0].decode(errors='replace').split():
-        digest.update(_source(each))
+def _digest(module: str, code: bytes) -> bytes:
+    """Return the digest of code and of all that it depends on."""
+    versions = [each.version for name in ('numba', 'llvmlite')
+                for each in distributions(name=name)]
+    digest = _DIGEST(repr((module, versions, _processor())).encode() + code)
+    for path in code.partition(b'\n')[0].decode(errors='replace').split('\t'):
+        digest.update(_source(path))
     return digest.digest()
 
 
 @cache
-def _source(module: str) -> bytes:
-    """Return the digest of a module's source; empty where there is none."""
-    path = _PACKAGE.joinpath(*module.split('.')[1:])
-    files = [path.with_suffix('.py'), path / '__init__.py']
-    if loaded := getattr(sys.modules.get(module), '__file__', None):
-        files.insert(0, Path(loaded))
-    for file in files:
-        with suppress(OSError, ValueError):
-            return _DIGEST(file.read_bytes()).digest()
+def _source(path: str) -> bytes:
+    """Return the digest of a source file, its path relative to the package; empty if missing."""
+    with suppress(OSError, ValueError):
+        return _DIGEST((PACKAGE / path).read_bytes()).digest()
     return b''
 
 
 @cache
-def _processor() -> bytes:
+def _processor() -> tuple[str, str, str]:
     from llvmlite import binding as llvm
 
-    features = llvm.get_host_cpu_features()
-    return f'{llvm.get_process_triple()} {llvm.get_host_cpu_name()} {features.flatten()}'.encode()
-
-
-@cache
-def _versions() -> str:
-    def of(name: str) -> str:
-        try:
-            return version(name)
-        except PackageNotFoundError:
-            return ''
-
-    return f'{of("numba")} {of("llvmlite")}'
+    return (llvm.get_process_triple(), llvm.get_host_cpu_name(),
+            llvm.get_host_cpu_features().flatten())

@@ -95,7 +95,7 @@ def _arguments() -> argparse.ArgumentParser:
 def _run(given: argparse.Namespace) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import find_bags
-    from stewart_dynamics.compilation.entry_point import prepare
+    from stewart_dynamics.compilation.functions import prepare
     from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.identification.one_run import FUNCTIONS, run
     from stewart_dynamics.identification.text import result_text

@@ -58,8 +58,8 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
     motions = compact(motions)
     wrenches = _NO_WRENCH if wrenches is None else compact(wrenches)
     bases = _NO_BASE if bases is None else compact(bases)
-    results = np.empty((len(motions), RESULT))
-    in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results,
+    results, sound = np.empty((len(motions), RESULT)), np.empty(len(motions), dtype=bool)
+    in_parts(inverse_dynamics.solve, constants, motions, wrenches, bases, results, sound,
              scratch=(inverse_dynamics.TILE,))
     return results
 

@@ -31,14 +31,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.entry_point import EntryPoint
+from stewart_dynamics.compilation.functions import EntryPoint
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, inverse_dynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.rows import (
-    ACCELERATION, BASE, LENGTHS, MOTION, NO_BASE, POSE, RESULT, WRENCH)
+    ACCELERATION, BASE, MOTION, NO_BASE, POSE, RESULT, WRENCH)
 
 _NO_WRENCH = np.zeros(WRENCH)
 _NO_BASE = np.array(NO_BASE)
@@ -64,8 +64,9 @@ class SingleSample:
 
     def __init__(self, constants: Array) -> None:
         self._inverse_dynamics = _Memories(
-            inverse_dynamics.solve_sample, constants, np.empty(MOTION), np.empty(WRENCH),
-            _NO_BASE, np.empty(RESULT), np.empty(1), np.empty(inverse_dynamics.TILE))
+            inverse_dynamics.solve, constants, np.empty((1, MOTION)), np.empty((1, WRENCH)),
+            _NO_BASE[None], np.empty((1, RESULT)), np.empty(1, dtype=bool),
+            np.empty(inverse_dynamics.TILE))
         self._forward_dynamics = _Memories(
             forward_dynamics.solve, constants, np.empty((1, MOTION)), np.empty((1, 6)),
             np.empty((1, WRENCH)), _NO_BASE[None], np.empty(forward_dynamics.WORK))
@@ -93,7 +94,7 @@ class SingleSample:
         solve()
         if base is not None:
             of_base[0] = math.nan  # the next one is still
-        result = arrays[3].copy() if sound[0] else None
+        result = arrays[3][0].copy() if sound[0] else None
         self._inverse_dynamics.free(memory)
         return result
 
@@ -114,15 +115,6 @@ class SingleSample:
         result = arrays[3][0].copy()
         self._base_wrench.free(memory)
         return result if math.isfinite(sum(result.tolist())) else None
-
-    def inverse_kinematics(self, pose: Pose | Motion) -> Array | None:
-        """Return the leg lengths (6,) at a pose."""
-        if type(pose) is not Pose and type(pose) is not Motion or pose.shape:
-            return None
-        at_rest = np.zeros(MOTION)
-        at_rest[POSE] = pose.rows[POSE]
-        result = self.inverse_dynamics(Motion.of_rows(at_rest), None, None)
-        return None if result is None else result[LENGTHS].copy()
 
     def forward_dynamics(self, motion: Motion, forces: Any, wrench: Any, base: Any,
                          ) -> Array | None:

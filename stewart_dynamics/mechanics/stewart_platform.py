@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -39,12 +40,13 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics, home_pose
+from stewart_dynamics.mechanics.kinematics.inverse_kinematics import leg_lengths
 from stewart_dynamics.mechanics.kinematics.joint_axes import JointAngles
 from stewart_dynamics.mechanics.platform_arguments import (
     base_rows, check_kind, copies, find_unsolvable, leg_stiffnesses, loaded, motion_rows, place)
 from stewart_dynamics.mechanics.rows import (
     BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, BASE_JOINT_ANGLES,
-    FORCES, GRAVITY, JOINT_ANGLES, LENGTHS, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
+    FORCES, GRAVITY, JOINT_ANGLES, MOTION, NO_BASE, PLATFORM_JOINT_ANGLES, POSE, POSITION,
     RESULT, TWIST, WRENCH)
 from stewart_dynamics.mechanics.single_sample import SingleSample
 from stewart_dynamics.mechanics.stiffness import NaturalModes
@@ -70,6 +72,9 @@ class StewartPlatform:
         As given.
     constants : (CONSTANTS,)
         The hexapod as the compiled functions take it, see ``hexapod_constants``.
+    solve : callable
+        ``mechanics.batch.solve`` of this hexapod: rows of motion, and optionally rows of wrenches
+        and of the base's motion, to rows of results, unchecked.
 
     Raises
     ------
@@ -84,6 +89,7 @@ class StewartPlatform:
                              'reads a file, Parameters takes a dict')
         self.parameters = parameters
         self.constants = hexapod_constants(parameters)
+        self.solve = partial(batch.solve, self.constants)
         self._single = SingleSample(self.constants)
         self._breakdown: ForceBreakdownRows | None = None
         self._home: Pose | None = None
@@ -148,17 +154,6 @@ class StewartPlatform:
         if len(unsolvable):
             results[unsolvable, FORCES] = np.nan
         return InverseDynamics(results.reshape(*shape, RESULT))
-
-    def solve(self, rows: Array, wrenches: Array | None = None, bases: Array | None = None,
-              ) -> Array:
-        """
-        Return rows of results (N, RESULT) of rows of motion (N, MOTION), unchecked.
-
-        They are laid out as ``mechanics.rows`` says. The wrenches are (N, 6), or (1, 6) for all
-        samples; so are the bases, (N, BASE), of which a row of nan adds no load. Large batches
-        use all processors.
-        """
-        return batch.solve(self.constants, rows, wrenches, bases)
 
     def force_breakdown(
             self, motion: Motion, wrench: ArrayLike | None = None,
@@ -295,11 +290,9 @@ class StewartPlatform:
 
     def inverse_kinematics(self, pose: Pose | Motion) -> Array:
         """Return the six leg lengths at a pose, (..., 6) [m]."""
-        lengths = self._single.inverse_kinematics(pose)
-        if lengths is not None:
-            return lengths
-        rows = motion_rows(pose)
-        lengths = self.solve(rows)[:, LENGTHS].reshape(*pose.shape, 6).copy()
+        check_kind(pose, Pose, Motion)
+        with np.errstate(all='ignore'):
+            lengths = leg_lengths(self.constants, pose.rows)
         return check_finite('leg lengths', lengths, len(pose.shape))
 
     def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion) -> Pose:

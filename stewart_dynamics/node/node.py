@@ -29,7 +29,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.compilation import machine_code
-from stewart_dynamics.compilation.preparation import Preparation
+from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.description.joint_states import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import estimate as external_wrench, payload

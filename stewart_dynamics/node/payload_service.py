@@ -26,7 +26,7 @@ from rclpy.time import Time
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from stewart_dynamics.compilation.preparation import Preparation
+from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.external_wrench.payload import FUNCTIONS, Outcome, Payload
 from stewart_dynamics.ros.rclpy_workarounds import create_later_service, OneShotTimer
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from stewart_dynamics.compilation.preparation import Preparation
+from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.planned.messages import Outcome
 
 # So many are in work or wait.

@@ -113,7 +113,7 @@ def _options(given: argparse.Namespace) -> Options:
 def _run(given: argparse.Namespace, options: Options) -> int:
     # Imported here, so that --help is fast.
     from stewart_dynamics.bags.find import FLEET_PAGE, folders_of_results
-    from stewart_dynamics.compilation.entry_point import prepare
+    from stewart_dynamics.compilation.functions import prepare
     from stewart_dynamics.compilation.machine_code import HINT
     from stewart_dynamics.mechanics.plausibility import likely_mistakes
     from stewart_dynamics.parameters.table import Parameters

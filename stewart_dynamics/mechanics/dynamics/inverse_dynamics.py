@@ -36,7 +36,7 @@ from __future__ import annotations
 
 import math
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.base_load import base_load, moves
 from stewart_dynamics.mechanics.dynamics.bodies import leg_dynamics, platform_dynamics
@@ -246,20 +246,9 @@ def solve_one(constants: Array, motion: Array, wrench: Array, base: Array, resul
         result[n] = tile[_RESULT + n * LANES]
 
 
-@entry_point('f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'f8[::1]')
-def solve_sample(constants: Array, motion: Array, wrench: Array, base: Array, result: Array,
-                 sound: Array, tile: Array) -> None:
-    """Do the same; ``sound`` (1,) is 1 where all numbers are finite and J_inv can be solved."""
-    solve_one(constants, motion, wrench, base, result, tile)
-    finite = True
-    for n in range(RESULT):
-        finite = finite and math.isfinite(result[n])
-    sound[0] = 1.0 if finite and result[CONDITION] < UNSOLVABLE_CONDITION else 0.0
-
-
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[::1]')
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'b1[::1]', 'f8[::1]')
 def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, results: Array,
-          tile: Array) -> None:
+          sound: Flags, tile: Array) -> None:
     """
     Compute the result of every motion.
 
@@ -276,6 +265,8 @@ def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, resul
     results : (N, RESULT)
         Written: lengths [m], rates [m/s], forces [N], forces under a unit load, det(J) [m^3],
         d(det)/dt [m^3/s] and the condition number.
+    sound : (N,)
+        Written: whether all numbers are finite and J_inv can be solved.
     tile : (TILE,)
         Scratch memory.
 
@@ -299,5 +290,9 @@ def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, resul
         _tile_dynamics(constants, tile, lanes)
         _tile_eigenvalues(tile, lanes)
         for k in range(lanes):
+            finite = True
             for n in range(RESULT):
-                results[first + k, n] = tile[_RESULT + n * LANES + k]
+                result = tile[_RESULT + n * LANES + k]
+                results[first + k, n] = result
+                finite = finite and math.isfinite(result)
+            sound[first + k] = finite and results[first + k, CONDITION] < UNSOLVABLE_CONDITION
