@@ -18,12 +18,15 @@ from __future__ import annotations
 
 from typing import Any
 
-_LONGEST = 80
+_LONGEST, _LONGEST_LINE = 80, 4000
 
 
 def one_line(exc: object) -> str:
-    """Return the text of an error in one line, or its type if it has no text."""
-    return ' '.join(f'{exc}'.split()) or type(exc).__name__
+    """Return the text of an error in one line of limited length, or its type if it has none."""
+    text = f'{exc}'
+    if len(text) > _LONGEST_LINE:  # texts of a file can have any length
+        text = f'{text:.{_LONGEST_LINE}}...'
+    return ' '.join(text.split()) or type(exc).__name__
 
 
 def shown(value: Any) -> str:

@@ -803,7 +803,8 @@ def test_lost_rows_of_sqlite3_are_reported(tmp_path: Path) -> None:
         assert found.messages == given_ or found.missing
         lost += len(found.messages) < len(given_)
     assert lost > 10
-    assert rejected > 10
+    # only where the list of tables or topics is damaged
+    assert 0 < rejected < 10
 
 
 def test_rows_that_are_not_messages_are_missing(tmp_path: Path) -> None:
@@ -819,6 +820,58 @@ def test_rows_that_are_not_messages_are_missing(tmp_path: Path) -> None:
     found = read(file)
     assert found.messages == given_
     assert found.missing == [f'{file.name}: 4 rows that are not messages']
+
+
+ENDLESS = 'WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) '
+
+
+@pytest.mark.parametrize('changes', [
+    f'DROP TABLE messages; CREATE VIEW messages AS {ENDLESS} SELECT x AS id, 1 AS topic_id, '
+    "x AS timestamp, x'00010000' AS data FROM n",
+    f'DROP TABLE topics; CREATE VIEW topics AS {ENDLESS} SELECT x AS id, x AS name, x AS type, '
+    'x AS serialization_format FROM n',
+    'DROP TABLE topics; CREATE TABLE topics (id, name, type, serialization_format AS '
+    '(hex(zeroblob(500000000))))',
+    'DROP TABLE messages; CREATE TABLE messages (id, topic_id, timestamp)'])
+def test_tables_that_may_never_end_are_rejected(changes: str, tmp_path: Path) -> None:
+    file = storage(write_bag(tmp_path / 'bag', motion(1)))
+    with sqlite3.connect(file) as database:
+        database.executescript(changes)
+    database.close()
+    with pytest.raises(BagError, match='has no table (messages|topics) with the columns'):
+        Recording(file)
+
+
+def test_definitions_that_never_end_are_not_read(tmp_path: Path) -> None:
+    given_ = motion(1)
+    file = storage(write_bag(tmp_path / 'bag', given_))
+    with sqlite3.connect(file) as database:
+        database.executescript(
+            'DROP TABLE IF EXISTS message_definitions; CREATE VIEW message_definitions AS '
+            f"{ENDLESS} SELECT x AS id, '' AS topic_type, '' AS encoding, '' AS "
+            "encoded_message_definition, '' AS type_description_hash FROM n")
+    database.close()
+    assert read(file)[:2] == (given_, [])
+
+
+@pytest.mark.parametrize(('changes', 'missing'), [
+    ("UPDATE topics SET name = x'00ff' WHERE id = 1", r"topic b'\x00\xff': number, name, type"),
+    ("UPDATE topics SET type = x'05' WHERE id = 1", 'number, name, type or encoding is not valid'),
+    ("UPDATE topics SET name = '/' || hex(zeroblob(5000000)) WHERE id = 1",
+     '0000... of type geometry_msgs/msg/PoseStamped: at most 255 characters'),
+    ('UPDATE messages SET timestamp = -timestamp WHERE topic_id = 1', '2 rows that are not'),
+    ('UPDATE messages SET data = zeroblob(2000000) WHERE topic_id = 1', '2 rows that are not')])
+def test_odd_rows_are_missing(changes: str, missing: str, tmp_path: Path) -> None:
+    given_ = motion(2)
+    file = storage(write_bag(tmp_path / 'bag', given_))
+    with sqlite3.connect(file) as database:
+        database.execute(changes)
+    database.close()
+    found = read(file)
+    assert found.messages == [each for each in given_ if not each[0].endswith(POSE)]
+    assert len(found.missing) == 1
+    assert missing in found.missing[0]
+    assert len(found.missing[0]) < 300
 
 
 @pytest.mark.parametrize('suffix', ['-wal', '-journal'])

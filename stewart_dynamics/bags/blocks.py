@@ -31,6 +31,8 @@ LATEST = int(np.iinfo(np.int64).max)
 LARGEST_CHUNK = 1 << 27
 # Larger than any setpoint or leg state; larger messages are not decompressed.
 LARGEST_MESSAGE = 1 << 16
+# Larger rows of a table are not read.
+LARGEST_ROW = 1 << 20
 # Messages in a block: enough that the overhead of a numpy call is small, few enough that they fit
 # into the processor's cache.
 _FEWEST, IN_A_BLOCK = 4096, 16384
@@ -130,6 +132,31 @@ def compact(block: Messages) -> Messages:
     _gather(block.data, np.ascontiguousarray(block.starts), np.ascontiguousarray(block.sizes),
             data)
     return block._replace(starts=np.cumsum(block.sizes) - block.sizes, data=data)
+
+
+def rows_in_blocks(rows: Iterator[tuple[str, int, bytes]], keys: Mapping[str, str],
+                   ) -> Iterator[tuple[Messages, int]]:
+    """Yield single messages, topic, time and data, in blocks, also those before an error."""
+    names = tuple(dict.fromkeys(keys.values()))
+    numbers = {topic: names.index(key) for topic, key in keys.items()}
+    more = True
+    while more:
+        of_topic, times, messages, size, error = list[int](), list[int](), list[bytes](), 0, None
+        more = False
+        try:
+            for topic, time, data in rows:
+                of_topic.append(numbers[topic])
+                times.append(time)
+                messages.append(data)
+                size += len(data)
+                if len(times) == _FEWEST or size >= MOST_BYTES:
+                    more = True
+                    break
+        except Exception as exc:  # raised once these are handed over
+            error = exc
+        yield Messages.of(names, of_topic, times, messages), size
+        if error is not None:
+            raise error
 
 
 def of_good_length(blocks: Iterator[tuple[Messages, int]]) -> Iterator[tuple[Messages, int]]:

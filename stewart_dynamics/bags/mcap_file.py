@@ -102,8 +102,7 @@ class McapFile:
         self._file = path.open('rb')
         try:
             if self._file.read(len(MAGIC)) != MAGIC:
-                raise BagError(f'{path}: not a bag that can be read: does not begin like an MCAP '
-                               'file')
+                raise BagError('does not begin like an MCAP file')
             self._size = self._file.seek(0, 2)
             if not self._read_index():
                 self._types.clear()

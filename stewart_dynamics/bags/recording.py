@@ -24,11 +24,14 @@ import tempfile
 from stewart_dynamics.bags.blocks import of_good_length, Source
 from stewart_dynamics.bags.files import files_of, unpack
 from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
-from stewart_dynamics.errors import BagError, one_line
+from stewart_dynamics.bags.sqlite_file import SqliteFile
+from stewart_dynamics.errors import BagError, one_line, shown_name
 from stewart_dynamics.messages.recorded import Messages
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'
+# Longer names of topics or types are not valid in ROS.
+_LONGEST_NAME = 255
 # Messages that are read of a file of any size. Of larger ones no more are read than they have
 # bytes: no recording is compressed as well, but files made to occupy the reader for hours are.
 _MESSAGES = 100_000
@@ -74,9 +77,13 @@ class Recording:
             raise
         self.missing += faults
         kinds: dict[str, set[str]] = {}
-        for _, source in self._sources:
+        for file, source in self._sources:
             for topic, kind in source.topics.items():
-                kinds.setdefault(topic, set()).add(kind)
+                if max(len(topic), len(kind)) <= _LONGEST_NAME:
+                    kinds.setdefault(topic, set()).add(kind)
+                else:
+                    self.missing.append(f'{file.name}: topic {shown_name(topic)} of type '
+                                        f'{shown_name(kind)}: at most {_LONGEST_NAME} characters')
         self.topics = {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
 
     def messages(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
@@ -128,33 +135,20 @@ class Recording:
                 head = stream.read(len(_SQLITE))
             if head.startswith(MAGIC):
                 return McapFile(unpacked)
-            if not head.startswith((_SQLITE, _ROS_1)):
-                raise BagError(f'{file}: not a bag that can be read: not MCAP, not sqlite3, not '
-                               'a bag of ROS 1')
-            return self._opened_by_rosbags(
-                file, unpacked, '.db3' if head == _SQLITE else '.bag')
-        except BagError:
-            raise
-        except OSError as exc:
-            raise BagError(f'{file}: not a bag that can be read: {one_line(exc)}') from exc
-
-    def _opened_by_rosbags(self, file: Path, unpacked: Path, suffix: str) -> Source:
-        from stewart_dynamics.bags.rosbags_recording import RosbagsRecording
-
-        # rosbags detects formats by suffix, and cannot open names with ?, # or %.
-        link = self._new_file().with_suffix(suffix)
-        link.symlink_to(unpacked.absolute())
-        try:
-            source = RosbagsRecording(link)
+            if head.startswith(_ROS_1):
+                from stewart_dynamics.bags.ros1_file import Ros1File  # rosbags is slow to import
+                return Ros1File(unpacked)
+            if head != _SQLITE:
+                raise BagError('not MCAP, not sqlite3, not a bag of ROS 1')
+            # After a crash of the recorder it contains messages that are not in the file.
+            for ending in ('-wal', '-journal'):
+                journal = file.with_name(f'{file.name}{ending}')
+                if journal.is_file() and journal.stat().st_size:
+                    self.missing.append(f'{journal.name}: the recording was not closed; messages '
+                                        'that are only in this file are not read')
+            return SqliteFile(unpacked)
         except Exception as exc:  # damaged bytes: rosbags raises any exception
             raise BagError(f'{file}: not a bag that can be read: {one_line(exc)}') from exc
-        # After a crash of the recorder it contains messages that are not in the file.
-        for ending in ('-wal', '-journal'):
-            journal = file.with_name(f'{file.name}{ending}')
-            if journal.is_file() and journal.stat().st_size:
-                self.missing.append(f'{journal.name}: the recording was not closed; messages '
-                                    'that are only in this file are not read')
-        return source
 
     def _new_file(self) -> Path:
         """Return a path in a temporary folder, removed by ``close``."""

@@ -29,7 +29,7 @@ from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 
 MEASURED = 'measured'
 _MEASURED_TYPE = 'sensor_msgs/msg/JointState'
-# At most so many of a kind are listed.
+# Maximum number of listed texts of a kind.
 LISTED = 20
 _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
 
@@ -77,19 +77,19 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
                    if kind == inputs.INPUT_TYPES[inputs.WRENCH] and name not in topics.values()
                    and name != f'{options.node}/{BASE_WRENCH}')
     if loads and inputs.WRENCH not in topics:
-        notices.append(f'{", ".join(loads)}: not used as external wrench; --wrench selects one')
+        notices.append(f'{_joined(loads)}: not used as external wrench; --wrench selects one')
     base = sorted(
         name for name, kind in recording.topics.items() if name not in topics.values()
         and (name in [f'{options.node}/{key}' for key in _OF_BASE]
              or kind == inputs.INPUT_TYPES[inputs.BASE_IMU]
              or name.endswith(f'/{inputs.BASE_POSE}')))
     if base:
-        notices.append(f'{", ".join(base)}: not used: base.source is {parameters["base.source"]}')
+        notices.append(f'{_joined(base)}: not used: base.source is {parameters["base.source"]}')
     legs = sorted(name for name, kind in recording.topics.items()
                   if kind == _MEASURED_TYPE and name not in topics.values()
                   and name not in (f'{options.node}/leg_states', f'{options.node}/{JOINT_STATES}'))
     if legs and MEASURED not in topics:
-        notices.append(f'{", ".join(legs)}: not used; --measured compares the efforts of measured '
+        notices.append(f'{_joined(legs)}: not used; --measured compares the efforts of measured '
                        'legs with the computed forces')
     return notices
 
@@ -124,7 +124,7 @@ def _by_type(recording: Recording, key: str, options: Options, taken: Container[
         return candidates[0]
     if candidates:
         raise BagError(f'{recording.path}: has no topic {usual}, and several of its type, '
-                       f'{kind}: {", ".join(candidates)}: select one by {_option(key)}')
+                       f'{kind}: {_joined(candidates)}: select one by {_option(key)}')
     raise BagError(f'{recording.path}: has no topic {usual}, nor another of its type, {kind}; '
                    f'it contains {_held(recording)}{_advice(recording, key)}')
 
@@ -140,7 +140,7 @@ def _base_by_type(recording: Recording, key: str, options: Options, source: str,
     text = (f'{recording.path}: base.source is {source}, and the bag has no topic '
             f'{options.node}/{key}')
     if candidates:
-        raise BagError(f'{text}; of its type, {kind}, it has {", ".join(candidates)}: '
+        raise BagError(f'{text}; of its type, {kind}, it has {_joined(candidates)}: '
                        f'{_option(key)} selects one')
     raise BagError(f'{text}, nor another of its type, {kind}, that is no setpoint; it contains '
                    f'{_held(recording)}')
@@ -172,14 +172,18 @@ def _of_type(recording: Recording, name: str, kind: str) -> str:
 
 
 def _held(recording: Recording) -> str:
-    held = ', '.join(f'{name} ({kind})' for name, kind in sorted(
-        recording.topics.items())) or 'no topics'
+    held = _joined([f'{name} ({kind})' for name, kind in sorted(
+        recording.topics.items())]) or 'no topics'
     damage = listed(recording.damage)
     return held + (f'; could not be read: {"; ".join(damage)}' if damage else '')
 
 
-def listed(what: list[str]) -> list[str]:
+def _joined(names: list[str]) -> str:
+    return ', '.join(listed(names))
+
+
+def listed(texts: list[str]) -> list[str]:
     """Return the first texts, and the number of the others."""
-    if len(what) <= LISTED:
-        return list(what)
-    return [*what[:LISTED], f'and {len(what) - LISTED} more']
+    if len(texts) <= LISTED:
+        return list(texts)
+    return [*texts[:LISTED], f'and {len(texts) - LISTED} more']

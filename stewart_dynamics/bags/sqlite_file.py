@@ -1,0 +1,143 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Bags in sqlite3, as rosbag2 records them; the format has no checksums."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+import sqlite3
+
+from stewart_dynamics.bags.blocks import LARGEST_ROW, rows_in_blocks
+from stewart_dynamics.errors import BagError, one_line, shown
+from stewart_dynamics.messages.recorded import Messages
+
+# Instructions of sqlite's virtual machine at most, for all of a file and for each byte: ten
+# times as many as the rows of a recording need.
+_INSTRUCTIONS, _FOR_A_BYTE, _AT_ONCE = 100_000_000, 100, 1_000_000
+_TABLES = {'topics': ('id', 'name', 'type', 'serialization_format'),
+           'messages': ('topic_id', 'timestamp', 'data')}
+
+
+class SqliteFile:
+    """
+    The messages of a file in sqlite3.
+
+    Raises BagError if it has no such tables, sqlite3.Error if it cannot be opened.
+
+    Attributes
+    ----------
+    missing : list of str
+        What could not be read.
+    unchecked : bool
+        Messages without a checksum were read: always.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.missing: list[str] = []
+        self.unchecked = True
+        # As it is on disk: no journal is applied, and none is made.
+        self._database = sqlite3.connect(f'{path.absolute().as_uri()}?immutable=1', uri=True,
+                                         check_same_thread=False)
+        self._steps = (_INSTRUCTIONS + _FOR_A_BYTE * path.stat().st_size) // _AT_ONCE
+        self._database.set_progress_handler(self._step, _AT_ONCE)
+        # Names may be any bytes.
+        self._database.text_factory = lambda text: text.decode('utf-8', 'backslashreplace')
+        try:
+            for table, columns in _TABLES.items():
+                self._check(table, columns)
+            self._topics = self._read_topics()
+        except BaseException:
+            self._database.close()
+            raise
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """Return the type of each topic, and its encoding if that is not CDR."""
+        kinds: dict[str, set[str]] = {}
+        for name, kind in self._topics.values():
+            kinds.setdefault(name, set()).add(kind)
+        return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+
+    def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
+        """Yield the messages of these topics, see Source; an error ends them, and is noted."""
+        wanted = {number: name for number, (name, _) in self._topics.items() if name in keys}
+        count = unsound = 0
+
+        def rows() -> Iterator[tuple[str, int, bytes]]:
+            nonlocal count, unsound
+            for number, time, data in self._database.execute(
+                    "SELECT topic_id, timestamp, CASE WHEN typeof(data) = 'blob' AND "
+                    f'length(data) <= {LARGEST_ROW} THEN data END FROM messages WHERE topic_id IN '
+                    f'({", ".join(map(str, wanted))}) ORDER BY timestamp'):
+                count += 1
+                if isinstance(time, int) and time >= 0 and data is not None:
+                    yield wanted[number], time, data
+                else:
+                    unsound += 1
+
+        try:
+            yield from rows_in_blocks(rows(), keys)
+        except sqlite3.Error as exc:
+            self.missing.append(f'everything after {count} messages: {one_line(exc)}')
+        if unsound:
+            self.missing.append(f'{unsound} rows that are not messages')
+        if not self.missing:
+            self._check_pages()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._database.close()
+
+    def _step(self) -> bool:
+        """Return whether to interrupt: only files made for it take as many steps."""
+        self._steps -= 1
+        return self._steps < 0
+
+    def _check(self, table: str, columns: tuple[str, ...]) -> None:
+        """Raise BagError unless this is a table on disk; views and formulas may never end."""
+        # An ordinary column is not hidden, and an ordinary table has a page.
+        found = {name for _, name, _, _, _, _, hidden in self._database.execute(
+            f'PRAGMA table_xinfo({table})') if not hidden}
+        kinds = [kind if page else 'view' for kind, page in self._database.execute(
+            'SELECT type, rootpage FROM sqlite_master WHERE lower(name) = ?', [table])]
+        if kinds != ['table'] or not found.issuperset(columns):
+            raise BagError(f'has no table {table} with the columns {", ".join(columns)}')
+
+    def _read_topics(self) -> dict[int, tuple[str, str]]:
+        """Return name and type of each topic, by its number."""
+        topics = {}
+        for number, *texts in self._database.execute(
+                f'SELECT {", ".join(_TABLES["topics"])} FROM topics'):
+            name, kind, encoding = texts
+            if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
+                self.missing.append(f'topic {shown(name)}: number, name, type or encoding is not '
+                                    'valid')
+            else:
+                topics[number] = name, kind if encoding == 'cdr' else (
+                    f'{kind} encoded as {encoding}')
+        return topics
+
+    def _check_pages(self) -> None:
+        """Note damage that sqlite3 does not report while reading."""
+        try:
+            self._database.execute('PRAGMA ignore_check_constraints = ON')
+            (found,), = self._database.execute('PRAGMA quick_check(1)')
+        except sqlite3.Error as exc:
+            found = exc
+        if found != 'ok':
+            self.missing.append(f'damaged, what is missing is unknown: {one_line(found)}')
