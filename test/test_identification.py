@@ -212,7 +212,7 @@ def test_a_tilted_base_is_a_likely_mistake_unless_it_is_asked_for(
         identified: Callable[..., Any]) -> None:
     code, result, out, err = identified('tilted', '--no-report')
     assert (code, result, out) == (2, None, '')
-    assert 'the base looks tilted by 1.5 degrees against gravity' in err
+    assert 'gravity of the parameters looks wrong: a base tilted by 1.5' in err
     assert err.count('\n') == 1
 
 
@@ -255,7 +255,7 @@ def _swapped(given: Recorded) -> Recorded:
      'likely torques of the motors'),
     (_swapped, 'positions and efforts of leg_2 and leg_3 look swapped'),
     (lambda given: given._replace(positions=given.positions - 0.02),
-     'geometry.zero_length looks wrong: +'),
+     'geometry.zero_length looks wrong: another geometry.zero_length, +19'),
     (lambda given: given._replace(positions=1e3 * given.positions),
      'lengths belong to no pose of this hexapod'),
 ], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])

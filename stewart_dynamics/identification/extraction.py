@@ -36,7 +36,9 @@ from stewart_dynamics.identification.filters import convolved, decimated, LowPas
 from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # The wide band, by the narrow one; and samples for each period of the narrow cut-off.
@@ -49,6 +51,12 @@ ORDERS = 4
 _STOP, _SATURATED = 5e-5, 0.999
 # Samples of which the regressor is computed at once.
 _TOGETHER = 4096
+# Rates at which Stribeck friction may have fallen to 1/e, in RMS rates of the first window; and
+# in changes of the rate from one sample to the next, which blur the reversals.
+_STRIBECK, _BLURRED = (0.1, 0.3), 6.0
+BLURS = (1.0, 3.0)
+SLIP = 1 + len(BLURS) + len(_STRIBECK)
+"""Shapes of friction over the rate: its sign, the blur of reversals, Stribeck friction."""
 
 
 class Extract(NamedTuple):
@@ -64,8 +72,12 @@ class Extract(NamedTuple):
     """(N, 6, ORDERS) and derivatives by time [N, N/s, ...]"""
     sound: Flags
     """(N, 6) whether nothing is wrong with what went into it"""
-    rates: Array
-    """(N, 6) of the legs [m/s]"""
+    legs: Array
+    """(N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]"""
+    slip: Array
+    """(N, 6, SLIP) shapes of friction over the rate"""
+    poses: Array
+    """(N, POSE) of the platform, near those of the lengths"""
     deviations: tuple[float, float]
     """Of the white noise of lengths [m] and of rates [m/s]; nan: none are measured."""
     stops: int
@@ -88,15 +100,17 @@ class Extraction:
         Of the windows [s].
     cutoff : float
         Of the narrow band [Hz].
+    speeds : tuple of float, optional
+        Rates of the shapes of friction [m/s]; by default they follow from the first window.
 
     """
 
     def __init__(self, platform: StewartPlatform, unknowns: Unknowns, period: float,
-                 cutoff: float) -> None:
+                 cutoff: float, speeds: tuple[float, ...] | None = None) -> None:
         self.platform, self._unknowns, self._period = platform, unknowns, period
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
-        self.cutoff = cutoff
+        self.cutoff, self.speeds = cutoff, speeds
         self.step = max(1, int(1.0 / (SAMPLES * cutoff * period)))
         self.margin = self._wide.half + self._narrow.half
         """Samples at each end of a window that give no output."""
@@ -127,9 +141,23 @@ class Extraction:
             for order in range(ORDERS)], axis=-1)
         wrong, stops = self._wrong(window)
         times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
+        if self.speeds is None:
+            blur = self._period * _rms(accelerations) + 3.0 * COULOMB_RATE
+            self.speeds = (*(each * blur for each in BLURS), *(
+                max(part * _rms(rates), _BLURRED * blur) for part in _STRIBECK))
+        taps = self._narrow.taps()
+        legs = np.stack([decimated(each, taps, self.step)
+                         for each in (lengths, rates, accelerations)], axis=-1)
         at = half + self.step * np.arange(many)
-        return Extract(times, regressor, known, efforts, ~wrong[:many], rates[at], deviations,
-                       stops, Pose.of_rows(found.rows[-1]))
+        return Extract(times, regressor, known, efforts, ~wrong[:many], legs,
+                       decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE],
+                       deviations, stops, Pose.of_rows(found.rows[-1]))
+
+    def _slip(self, rates: Array) -> Array:
+        assert self.speeds is not None
+        sign = np.clip(rates / COULOMB_RATE, -1.0, 1.0)
+        return np.stack([sign, *(sign * np.exp(-(rates / speed) ** 2) for speed in self.speeds)],
+                        axis=-1)
 
     def _deviations(self, window: Window) -> tuple[float, float]:
         of_lengths = float(np.sqrt(np.mean(white_deviation(window.positions) ** 2)))
@@ -194,3 +222,7 @@ class Extraction:
             (len(bad) - 2 * self._narrow.half - 1) // self.step + 1)
         wrong: Flags = sums[at + reach + 1] - sums[at - reach] > 0.0
         return wrong, int(np.count_nonzero(stopped.any(axis=1)))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values ** 2)))

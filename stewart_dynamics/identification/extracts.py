@@ -37,8 +37,10 @@ class Block(NamedTuple):
     """(N, 6, n + 1 + ORDERS): regressor, known force, effort and its derivatives"""
     sound: Flags
     """(N, 6)"""
-    rates: Array
-    """(N, 6) [m/s]"""
+    legs: Array
+    slip: Array
+    poses: Array
+    """As in ``Extract``."""
 
 
 class Extracts:
@@ -53,7 +55,8 @@ class Extracts:
         """Add the extract of a window of a bag that begins at a time [s]."""
         columns = np.concatenate(
             [extract.regressor, extract.known[..., None], extract.efforts], axis=-1)
-        for array in (begin + extract.times, columns, extract.sound, extract.rates):
+        for array in (begin + extract.times, columns, extract.sound, extract.legs, extract.slip,
+                      extract.poses):
             np.save(self._file, array)
         self._bags.append(bag)
         self.samples += len(extract.times)
@@ -62,7 +65,7 @@ class Extracts:
         """Read them."""
         self._file.seek(0)
         for number, bag in enumerate(self._bags):
-            yield Block(number, bag, *(np.load(self._file) for _ in range(4)))
+            yield Block(number, bag, *(np.load(self._file) for _ in range(6)))
 
     def __len__(self) -> int:
         """Return the number of windows."""

@@ -22,7 +22,7 @@ predicted by a fit to the rest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
@@ -39,13 +39,13 @@ from stewart_dynamics.identification.fit import Fit, fit
 from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.intervals import Errors, errors_of
+from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
-    Likely, of_efforts, of_kinematics, of_no_pose)
+    Likely, of_efforts, of_fit, of_no_pose)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 
@@ -115,6 +115,8 @@ class Identified(NamedTuple):
     """Efforts, RMS (6,) [N]."""
     validation: Validation | None
     likely: tuple[Likely, ...]
+    lack_of_fit: LackOfFit | None
+    """None if the residuals are noise."""
 
 
 Progress = Callable[[int], None]
@@ -146,9 +148,10 @@ class Identification:
         self.extracts = Extracts()
         self.bags: list[BagRead] = []
         self.chosen: list[Flags] = []
-        self._first: tuple[Extraction, Window, Pose] | None = None
+        self._first: tuple[Extraction, Window] | None = None
         self._noise: Array | None = None
         self._of_noise = 0
+        self._speeds: tuple[float, ...] | None = None
 
     def read(self, path: Path, progress: Progress | None = None) -> None:
         """
@@ -160,51 +163,65 @@ class Identification:
             It cannot be read, or contains nothing that can be used.
 
         """
+        options = self._options
+        with closing(Recording(path)) as recording:
+            topics = find_topics(recording, options.node, options.measured, options.efforts)
+            legs = RecordedLegs(recording, topics, self.parameters['joints'],
+                                2.0 * _margin(options.cutoff))
+            bag = self.add(path, legs.windows(progress))
+            if bag is None:
+                raise BagError(
+                    f'{path}: {topics.legs}: nothing to identify from: '
+                    + (f'{legs.samples} samples, of which no {2.0 * _margin(options.cutoff):.2g} '
+                       's are without a gap; a lower --cutoff needs even more' if legs.samples
+                       else ', '.join(f'{count} messages {why}' for why, count in
+                                      legs.rejected.items()) or 'no messages'))
+            self.bags[-1] = bag._replace(
+                topics=topics, samples=legs.samples, rejected=dict(legs.rejected),
+                missing=list(recording.missing),
+                notices=[*recording.notices, *bag.notices])
+
+    def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
+        """Add the windows of a bag; return None if nothing of them can be used."""
         options, p = self._options, self.parameters
-        number, left_out, stops, outliers = len(self.bags), 0, 0, 0
+        number, left_out, stops, outliers, samples = len(self.bags), 0, 0, 0, 0
         extraction: Extraction | None = None
         last: Extract | None = None
         begin = end = 0
         before = self.extracts.samples
-        with closing(Recording(path)) as recording:
-            topics = find_topics(recording, options.node, options.measured, options.efforts)
-            overlap = 2.0 * _margin(options.cutoff)
-            legs = RecordedLegs(recording, topics, p['joints'], overlap)
-            for window in legs.windows(progress):
-                if extraction is None:
-                    cutoff = min(options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
-                    extraction = Extraction(self.platform, self.unknowns, window.period, cutoff)
-                    begin = window.begin
-                if options.motor_torque:
-                    window = window._replace(
-                        efforts=window.efforts * 2.0 * np.pi / p['actuator.screw_lead'])
-                if len(window.positions) < 2 * extraction.margin + 2 * extraction.step:
-                    left_out += 1
-                    continue
-                last = self._extract(path, number, extraction, window, (
-                    window.begin - begin) * 1e-9, last)
-                stops, outliers = stops + last.stops, outliers + int(
-                    np.count_nonzero(window.outliers))
-                end = window.begin + round(len(window.positions) * window.period * 1e9)
-            rejected, missing = dict(legs.rejected), list(recording.missing)
-            notices = list(recording.notices)
+        for window in windows:
+            if extraction is None:
+                cutoff = min(options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
+                extraction = Extraction(self.platform, self.unknowns, window.period, cutoff,
+                                        self._speeds)
+                begin = window.begin
+            if options.motor_torque:
+                window = window._replace(
+                    efforts=window.efforts * 2.0 * np.pi / p['actuator.screw_lead'])
+            if len(window.positions) < 2 * extraction.margin + 2 * extraction.step:
+                left_out += 1
+                continue
+            last = self._extract(path, number, extraction, window, (
+                window.begin - begin) * 1e-9, last)
+            self._speeds = extraction.speeds
+            stops, outliers = stops + last.stops, outliers + int(
+                np.count_nonzero(window.outliers))
+            samples += len(window.positions)
+            end = window.begin + round(len(window.positions) * window.period * 1e9)
+            rates, period = window.rates is not None, window.period
         if extraction is None or last is None or self.extracts.samples == before:
-            raise BagError(
-                f'{path}: {topics.legs}: nothing to identify from: '
-                + (f'{legs.samples} samples, of which no {2.0 * _margin(options.cutoff):.2g} s '
-                   'are without a gap; a lower --cutoff needs even more' if legs.samples else
-                   ', '.join(f'{count} messages {why}' for why, count in rejected.items())
-                   or 'no messages'))
+            return None
+        notices = []
         if extraction.cutoff < options.cutoff:
-            notices.append(f'sampled at {1.0 / legs.period:.4g} Hz: the cut-off frequency is '
+            notices.append(f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
                            f'{extraction.cutoff:.3g} Hz')
-        if (self.extracts.samples - before) * extraction.step * legs.period < _SHORT:
+        if (self.extracts.samples - before) * extraction.step * period < _SHORT:
             notices.append(f'less than {_SHORT:g} s are left by the filters: intervals are too '
                            'narrow for so short a recording')
         self.bags.append(BagRead(
-            path, topics, legs.samples, (end - begin) * 1e-9, legs.period, extraction.cutoff,
-            bool(legs.rates), rejected, left_out, stops, outliers, last.deviations, missing,
-            notices))
+            path, Topics('', ''), samples, (end - begin) * 1e-9, period, extraction.cutoff,
+            rates, {}, left_out, stops, outliers, last.deviations, [], notices))
+        return self.bags[-1]
 
     def _extract(self, path: Path, number: int, extraction: Extraction, window: Window,
                  begin: float, last: Extract | None) -> Extract:
@@ -229,7 +246,7 @@ class Identification:
             self._noise = found if self._noise is None else self._noise + found
             self._of_noise += len(change)
             if self._first is None:
-                self._first = extraction, window, guess
+                self._first = extraction, window
         return extract
 
     def result(self) -> Identified:
@@ -256,15 +273,16 @@ class Identification:
         errors = errors_of(self.extracts, sums, unknowns, found, self.chosen, options.prior)
         after = _rms(sums, unknowns, found.values, found.delays)
         measured = _measured(sums)
+        lack = lack_of_fit(self.platform, self.extracts, unknowns, found, self.chosen)
         if not likely:
             assert self._first is not None
-            likely += of_kinematics(self.parameters, unknowns, *self._first, found, float(
+            likely += of_fit(self.parameters, unknowns, *self._first, found, lack, float(
                 np.sqrt(np.mean(after ** 2) / (np.mean(measured ** 2) + 1e-300))))
         return Identified(
             unknowns.parameters(found.values), unknowns, found, errors, tuple(self.bags),
             self.extracts.samples, outliers, unsound,
             _rms(sums, unknowns, unknowns.start, found.delays), after, measured,
-            self._validation(noise) if options.hold_out else None, tuple(likely))
+            self._validation(noise) if options.hold_out else None, tuple(likely), lack)
 
     def _sums(self, chosen: Callable[[Block], Flags] | None = None) -> Sums:
         return sums_of(self.extracts, len(self.bags),

@@ -33,10 +33,10 @@ from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extract, Extraction
 from stewart_dynamics.identification.fit import Fit
 from stewart_dynamics.identification.guess import pose_near
+from stewart_dynamics.identification.lack_of_fit import LackOfFit
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.least_squares import Information, information, nothing, solve
 from stewart_dynamics.parameters.table import Parameters
 
@@ -54,12 +54,8 @@ _UNEXPLAINED = 0.3
 _BETTER = 0.5
 # Part of the samples that must be sound for a comparison.
 _FEWEST = 0.5
-# For a zero length it need not become so much smaller: it is told well.
-_SMALL_GAIN = 0.85
 # The time of the search at most [s].
 _PIECE = 5.0
-# Of geometry.zero_length: a change that is tried [m], the smallest that is named, steps.
-_CHANGE, _NAMED, _STEPS = 1e-3, 2e-3, 6
 
 
 class Likely(NamedTuple):
@@ -96,15 +92,15 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
     """
     scale, error = _scale(sums, unknowns, platform_too=False)
     by_file, _ = _scale(sums, unknowns, platform_too=True)
-    if not (np.isfinite(scale) and error < 0.1 * abs(scale)) or by_file == 0.0:
-        scale = by_file
-    elif not 0.1 < scale / by_file < 10.0:  # the file's legs may be wrong, not by so much
-        scale = by_file
     if not np.isfinite(by_file) or by_file == 0.0:
         yield Likely('scale', 'all efforts are zero')
         return
-    if not np.isfinite(scale):
-        return
+    if not (np.isfinite(scale) and error < 0.1 * abs(scale)) or (
+            # the file's legs may be wrong, not by so much
+            not 0.1 < scale / by_file < 10.0):
+        scale = by_file
+    elif (scale > 0.0) == (by_file > 0.0) and 1.0 / _FAR < abs(by_file) < _FAR:
+        scale = by_file  # its weight says that the unit is right, whatever the legs do
     if scale < 0.0:
         yield Likely('sign', 'the efforts have the opposite sign: + must push, as the forces of '
                              f'the node do (they are {scale:.3g} times what the model computes)')
@@ -134,46 +130,47 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
             if scale < 0.05 else 'another unit, or a wrong platform.mass')))
 
 
-def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
-                  guess: Pose, fit: Fit, residual: float) -> Iterator[Likely]:
+def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
+           fit: Fit, lack: LackOfFit | None, residual: float) -> Iterator[Likely]:
     """
-    Yield likely mistakes of zero length, and of legs where the residual is a large part.
+    Yield a likely mistake where the residual is a large part of the efforts.
 
     Parameters
     ----------
     p : Parameters
-        The file's.
+        Parameters of the file.
     unknowns : Unknowns
-        What was asked for.
+        Unknowns of the fit.
     extraction : Extraction
-        Of the first window.
-    window, guess
-        That window, and a pose near its first.
+        Extraction of the first window.
+    window : Window
+        That window.
     fit : Fit
         The result.
+    lack : LackOfFit or None
+        Its lack of fit.
     residual : float
         RMS of the residuals, as a part of that of the efforts.
 
     """
-    piece = _piece(window, extraction)
-    now = _tried(p, unknowns, extraction, piece, fit)
-    joints = p['joints']
-    found = [(now, '', '')]
-    suspicious = residual > _SUSPICIOUS
-    for legs, what in ((range(6), ''), *(([n], f' of {joints[n]}') for n in range(6)
-                                         if suspicious)):
-        offset, misfit = _zero_length(p, unknowns, extraction, piece, fit, list(legs))
-        if abs(offset) > _NAMED:
-            found.append((misfit / _SMALL_GAIN * _BETTER, 'zero_length', (
-                f'geometry.zero_length{what} looks wrong: {1e3 * offset:+.1f} mm fit')))
-    if not suspicious:
-        yield from _best(found, now)
+    first = None if lack is None else lack.causes[0]
+    if lack is not None and first is not None and first.what == 'zero_length' and (
+            lack.left < _BETTER):
+        yield Likely(first.what, f'geometry.zero_length looks wrong: {first.text}: the residual '
+                                 f'becomes {lack.left:.2f} times as large')
         return
-    if unknowns.tilt is None:
-        misfit, angle = _tilt(p, unknowns, extraction, piece, fit)
-        found.append((misfit, 'tilt', (
-            f'the base looks tilted by {np.degrees(angle):.1f} degrees against gravity as the '
-            'parameters have it: tilt in --identify takes that into account')))
+    if residual < _SUSPICIOUS:
+        return
+    piece, joints = _piece(window, extraction), p['joints']
+    now = _tried(unknowns, extraction, piece, fit)
+    found = [(now, 'misfit', (
+        f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
+        'positions and efforts may not belong together, or the geometry is wrong'))]
+    if lack is not None and first is not None and first.what == 'tilt':
+        found.append((lack.left * now, first.what, (
+            f'gravity of the parameters looks wrong: {first.text}: tilt in --identify takes that '
+            'into account')))
+    best = _BETTER if lack is None else min(_BETTER, lack.left)
     for a, b in combinations(range(6), 2):
         order = list(range(6))
         order[a], order[b] = b, a
@@ -185,72 +182,15 @@ def of_kinematics(p: Parameters, unknowns: Unknowns, extraction: Extraction, win
                     rates=None if piece.rates is None else piece.rates[:, order])
             if 'efforts' in which:
                 swapped = swapped._replace(efforts=piece.efforts[:, order])
-            misfit = _tried(p, unknowns, extraction, swapped, fit)
-            found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} look '
-                                             'swapped'))
-    mistakes = list(_best(found, now))
-    if not mistakes and residual > _UNEXPLAINED:
-        mistakes.append(Likely('misfit', (
-            f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
-            'positions and efforts may not belong together, or the geometry is wrong')))
-    yield from mistakes
-
-
-def _best(found: list[tuple[float, str, str]], now: float) -> Iterator[Likely]:
+            misfit = _tried(unknowns, extraction, swapped, fit)
+            if misfit < best * now:
+                found.append((misfit, 'swapped', f'the {which} of {joints[a]} and {joints[b]} '
+                                                 'look swapped'))
     misfit, what, text = min(found)
-    if what and misfit < _BETTER * now:
-        part = misfit / now * (_SMALL_GAIN / _BETTER if what == 'zero_length' else 1.0)
-        yield Likely(what, f'{text}: the residual becomes {part:.2f} times as large')
-
-
-def _zero_length(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
-                 fit: Fit, legs: list[int]) -> tuple[float, float]:
-    """Return the change of the zero length of some legs that fits [m], and the residual [N]."""
-    shift = np.zeros(6)
-    shift[legs] = 1.0
-    offset, last = 0.0, float('inf')
-    for _ in range(_STEPS):
-        try:
-            extracts = [extraction(moved, pose_near(
-                extraction.platform, moved.positions[0] + p['geometry.zero_length']))
-                for moved in (window._replace(positions=window.positions + change * shift)
-                              for change in (offset, offset + _CHANGE))]
-        except (PoseError, SingularityError):
-            break
-        misfit, theta, _ = _fitted(unknowns, extracts[0], fit)
-        if not misfit < last:
-            break
-        last = misfit
-        first, second = extracts
-        by_offset = ((second.regressor - first.regressor) @ theta
-                     + second.known - first.known) / _CHANGE
-        both = first._replace(regressor=np.concatenate(
-            [first.regressor, by_offset[..., None]], axis=-1))
-        _, values, error = _fitted(unknowns, both, fit)
-        step = float(np.clip(values[-1], -0.1, 0.1))
-        if not error < _CHANGE:  # the motion does not tell it
-            return 0.0, float('inf')
-        if abs(step) < 0.1 * _NAMED:
-            break
-        offset += step
-    return offset, last
-
-
-def _tilt(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
-          ) -> tuple[float, float]:
-    """Return the residual with a tilt of gravity [N], and the tilt that fits [rad]."""
-    tilted = unknowns.with_tilt()
-    with_tilt = Extraction(extraction.platform, tilted, window.period, extraction.cutoff)
-    try:
-        extract = with_tilt(window, pose_near(
-            extraction.platform, window.positions[0] + p['geometry.zero_length']))
-    except (PoseError, SingularityError):
-        return float('inf'), 0.0
-    derivative = tilted.derivative(np.append(fit.values, np.zeros(2)))
-    misfit, theta, _ = _fitted(unknowns, extract._replace(regressor=np.concatenate([
-        extract.regressor[..., :len(unknowns.linear)], extract.regressor @ derivative[:, -2:],
-    ], axis=-1)), fit)
-    return misfit, float(np.hypot(*theta[-2:]))
+    if misfit < _BETTER * now:
+        yield Likely(what, f'{text}: the residual becomes {misfit / now:.2f} times as large')
+    elif residual > _UNEXPLAINED:
+        yield Likely(*found[0][1:])
 
 
 def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, float]:
@@ -305,27 +245,25 @@ def _piece(window: Window, extraction: Extraction) -> Window:
         outliers=window.outliers[part])
 
 
-def _tried(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit,
-           ) -> float:
+def _tried(unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit) -> float:
+    """Return the RMS residual of a window by its own fit; infinite without poses [N]."""
     try:
-        guess = pose_near(extraction.platform, window.positions[0] + p['geometry.zero_length'])
-        return _fitted(unknowns, extraction(window, guess), fit)[0]
+        guess = pose_near(extraction.platform, window.positions[0]
+                          + extraction.platform.parameters['geometry.zero_length'])
+        return _fitted(unknowns, extraction(window, guess), fit)
     except (PoseError, SingularityError):
         return float('inf')
 
 
-def _fitted(unknowns: Unknowns, extract: Extract, fit: Fit) -> tuple[float, Array, float]:
-    """Return the RMS residual [N], the linear parameters that fit, and the last one's error."""
+def _fitted(unknowns: Unknowns, extract: Extract, fit: Fit) -> float:
+    """Return the RMS residual of an extract by its own fit [N]."""
     shifts = residual_of(np.zeros(0), float(fit.delays[0]))[1:]
     efforts = extract.efforts @ shifts - extract.known
     samples = information(extract.regressor, efforts, extract.sound.astype(float))
+    if samples.rows < _FEWEST * extract.sound.size:
+        return float('inf')
     sizes = np.sqrt(np.maximum(np.diag(samples.matrix), 1e-300))
     scaled = samples._replace(matrix=samples.matrix / np.outer(sizes, sizes),
                               vector=samples.vector / sizes)
     found = solve(scaled, np.zeros(len(sizes)), np.ones(len(sizes)), largest_error=1e4)
-    if samples.rows < _FEWEST * extract.sound.size:
-        return float('inf'), found.values, float('inf')
-    misfit = float(np.sqrt(scaled.residual_squares(found.values) / samples.rows))
-    error = float(misfit * np.sqrt(found.covariance[-1, -1]) / sizes[-1]) if (
-        found.identifiability.identifiable[-1]) else float('inf')
-    return misfit, found.values / sizes, error
+    return float(np.sqrt(scaled.residual_squares(found.values) / samples.rows))

@@ -27,6 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.fit import LEAST_TOLD
 from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.identify import Identified
+from stewart_dynamics.identification.lack_of_fit import Found
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import combinations, TWO_SIDED
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
@@ -42,12 +43,13 @@ def document(found: Identified, options: Options) -> dict[str, Any]:
     what = found.fit.identifiability
     states = _states(found)
     errors = _errors(found)
-    u = found.unknowns
+    u, lack = found.unknowns, found.lack_of_fit
+    sure = lack is None or not lack.unexplained
     parameters = [{
         'name': name, 'unit': unit, 'file': float(start), 'value': float(value),
         'state': state, 'standard_error': _plain(error) if state != NOT_TOLD else None,
         'interval': ([float(value - TWO_SIDED * error), float(value + TWO_SIDED * error)]
-                     if state == IDENTIFIED else None),
+                     if state == IDENTIFIED and sure else None),
         'unknown_share': float(share), 'at_bound': name in found.fit.at_bound,
     } for name, unit, start, value, state, error, share in zip(
         u.names, u.units, u.start, found.fit.values, states, errors, what.shares, strict=True)]
@@ -83,9 +85,19 @@ def document(found: Identified, options: Options) -> dict[str, Any]:
             'samples': found.validation.samples,
             **_residuals(found.parameters['joints'], found.validation.before,
                          found.validation.after, found.validation.measured)},
+        'lack_of_fit': None if lack is None else {
+            'cause': lack.causes[0].what, 'text': lack.text,
+            'intervals': 'widened' if sure else 'none', 'residual_left': lack.left,
+            'causes': [_cause(each) for each in lack.causes],
+            'other_causes': [_cause(each) for each in lack.others]},
         'likely_mistakes': [each._asdict() for each in found.likely],
         'identified': plain_parameters(found.parameters),
     }
+
+
+def _cause(each: Found) -> dict[str, Any]:
+    return {'what': each.what, 'text': each.text, 'statistic': each.statistic,
+            'columns': each.columns, 'deviations': each.deviations}
 
 
 def _states(found: Identified) -> list[str]:
@@ -95,11 +107,12 @@ def _states(found: Identified) -> list[str]:
 
 
 def _errors(found: Identified) -> Array:
-    """Return standard errors (k,), with what unknown directions may add."""
+    """Return standard errors (k,), with what unknown directions and a lack of fit may add."""
     what = found.fit.identifiability
     own = np.maximum(np.diag(found.errors.covariance), 0.0)
     errors: Array = np.sqrt(own + (what.shares * what.scales) ** 2)
-    return errors
+    return errors if found.lack_of_fit is None else (
+        errors + found.lack_of_fit.shifts / TWO_SIDED)
 
 
 def _combinations(found: Identified) -> list[dict[str, Any]]:
@@ -152,7 +165,8 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
         name = '.'.join(parts[:2]) if parts[0] == 'platform' else '.'.join(parts[:-1])
         name = name.replace('first_moment', 'center_of_mass').replace('second_moment', 'inertia')
         if each['state'] == IDENTIFIED:
-            text = f'+-{TWO_SIDED * each["standard_error"]:.2g}'
+            text = (f'+-{TWO_SIDED * each["standard_error"]:.2g}' if each['interval'] else
+                    'no interval: lack of fit')
             if name == 'gravity':  # its value is not that of the file
                 text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
         else:

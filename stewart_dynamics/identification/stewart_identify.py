@@ -129,7 +129,8 @@ def _run(given: argparse.Namespace) -> int:
         return PARTLY_READ
     everything = all(each['state'] == 'identified' and not each['at_bound']
                      for each in result['parameters'])
-    return NOT_ALL_TOLD if given.strict and not everything else DONE
+    return NOT_ALL_TOLD if given.strict and not (
+        everything and result['lack_of_fit'] is None) else DONE
 
 
 def _kinds(text: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import textwrap
 from typing import Any
 
 from stewart_dynamics.identification.results import IDENTIFIED, NOT_TOLD
@@ -34,7 +35,9 @@ def result_text(result: Mapping[str, Any]) -> str:
         The content of identification.json.
 
     """
-    lines = [*_headline(result), '', *_table(result['parameters']), *_not_told(result)]
+    lack = result['lack_of_fit']
+    notice = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
+    lines = [*notice, *_headline(result), '', *_table(result['parameters']), *_not_told(result)]
     lines += _bags(result)
     return '\n'.join(lines)
 
@@ -66,9 +69,11 @@ def _table(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
              '  unit']
     for each in parameters:
         if each['state'] == IDENTIFIED:
-            low, high = each['interval']
             digits = decimals(each['standard_error'])
-            shown = f'{each["value"]:>11.{digits}f}', f'{low:.{digits}f} .. {high:.{digits}f}'
+            shown = f'{each["value"]:>11.{digits}f}', 'none: lack of fit'
+            if each['interval']:
+                low, high = each['interval']
+                shown = shown[0], f'{low:.{digits}f} .. {high:.{digits}f}'
             remark = '  at its bound' if each['at_bound'] else ''
         else:
             shown = f'{"-":>11}', ('kept: not told' if each['state'] == NOT_TOLD

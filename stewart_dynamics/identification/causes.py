@@ -1,0 +1,267 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Possible causes of a lack of fit, and the forces that each of them adds, as columns.
+
+A cause changes the efforts by its columns times small amounts, to first order: an offset, a tilt
+of gravity, other masses of the legs, friction of another law, a joint or a zero length elsewhere,
+another gain or delay of one leg, saturation, a payload that changes. Columns are computed at the
+low rate from the filtered motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.identification.extraction import BLURS, SLIP
+from stewart_dynamics.identification.extracts import Block
+from stewart_dynamics.identification.fit import Fit
+from stewart_dynamics.identification.kinematics import motions
+from stewart_dynamics.identification.tilt import Tilt
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.dynamics.linear_parameters import (
+    COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_SECOND, linear_parameters, PISTON_FIRST,
+    PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION)
+from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# Times at which a payload may change, as parts of all samples.
+_CHANGES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
+# Largest number of bags at whose begin a payload may change, besides.
+_MOST_BAGS = 6
+# Predicted forces above this part of the largest effort may be cut off by saturation.
+_SATURATED = 0.97
+# Step of the finite differences by a joint or a zero length, in sizes of the platform.
+_STEP = 1e-4
+UNKNOWN, BLUR = 'unknown', 'blur'
+
+
+class Cause(NamedTuple):
+    """A possible cause of a lack of fit."""
+
+    what: str
+    """One word for programs."""
+    places: Integers
+    """Its columns."""
+    text: str
+    """Description; ``{}`` stands for the amounts."""
+    factor: float = 1.0
+    """Unit of the text, in units of the amounts."""
+    measure: Callable[[Array], Any] = np.asarray
+    """What of the amounts (k,) the text gives."""
+
+    def described(self, amounts: Array) -> str:
+        """Return the description with the amounts (k,) of the columns."""
+        values = self.factor * np.atleast_1d(self.measure(amounts))
+        sign = '' if self.measure is np.linalg.norm else '+'
+        return self.text.format(' '.join(f'{each:{sign}.3g}' for each in values))
+
+
+class Causes:
+    """
+    Columns of all possible causes.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        With the parameters of the file.
+    unknowns : Unknowns
+        Unknowns of the fit.
+    fit : Fit
+        The result.
+    samples : int
+        Number of samples of all blocks.
+    bag_starts : sequence of float
+        Part of all samples before each bag but the first.
+    largest : float
+        Largest effort [N].
+    geometry : bool
+        With joints and zero lengths, which take longer.
+
+    """
+
+    def __init__(self, platform: StewartPlatform, unknowns: Unknowns, fit: Fit, samples: int,
+                 bag_starts: Sequence[float], largest: float, geometry: bool) -> None:
+        p = platform.parameters
+        self._platform, self._unknowns, self._fit = platform, unknowns, fit
+        self._samples, self._largest, self._geometry = samples, largest, geometry
+        self._changes = sorted({*_CHANGES, *(bag_starts if len(bag_starts) < _MOST_BAGS else ())})
+        self._theta = unknowns.theta(fit.values)
+        self._tilt = Tilt(p['gravity'])
+        self._size = float(p['singularity.characteristic_length'])
+        whole = linear_parameters(p)
+        whole[unknowns.linear] = self._theta[:len(unknowns.linear)]
+        self._whole = whole
+        self.all: tuple[Cause, ...] = ()
+        self.blur: Integers = np.zeros(0, dtype=np.int64)
+
+    def columns(self, block: Block, first: int) -> Array:
+        """Return an array (N, 6, m) for a block that begins with the sample ``first``."""
+        parts = dict(self._parts(block, first))
+        if not self.all:
+            starts = np.cumsum([0, *(each.shape[-1] for each in parts.values())])
+            places = {name: np.arange(a, b) for name, (a, b) in zip(
+                parts, pairwise(starts), strict=True)}
+            self.all, self.blur = tuple(self._causes(places)), places[BLUR]
+        return np.concatenate(list(parts.values()), axis=-1)
+
+    def _parts(self, block: Block, first: int) -> Iterator[tuple[str, Array]]:
+        platform = self._platform
+        lengths, rates, accelerations = np.moveaxis(block.legs, -1, 0)
+        poses = platform.forward_kinematics(lengths, Pose.of_rows(block.poses))
+        rows = motions(platform, poses, rates, accelerations)
+        matrix = platform.regressors(rows)
+        many = len(self._theta)
+        predicted = block.columns[..., :many] @ self._theta + block.columns[..., many]
+        whole = self._whole
+
+        yield 'offset', _by_leg(np.ones((len(rows), 6, 1)))
+        gravity = self._tilt.derivative(np.zeros(2))
+        yield 'tilt', np.stack([
+            platform.regressors_at_rest(rows, axis[None]) @ whole for axis in gravity.T], axis=-1)
+        yield 'reflected_mass', matrix[..., REFLECTED_MASS]
+        yield 'leg_mass', np.stack([
+            sum(matrix[..., part] @ whole[part] for part in parts)
+            for parts in ((CYLINDER_FIRST, CYLINDER_SECOND),
+                          (PISTON_MASS, PISTON_FIRST, PISTON_SECOND))], axis=-1)
+        yield 'viscous_friction', matrix[..., VISCOUS_FRICTION]
+        slip = _by_leg(block.slip)
+        yield 'coulomb_friction', slip[..., :6]
+        friction = 1 + len(BLURS)
+        yield BLUR, slip[..., 6:6 * friction]
+        for n in range(friction, SLIP):
+            yield f'stribeck_friction {n - friction}', slip[..., 6 * n:6 * n + 6]
+        yield 'load_friction', slip[..., :6] * np.abs(predicted)[..., None]
+        yield 'quadratic_friction', _by_leg((rates * np.abs(rates))[..., None])
+        yield 'gain', _by_leg(predicted[..., None])
+        yield 'scale', predicted[..., None]
+        yield 'delay', _by_leg(block.columns[..., many + 2, None])
+        beyond = np.maximum(np.abs(predicted) - _SATURATED * self._largest, 0.0)
+        yield 'saturation', (-np.sign(predicted) * beyond)[..., None]
+        at = (first + np.arange(len(rows))) / self._samples
+        for n, change in enumerate(self._changes):
+            yield f'payload {n}', matrix[..., :4] * (at >= change)[:, None, None]
+        late = (at - 0.5)[:, None, None]
+        yield 'friction_drift', late * np.stack([
+            matrix[..., part].sum(axis=-1) for part in (VISCOUS_FRICTION, COULOMB_FRICTION)],
+            axis=-1)
+        yield 'offset_drift', _by_leg(np.ones((len(rows), 6, 1))) * late
+        yield 'platform', matrix[..., :10]
+        x = (lengths - lengths.mean(axis=0)) / self._size
+        v = rates / (np.sqrt(np.mean(rates ** 2)) + 1e-300)
+        yield f'{UNKNOWN} pose', _by_leg(np.stack([x, x ** 2, x ** 3], axis=-1))
+        yield f'{UNKNOWN} rate', _by_leg(np.stack([np.abs(v), x * v, v ** 3], axis=-1))
+        if self._geometry:
+            yield 'zero_length', self._by_geometry(block, poses)
+            for end in ('base', 'platform'):
+                yield f'{end}_joint', self._by_joint(block, poses, end)
+
+    def _by_geometry(self, block: Block, poses: Pose) -> Array:
+        """Return the derivative of the forces by each zero length, (N, 6, 6) [N/m]."""
+        step = _STEP * self._size
+        return np.stack([self._difference(self._platform, block, poses, change, step)
+                         for change in step * np.eye(6)], axis=-1)
+
+    def _by_joint(self, block: Block, poses: Pose, end: str) -> Array:
+        """Return the derivative of the forces by joint coordinates, (N, 6, 18) [N/m]."""
+        p, step = self._platform.parameters, _STEP * self._size
+        name = f'geometry.{end}_joints'
+        found = []
+        for n in range(18):
+            moved = p[name].copy()
+            moved.reshape(-1)[n] += step
+            platform = StewartPlatform(p.replaced({name: moved}))
+            found.append(self._difference(platform, block, poses, np.zeros(6), step))
+        return np.stack(found, axis=-1)
+
+    def _difference(self, platform: StewartPlatform, block: Block, poses: Pose, change: Array,
+                    step: float) -> Array:
+        forces = []
+        lengths, rates, accelerations = np.moveaxis(block.legs, -1, 0)
+        for each, by in ((self._platform, np.zeros(6)), (platform, change)):
+            found = each.forward_kinematics(lengths + by, poses)
+            forces.append(each.regressors(motions(each, found, rates, accelerations))
+                          @ self._whole)
+        difference: Array = (forces[1] - forces[0]) / step
+        return difference
+
+    def _causes(self, places: dict[str, Integers]) -> Iterator[Cause]:
+        joints = self._platform.parameters['joints']
+        of_legs = (
+            ('offset', 'a constant offset of the efforts{}, {{}} N', 1.0),
+            ('reflected_mass', 'another actuator.reflected_mass{}, {{}} kg', 1.0),
+            ('gain', 'another gain of the efforts{}, {{}} %', 100.0),
+            ('delay', 'another delay of the efforts{}, {{}} ms', -1e3),
+            *((('zero_length', 'another geometry.zero_length{}, {{}} mm', 1e3),)
+              if self._geometry else ()))
+        for what, text, factor in of_legs:
+            for leg, place in zip(joints, places[what], strict=True):
+                yield Cause(what, np.array([place]), text.format(f' of {leg}'), factor)
+            if what in ('offset', 'reflected_mass', 'zero_length'):
+                yield Cause(what, places[what], text.format(''), factor)
+        of_all: tuple[tuple[str, str, float, Callable[[Array], Any]], ...] = (
+            ('tilt', 'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm),
+            ('leg_mass', 'other leg masses, cylinders and pistons {} %', 100.0, np.asarray),
+            *((f'stribeck_friction {n}', 'Stribeck friction, {} N at low rates', 1.0, np.mean)
+              for n in range(SLIP - 1 - len(BLURS))),
+            ('load_friction', 'friction that depends on the load, {} % of it', 100.0, np.mean),
+            ('quadratic_friction', 'friction that grows with the square of the rate, '
+             '{} N s^2/m^2', 1.0, np.mean),
+            ('scale', 'efforts that are by {} % larger than the forces', 100.0, np.asarray),
+            ('saturation', f'saturation of the efforts at about {self._largest:.4g} N', 1.0,
+             np.asarray),
+            ('friction_drift', 'friction that changes with time', 1.0, np.asarray),
+            ('offset_drift', 'offsets of the efforts that change with time, {} N', 1.0,
+             np.asarray),
+            ('platform', 'platform parameters that are not identified', 1.0, np.asarray),
+            ('viscous_friction', 'another actuator.viscous_friction, {} N s/m', 1.0,
+             np.asarray),
+            ('coulomb_friction', 'another actuator.coulomb_friction, {} N', 1.0, np.asarray),
+            (f'{UNKNOWN} pose', 'forces that depend on the pose', 1.0, np.asarray),
+            (f'{UNKNOWN} rate', 'forces that depend on the rate', 1.0, np.asarray))
+        for what, text, factor, measure in of_all:
+            yield Cause(what.partition(' ')[0], places[what], text, factor, measure)
+        for n, change in enumerate(self._changes):
+            yield Cause('payload', places[f'payload {n}'], (
+                f'a payload that changes at about {100.0 * change:.0f} % of the time, {{}} kg'),
+                1.0, _mass)
+        for n, (one, other) in enumerate(pairwise(self._changes)):
+            yield Cause('payload', np.concatenate(
+                [places[f'payload {n}'], places[f'payload {n + 1}']]), (
+                f'a payload that changes between {100.0 * one:.0f} and {100.0 * other:.0f} % of '
+                'the time, {} kg'), 1.0, _mass)
+        for end in ('base', 'platform') if self._geometry else ():
+            for n, leg in enumerate(joints):
+                yield Cause('joint', places[f'{end}_joint'][3 * n:3 * n + 3], (
+                    f'another {end} joint of {leg}, moved by {{}} mm'), 1e3)
+
+
+def _mass(amounts: Array) -> Array:
+    """Return the change of the mass by its amounts at one or two times, with first moments."""
+    mass: Array = amounts[::4].sum()
+    return mass
+
+
+def _by_leg(values: Array) -> Array:
+    """Return columns (N, 6, 6 k) of values (N, 6, k), for each value one of each leg."""
+    columns = np.zeros((len(values), 6, values.shape[-1], 6))
+    for leg in range(6):
+        columns[:, leg, :, leg] = values[:, leg]
+    return columns.reshape(len(values), 6, -1)

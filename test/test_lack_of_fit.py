@@ -1,0 +1,73 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Notices of what the model lacks: a small part of benchmarks/lack_of_fit.py."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from referees import rng
+
+from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.lack_of_fit import deviations
+from stewart_dynamics.identification.results import document
+from stewart_dynamics.identification.text import result_text
+from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from wrong_models import Case, CAUSES, GIVEN, identify, simulated, true_hexapod
+
+
+@pytest.mark.parametrize('cause', CAUSES)
+def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
+    seed = 1
+    make, right = CAUSES[cause]
+    case = make(true_hexapod(seed), rng(1000 + seed))
+    found = identify(simulated(case, seed))
+    assert found.lack_of_fit is not None
+    assert found.lack_of_fit.causes[0].what in right
+    result = document(found, Options())
+    assert result['lack_of_fit']['cause'] in right
+    assert result_text(result).startswith('LACK OF FIT: the residuals are more than noise: likely')
+    if cause in ('saturation', 'two payloads in two bags', 'payload of 2 to 6 kg drops'):
+        return  # no true values of the whole time
+    off = np.abs(found.fit.values - Unknowns(case.true).start)
+    half = TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))
+    narrow, given = off < half, [each['interval'] for each in result['parameters']]
+    if result['lack_of_fit']['intervals'] == 'none':
+        assert given == len(given) * [None]
+    else:
+        assert np.mean(off < half + found.lack_of_fit.shifts) >= max(0.8, narrow.mean())
+
+
+@pytest.mark.parametrize('seed', [11, 12, 13])
+def test_a_right_model_gives_no_notice(seed: int) -> None:
+    case = Case(true_hexapod(seed))
+    found = identify(simulated(case, seed))
+    assert found.lack_of_fit is None
+    assert found.likely == ()
+    off = np.abs(found.fit.values - Unknowns(case.true).start)
+    assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
+
+
+def test_what_is_asked_for_is_no_lack_of_fit() -> None:
+    case = CAUSES['offsets of 20 N RMS'][0](true_hexapod(1), rng(1001))
+    kinds = ('platform', 'friction', 'offset')
+    assert identify(simulated(case, 1), GIVEN, kinds).lack_of_fit is None
+
+
+def test_deviations_have_the_probability_of_chi_squared() -> None:
+    # 99.865 % quantiles: three standard deviations
+    for freedom, quantile in ((1, 10.27), (6, 21.85), (18, 40.59)):
+        assert deviations(quantile, freedom) == pytest.approx(3.0, abs=0.1)
