@@ -36,7 +36,6 @@ from stewart_dynamics.identification.filters import convolved, decimated, LowPas
 from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.dynamics.friction import COULOMB_RATE
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -142,7 +141,8 @@ class Extraction:
         wrong, stops = self._wrong(window)
         times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
         if self.speeds is None:
-            blur = self._period * _rms(accelerations) + 3.0 * COULOMB_RATE
+            band = self.platform.parameters['actuator.coulomb_velocity']
+            blur = self._period * _rms(accelerations) + 3.0 * float(np.mean(band))
             self.speeds = (*(each * blur for each in BLURS), *(
                 max(part * _rms(rates), _BLURRED * blur) for part in _STRIBECK))
         taps = self._narrow.taps()
@@ -155,7 +155,7 @@ class Extraction:
 
     def _slip(self, rates: Array) -> Array:
         assert self.speeds is not None
-        sign = np.clip(rates / COULOMB_RATE, -1.0, 1.0)
+        sign = np.clip(rates / self.platform.parameters['actuator.coulomb_velocity'], -1.0, 1.0)
         return np.stack([sign, *(sign * np.exp(-(rates / speed) ** 2) for speed in self.speeds)],
                         axis=-1)
 
