@@ -320,7 +320,7 @@ def test_batches_change_nothing_and_no_setpoint_is_lost(
     assert once.near_ends == again.near_ends
     assert once.deviation == again.deviation
     assert len(whole.stamps) + once.left_out.total() == len(times)
-    # what is given back are the setpoints given, in their order
+    # the returned setpoints are the given ones, in their order
     kept = np.isin(batch.wrenches[:, 0], whole.wrenches[:, 0])
     assert np.array_equal(batch.stamps[kept], whole.stamps)
     assert np.array_equal(batch.times[kept], whole.times)
@@ -357,7 +357,7 @@ def test_no_spline_continues_across_a_gap_or_a_restart() -> None:
         assert done.restarts.tolist() == both.restarts.tolist()
         assert not differentiator.left_out
         assert differentiator.near_ends == 4 * 10
-    # a step as long as the gap is none
+    # a step as long as the limit is not a gap
     joined = np.concatenate([times, times + 2.09])
     done = differentiated(differentiator := Differentiator(10.0, 0.1), [
         batch_of(joined, motion_at(joined).rows)])
@@ -373,7 +373,7 @@ def test_too_few_poses_in_a_row_are_left_out_and_counted() -> None:
     done = differentiated(differentiator, [batch])
     assert differentiator.left_out == {TOO_FEW: FEWEST - 1 + 3}
     assert np.array_equal(done.stamps, batch.stamps[[*range(20), *range(27, 27 + FEWEST)]])
-    # the restart before the three poses is one before what comes after them
+    # the restart before the three poses applies to the next pose
     assert np.flatnonzero(done.restarts).tolist() == [20]
 
 
@@ -428,7 +428,7 @@ def test_the_notice_states_the_cutoff_and_the_deviation() -> None:
     assert ends.startswith('16 setpoints are within 0.08 s')
 
 
-# What is rejected
+# Rejected values
 
 @pytest.mark.parametrize('cutoff', [0.0, -1.0, math.nan, math.inf])
 def test_a_cutoff_that_is_not_positive_is_rejected(cutoff: float) -> None:

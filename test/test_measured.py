@@ -458,7 +458,7 @@ def test_unmatched_samples_are_dropped_and_counted() -> None:
         far = turn * 50 * SECOND
         batch = Batch(case.setpoints.stamps + far, *list(case.setpoints)[1:])
         comparison.add_setpoints(case.seconds + far * 1e-9, batch, case.outputs)
-    # of the last ones that wait all are compared, of what was before them none
+    # the last waiting setpoints are all compared, earlier ones are not
     late = comparison.add_measured(case.setpoints.stamps + far, case.forces())
     rest = comparison.finish()
     assert len(late.seconds) + len(rest.seconds) == 5000

@@ -85,7 +85,7 @@ def write_bag(folder: Path, blocks: Iterable[tuple[NDArray[np.int64], Outputs]])
 
 @pytest.fixture(scope='module')
 def turned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outputs]:
-    """Return a bag of three chunks, and what is in it."""
+    """Return a bag of three chunks, and the outputs in it."""
     outputs = turning(300)
     assert 5 < np.isnan(outputs.forces[:, 0]).sum() < 50
     parts = [Outputs(*(part[at:at + 100] for part in outputs)) for at in (0, 100, 200)]

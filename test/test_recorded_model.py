@@ -69,7 +69,7 @@ def placed(tree: dict[str, tuple[str, Array]], link: str, base: str) -> Array:
 
 
 class Recorded:
-    """A random hexapod, a motion of it, and what is recorded of both."""
+    """A random hexapod, a motion, and the recorded messages."""
 
     def __init__(self, **changes: Any) -> None:
         random = rng()

@@ -72,7 +72,7 @@ def at_sea(source: str, number: int = 300) -> list[Recorded]:
     """
     Return setpoints at 100 Hz on a deck at 73 Hz, as they come.
 
-    The first 5 setpoints are before the first sample of the base; from 1.5 to 2 s there is none.
+    The first 5 setpoints are before the first sample of the base, and a gap is from 1.5 to 2 s.
     """
     of = motion(number)
     for n in range(4, int(number * 0.73)):
@@ -118,7 +118,7 @@ def replayed(of: list[Recorded], parameters: Parameters, folder: Path, *options:
     return outputs_of(folder / 'out' / 'bag')
 
 
-# Of topics under other names; the usual ones have their types.
+# Types of topics with other names; the usual names imply their types.
 TYPES = {'deck_pose': INPUT_TYPES[BASE_POSE], 'deck_twist': INPUT_TYPES[BASE_TWIST],
          'deck_accel': INPUT_TYPES[BASE_ACCEL], 'deck_imu': INPUT_TYPES[BASE_IMU],
          'pose': INPUT_TYPES[POSE], 'twist': INPUT_TYPES[TWIST], 'accel': INPUT_TYPES[ACCEL],

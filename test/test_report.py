@@ -45,6 +45,7 @@ from stewart_dynamics.replay.bag_report import Report, share_plotly
 from stewart_dynamics.replay.residuals import Comparison
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline
+from stewart_dynamics.reporting.colors import LEG_COLORS, ROLES
 from stewart_dynamics.reporting.pages import digits, number, thousands
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
@@ -66,7 +67,7 @@ HOSTILE = ('</script ><script >window.hacked=1</script >', '<img src=x onerror=w
 
 
 class Given:
-    """A motion, what it gives, and the report of it."""
+    """A motion, its outputs, and their report."""
 
     def __init__(self, seconds: Array, motions: Array, parameters: Parameters = PARAMETERS,
                  bases: Array | None = None) -> None:
@@ -390,6 +391,17 @@ def test_measured_forces_and_contacts_are_shown_and_drawn(tmp_path: Path) -> Non
     assert 'Contact, most in' in text
 
 
+def test_each_color_is_declared_once() -> None:
+    declared = {*LEG_COLORS, *ROLES.values()}
+    assert len(declared) == len(LEG_COLORS) + len(ROLES)
+    for folder in ('reporting', 'replay', 'identification'):
+        for file in (CONFIG.parent / 'stewart_dynamics' / folder).rglob('*.*'):
+            if file.suffix in ('.py', '.js', '.css', '.html') and file.stem not in (
+                    'colors', 'index'):  # the index has a dark mode of its own
+                repeated = declared & set(re.findall('#[0-9a-f]{6}', file.read_text()))
+                assert not repeated, f'{file}: {repeated}'
+
+
 def test_every_section_with_tables_has_a_link(tmp_path: Path) -> None:
     given = trajectory('clear')
     for name, write in (('plain', given.write),
@@ -435,7 +447,7 @@ def test_missing_plotly_is_reported_in_one_line(tmp_path: Path) -> None:
 
 @pytest.fixture(scope='module')
 def browser() -> Iterator[Browser]:
-    """Return a browser; the test is skipped where there is none."""
+    """Return a browser; skip the test if no browser is installed."""
     playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The folder of a bag's results, and what killed runs leave beside it."""
+"""The folder of a bag's results, and the partial results of killed runs."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_what_a_killed_run_left_is_removed(tmp_path: Path) -> None:
         assert len(names(tmp_path)) == len(kept) + 4
         remove_abandoned([bag, tmp_path / 'nowhere' / 'bag'])
         assert in_use.is_dir()
-        # Those of another bag are not ours.
+        # partial results of another bag are kept
         assert len(names(tmp_path)) == len(kept) + 2
     remove_abandoned([bag, other])
     assert names(tmp_path) == kept | {'bag'}

@@ -158,7 +158,7 @@ def test_between_uneven_times_and_for_missing_samples_values_are_interpolated() 
     at = int(np.argmax(even.amplitudes[0]))
     assert int(np.argmax(found.amplitudes[0])) == at
     assert found.amplitudes[0, at] == pytest.approx(even.amplitudes[0, at], rel=0.02)
-    # what is added is far below
+    # the error of interpolation is far below
     assert found.amplitudes[0, found.frequencies > 5.0].max() < 0.01 * even.amplitudes[0, at]
 
 

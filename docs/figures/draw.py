@@ -39,6 +39,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.one_bag import replay
 from stewart_dynamics.replay.replay_options import NODE
+from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 
@@ -47,10 +48,7 @@ from matplotlib import pyplot  # noqa: E402, I100, I202
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-# The palette of Okabe and Ito, which colour-blind readers can distinguish.
-LEG_COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
-AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
 
 
 class Recorded(NamedTuple):

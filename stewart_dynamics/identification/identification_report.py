@@ -32,8 +32,8 @@ from stewart_dynamics.identification.results import IDENTIFIED, IN_COMBINATION, 
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.text import decimals, grouped
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
-from stewart_dynamics.reporting.plots import COLORS
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.whole_file import write_files
 
@@ -92,7 +92,7 @@ class Report:
         of_state = {state: [each for each in parameters if each['state'] == state]
                     for state in (IDENTIFIED, IN_COMBINATION, NOT_TOLD)}
         text = page(
-            _FOLDER, 'identification', [script], r=result, parameters=parameters,
+            _FOLDER, 'identification', [script], document=True, r=result, parameters=parameters,
             identified=of_state[IDENTIFIED],
             combined=grouped([each['name'] for each in of_state[IN_COMBINATION]]),
             not_told=grouped([each['name'] for each in of_state[NOT_TOLD]]),
@@ -109,6 +109,6 @@ class Report:
             dict(zip(('frequencies', 'values'), (
                 base64_of(each, '<f4') for each in drawn(self._density.frequencies, amplitudes)),
                 strict=True)) for amplitudes in self._density.amplitudes]
-        return {'legs': list(self._found.parameters['joints']), 'colors': COLORS,
+        return {'legs': list(self._found.parameters['joints']), 'colors': LEG_COLORS,
                 'curves': [base64_of(column, '<f4') for column in self._curves.T],
                 'spectra': spectra}

@@ -32,15 +32,19 @@ from urllib.parse import quote
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
+    ROTATION)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.report_verdicts import (
-    date, exceeded_limits, rejections, smallest_margins, units, verdicts)
+    date, exceeded_limits, margin_columns, rejections, smallest_margins, units, verdicts)
 from stewart_dynamics.reporting import plots as channels
+from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
-from stewart_dynamics.reporting.force_sources import sources_of
 from stewart_dynamics.reporting.pages import base64_of, page, plotly_script
 from stewart_dynamics.reporting.plots import (
-    base_wrench_plots, COLORS, measured_plots, motion_plots, spectrum_plots)
+    base_wrench_plots, measured_plots, motion_plots, PLOT_OF, spectrum_plots)
 from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.setpoints.step import Batch, Outputs
 from stewart_dynamics.whole_file import write_files
@@ -97,12 +101,12 @@ class Report:
         """
         motions, forces = setpoints.motions, outputs.demanded_forces
         rows = np.empty((self._channels, len(seconds)))
-        rows[channels.POSITION] = motions[:, 0:3].T
-        rows[channels.ANGLES] = self._continued(_euler(motions[:, 3:12])).T
-        rows[channels.VELOCITY] = motions[:, 12:15].T
-        rows[channels.OMEGA] = np.degrees(motions[:, 15:18]).T
-        rows[channels.ACCELERATION] = motions[:, 18:21].T
-        rows[channels.ALPHA] = np.degrees(motions[:, 21:24]).T
+        rows[channels.POSITION] = motions[:, POSITION].T
+        rows[channels.ANGLES] = self._continued(_euler(motions[:, ROTATION])).T
+        rows[channels.VELOCITY] = motions[:, LINEAR_VELOCITY].T
+        rows[channels.OMEGA] = np.degrees(motions[:, ANGULAR_VELOCITY]).T
+        rows[channels.ACCELERATION] = motions[:, LINEAR_ACCELERATION].T
+        rows[channels.ALPHA] = np.degrees(motions[:, ANGULAR_ACCELERATION]).T
         rows[channels.LENGTHS] = outputs.lengths.T
         rows[channels.RATES] = outputs.rates.T
         rows[channels.FORCES] = forces.T
@@ -117,7 +121,7 @@ class Report:
         self._curves.add(seconds, rows)
         self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
         self._frames.add(seconds, np.concatenate(
-            [motions[:, :12], outputs.lengths, forces], axis=1))
+            [motions[:, POSE], outputs.lengths, forces], axis=1))
 
     def add_measured(
             self, seconds: Array, measured: Array, computed: Array, wrench: Array) -> None:
@@ -157,17 +161,17 @@ class Report:
         """
         script = plotly_script() if plotly is None else ''
         text = page(
-            FOLDER, 'report', [script] if script else [], plotly is not None, s=summary,
+            FOLDER, 'report', [script] if script else [], plotly is not None, True, s=summary,
             p=self._parameters, legs=list(self._legs),
             name=Path(summary['bag']).name or summary['bag'], plotly=script,
             plotly_file=None if plotly is None else quote(Path(
                 os.path.relpath(plotly, path.parent)).as_posix()),
             data=self._data(summary), sources=sources_of(self._parameters),
             verdicts=verdicts(summary), exceeded=exceeded_limits(summary['limits']),
-            margins=smallest_margins(summary),
+            margins=smallest_margins(summary), margin_columns=margin_columns(self._parameters),
             rejected=sum(each['count'] for each in summary['rejected']),
             rejections=rejections(summary),
-            date=date(summary['setpoints']['first_stamp_ns']), units=units(),
+            date=date(summary['setpoints']['first_stamp_ns']), units=units(), plot_of=PLOT_OF,
             most_times=_MOST_TIMES)
         write_files({path: text})
 
@@ -199,7 +203,7 @@ class Report:
             'begin': float(times[0]) if len(times) else 0.0,
             'end': float(times[-1]) if len(times) else 0.0,
             'legs': self._legs,
-            'colors': COLORS,
+            'colors': LEG_COLORS,
             'baseJoints': p['geometry.base_joints'].tolist(),
             'platformJoints': p['geometry.platform_joints'].tolist(),
             'frames': {'times': base64_of(times, '<f8'), 'numbers': base64_of(frames, '<f8')},

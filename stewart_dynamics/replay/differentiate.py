@@ -25,7 +25,9 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Stamps
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.rows import MOTION, WRENCH
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
+    POSITION, ROTATION, WRENCH)
 from stewart_dynamics.replay.smoothing_spline import banded_solver, FEWEST, smoothing_spline
 from stewart_dynamics.setpoints.step import Batch
 
@@ -46,10 +48,6 @@ _REACH_IN_POSES = 32
 _MOST_POSES_IN_A_CUTOFF = 2000
 # Smoothing makes a quaternion shorter than one.
 _SHORTEST_QUATERNION = 0.5
-
-_POSITION, _ROTATION, _POSE = slice(0, 3), slice(3, 12), slice(0, 12)
-_VELOCITY, _OMEGA, _ACCELERATION, _ALPHA = (
-    slice(12, 15), slice(15, 18), slice(18, 21), slice(21, 24))
 
 
 class Deviation(NamedTuple):
@@ -226,11 +224,11 @@ class Differentiator:
         stamps, motions = segment.stamps[part], segment.motions[part]
         times = (stamps - stamps[0]) * 1e-9
         self._check_rate(times)
-        quaternions = rotations.to_quaternion(motions[:, _ROTATION].reshape(-1, 3, 3))
+        quaternions = rotations.to_quaternion(motions[:, ROTATION].reshape(-1, 3, 3))
         flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
         quaternions[1:][np.logical_xor.accumulate(flips)] *= -1.0
         spline = smoothing_spline(
-            times, np.concatenate([motions[:, _POSITION], quaternions], axis=1), self.cutoff)
+            times, np.concatenate([motions[:, POSITION], quaternions], axis=1), self.cutoff)
         inner = slice(core.start - part.start, core.stop - part.start)
         values, rates, accelerations = (each[inner] for each in spline)
 
@@ -245,15 +243,15 @@ class Differentiator:
                  - 2.0 * np.sum(turn * turn_rate, axis=-1, keepdims=True) / square * omega)
         given = segment.chosen(core)
         out = np.empty_like(given.motions)
-        out[:, _POSE] = given.motions[:, _POSE]
-        out[:, _VELOCITY], out[:, _ACCELERATION] = rates[:, :3], accelerations[:, :3]
-        out[:, _OMEGA], out[:, _ALPHA] = omega, alpha
+        out[:, POSE] = given.motions[:, POSE]
+        out[:, LINEAR_VELOCITY], out[:, LINEAR_ACCELERATION] = rates[:, :3], accelerations[:, :3]
+        out[:, ANGULAR_VELOCITY], out[:, ANGULAR_ACCELERATION] = omega, alpha
 
         time = 1e9 / self.cutoff
         near = (given.stamps - self._begun < time) | (segment.stamps[-1] - given.stamps < time)
         self.near_ends += int(np.count_nonzero(followed & near))
         known = followed & ~near & np.isfinite(out).all(axis=1)
-        self._gather(values[known, :3] - out[known, _POSITION], turn[known],
+        self._gather(values[known, :3] - out[known, POSITION], turn[known],
                      quaternions[inner][known])
         return self._followed(given, out, followed)
 

@@ -20,19 +20,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
-from stewart_dynamics.parameters.table import PARAMETERS
+from stewart_dynamics.mechanics.limits import OF_JOINTS, QUANTITIES
+from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 Summary = Mapping[str, Any]
 """The content of summary.json."""
 Verdict = tuple[str, str]
 """Level (good, warn, bad or none) and title of a card."""
-
-_MARGINS = (('length', 'length_margin_m', 'm'), ('rate', 'rate_margin_m_s', 'm/s'),
-            ('force', 'force_margin_n', 'N'),
-            ('base joint angle', 'base_joint_angle_margin_rad', 'rad'),
-            ('platform joint angle', 'platform_joint_angle_margin_rad', 'rad'))
 
 # Measured forces differ if the residual's RMS is a larger part of theirs.
 _DIFFERENT = 0.05
@@ -91,10 +87,36 @@ def rejections(summary: Summary) -> list[dict[str, Any]]:
             for each in summary['rejected']]
 
 
+class MarginColumn(NamedTuple):
+    """The margins of a quantity from its limits."""
+
+    name: str
+    unit: str
+    key: str
+    """Of a leg in summary.json."""
+    limits: tuple[str, ...]
+
+
+def margin_columns(parameters: Parameters) -> list[MarginColumn]:
+    """Return the quantities with limits; angles of joints only if one of them has a limit."""
+    of_joints = any(parameters[name] is not None for name in OF_JOINTS)
+    return [column for column in _MARGINS if of_joints or column.limits[0] not in OF_JOINTS]
+
+
+def _margin_column(name: str, unit: str) -> MarginColumn:
+    suffix = unit.lower().replace('/', '_')
+    return MarginColumn(
+        name, unit, f'{name.replace(" ", "_")}_margin_{suffix}',
+        tuple(limit for limit, quantity in QUANTITIES.items() if quantity == (name, unit)))
+
+
+_MARGINS = [_margin_column(*quantity) for quantity in dict.fromkeys(QUANTITIES.values())]
+
+
 def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
     """Return the smallest margins of length, rate, force and joint angles, each with its leg."""
     found = []
-    for name, key, unit in _MARGINS:
+    for name, unit, key, _ in _MARGINS:
         of_legs = [(leg[key], joint) for joint, leg in summary['legs'].items()
                    if leg[key] is not None]
         if of_legs:
@@ -110,7 +132,7 @@ def exceeded_limits(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
         legs = [each for each in limits if each['limit'] == name]
         worst = max(legs, key=lambda each: abs(abs(each['worst']) - each['bound']))
         found.append({
-            'name': name, 'bound': worst['bound'], 'unit': PARAMETERS[name].unit or '',
+            'name': name, 'bound': worst['bound'], 'unit': QUANTITIES[name][1],
             'leg': worst['leg'], 'worst': worst['worst'], 'others': len(legs) - 1,
             'first_at_s': min(each['first_at_s'] for each in legs)})
     return found

@@ -28,24 +28,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
+from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, BASE_ANGLE_MAX, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, PLATFORM_ANGLE_MAX,
-    VELOCITY_MAX)
+    ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, QUANTITIES, VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.base_wrench_summary import BaseWrenchSummary
 from stewart_dynamics.reporting.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)
-from stewart_dynamics.reporting.force_sources import sources_of
 from stewart_dynamics.setpoints.step import Batch, Outputs
 
 # Values of a leg that are not known from poses alone.
 _OF_VELOCITY = (
     'rate_peak_m_s', 'rate_peak_at_s', 'rate_margin_m_s', 'power_peak_w', 'power_peak_at_s',
     'power_mean_w', 'energy_driving_j', 'energy_braking_j')
-# Keys of the joints' angles, by their limit.
-_ANGLES = {BASE_ANGLE_MAX: 'base_joint_angle', PLATFORM_ANGLE_MAX: 'platform_joint_angle'}
 _AT_REST = ('gravity', 'wrench', 'base motion')
+# Columns of the base wrench: force and moment, then their components.
+_BASE_WRENCH = (
+    'force', 'moment', 'force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z')
+_BASE_UNITS = ('n', 'n_m', 'n', 'n', 'n', 'n_m', 'n_m', 'n_m')
 
 
 class _Block(NamedTuple):
@@ -112,7 +112,7 @@ class Summary:
         self._unit_load_force = Extreme(6, np.positive)
         self._crossings = Crossings()
         self._warnings = Warnings()
-        self._base_wrench = BaseWrenchSummary()
+        self._base_wrench = _BaseWrench()
         self._sources = sources_of(parameters)
         # one source at a time: numpy is far slower along many columns at once
         self._source_peaks = [Extreme(6, np.abs) for _ in self._sources]
@@ -278,7 +278,7 @@ class Summary:
             'force_margin_n': None if strongest is None else _number(strongest - abs(force)),
         }
         for (name, angles), bound in zip(self._angles.items(), widest, strict=True):
-            key, angle = _ANGLES[name], angles.values[leg]
+            key, angle = QUANTITIES[name][0].replace(' ', '_'), angles.values[leg]
             found |= {f'{key}_max_rad': _number(angle),
                       f'{key}_max_at_s': _number(angles.at[leg]),
                       f'{key}_margin_rad': None if bound is None else _number(bound - angle)}
@@ -332,3 +332,44 @@ class Summary:
 def _number(value: float) -> float | None:
     """Return a plain number, None if it is not finite."""
     return float(value) if math.isfinite(value) else None
+
+
+class _BaseWrench:
+    """Peaks, RMS and means of the base wrench, block by block."""
+
+    def __init__(self) -> None:
+        self._peaks = Extreme(len(_BASE_WRENCH), np.abs)
+        self._squares_and_sizes = Integral(2 * len(_BASE_WRENCH))
+
+    def add(self, seconds: Array, steps: Array, wrenches: Array) -> None:
+        """
+        Add a block of samples.
+
+        Parameters
+        ----------
+        seconds : (N,)
+            Time since the first setpoint of the bag [s].
+        steps : (N,)
+            From each one's predecessor to it [s].
+        wrenches : (N, 6)
+            Force [N] and moment [N m]; nan: not known.
+
+        """
+        squares = np.empty((len(seconds), len(_BASE_WRENCH)))
+        with np.errstate(over='ignore'):
+            np.square(wrenches, out=squares[:, 2:])
+            squares[:, 0] = squares[:, 2] + squares[:, 3] + squares[:, 4]
+            squares[:, 1] = squares[:, 5] + squares[:, 6] + squares[:, 7]
+        values = np.concatenate((np.sqrt(squares[:, :2]), wrenches), axis=1)
+        self._peaks.add(seconds, values)
+        self._squares_and_sizes.add(steps, np.concatenate((squares, values), axis=1))
+
+    def values(self) -> dict[str, dict[str, float | None]]:
+        """Return the part of summary.json."""
+        squares, means = self._squares_and_sizes.mean.reshape(2, len(_BASE_WRENCH)).tolist()
+        numbers = zip(np.sqrt(squares).tolist(), means, self._peaks.values.tolist(),
+                      self._peaks.at.tolist(), strict=True)
+        return {name: dict(zip(
+            (f'rms_{unit}', f'mean_{unit}', f'peak_{unit}', 'peak_at_s'), map(_number, each),
+            strict=True)) for name, unit, each in zip(
+                _BASE_WRENCH, _BASE_UNITS, numbers, strict=True)}

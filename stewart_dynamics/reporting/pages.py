@@ -35,6 +35,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 import numpy as np
 from numpy.typing import ArrayLike
 from stewart_dynamics.errors import StewartError
+from stewart_dynamics.reporting.colors import custom_properties
 
 _SHARED = Path(__file__).with_name('templates')
 
@@ -81,7 +82,7 @@ def _environment(folder: Path) -> Environment:
 
 
 def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool = False,
-         **values: Any) -> str:
+         document: bool = False, **values: Any) -> str:
     """
     Return a page.
 
@@ -95,6 +96,8 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
         Other scripts that the page is allowed to run.
     shared : bool
         The page is allowed to run scripts in files.
+    document : bool
+        The page has the common style of documents (document.css) before its own.
     values : mapping
         Variables of the template.
 
@@ -102,6 +105,8 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     script, style = (folder.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
                      for suffix in ('.js', '.css'))
     script = f'\n{script}'
+    common = _SHARED.joinpath('document.css').read_text(encoding='utf-8') if document else ''
+    style = custom_properties() + common + style
     hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script)),
                        *(["'self'"] if shared else [])])
     return _environment(folder).get_template(f'{template}.html').render(

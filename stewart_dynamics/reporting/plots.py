@@ -23,18 +23,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
-from stewart_dynamics.mechanics.limits import ANGLES as ANGLES_OF, BASE_ANGLE_MAX, OF_JOINTS
+from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
+from stewart_dynamics.mechanics.limits import (
+    ANGLES as ANGLES_OF, BASE_ANGLE_MAX, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.reporting.force_sources import sources_of
+from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
 from stewart_dynamics.reporting.spectrum import Density
 
-# Okabe and Ito's palette for the color-blind, without yellow, which is not visible on white.
-COLORS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
-_AXIS_COLORS = ('#d55e00', '#009e73', '#0072b2')
-_BLACK = '#222222'
-_SOURCE_COLORS = dict(zip(SOURCES, (*COLORS, _BLACK), strict=True))
+_BLACK = ROLES['black']
+_SOURCE_COLORS = dict(zip(SOURCES, (*LEG_COLORS, _BLACK), strict=True))
 
 # The channels of a sample.
 POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
@@ -46,6 +45,11 @@ BASE_WRENCH = slice(44, 50)
 BREAKDOWN = slice(50, 50 + 6 * len(SOURCES))
 
 BASE_SECTION = 'base_wrench'
+
+# The plot that shows the quantity of a limit.
+PLOT_OF = {
+    LENGTH_MIN: 'lengths', LENGTH_MAX: 'lengths', VELOCITY_MAX: 'rates', FORCE_MAX: 'forces',
+    **{name: name.removeprefix('limits.').removesuffix('_max') for name in OF_JOINTS}}
 
 # The channels of a comparison with measured forces, after those of the motion.
 MEASURED, COMPUTED, RESIDUAL, WRENCH = (slice(n, n + 6) for n in range(0, 24, 6))
@@ -141,19 +145,19 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
                  *_bounds('length_max', p['limits.length_max'])]),
         *(_of_joints(p, limit) for limit in OF_JOINTS if p[limit] is not None),
         Plot('determinant', '17', 'det(J)', 'm³',
-             {'': [Curve('det(J)', COLORS[0], DETERMINANT)]},
-             'zero at a singularity', [Bound(0.0, 'singular', '#c00000')],
+             {'': [Curve('det(J)', LEG_COLORS[0], DETERMINANT)]},
+             'zero at a singularity', [Bound(0.0, 'singular', ROLES['singular'])],
              spikes=True),
         Plot('condition', '17', 'Condition number of J_inv', '–',
-             {'': [Curve('condition', COLORS[1], CONDITION)]}, 'dimensionless; 1 is best', [
-                 Bound(p['singularity.warn_condition'], 'warn', '#b36b00'),
-                 Bound(p['singularity.stop_condition'], 'stop', '#c00000')], log=True),
+             {'': [Curve('condition', LEG_COLORS[1], CONDITION)]}, 'dimensionless; 1 is best', [
+                 Bound(p['singularity.warn_condition'], 'warn', ROLES['near']),
+                 Bound(p['singularity.stop_condition'], 'stop', ROLES['singular'])], log=True),
         Plot('forces', '18', 'Leg forces', 'N', _of_legs(joints, FORCES),
              'demanded by the motion, + pushes',
              _bounds('force_max', p['limits.force_max'], both=True), spikes=True),
         *(of_rates if velocities_known else ()),
         Plot('force_breakdown', '', 'Leg force by source', 'N', {
-            leg: [Curve('sum', '#a3abb6', FORCES.start + n, width=4.5),
+            leg: [Curve('sum', ROLES['zero'], FORCES.start + n, width=4.5),
                   *(Curve(source, _SOURCE_COLORS[source], BREAKDOWN.start + 6 * k + n)
                     for k, source in enumerate(sources_of(p)))]
             for n, leg in enumerate(joints)}, 'the parts of the demanded force', spikes=True)]
@@ -164,7 +168,7 @@ def _of_joints(p: Parameters, limit: str) -> Plot:
     which, first = ANGLES_OF[limit], joint_angles_of(p).start
     joint = 'base' if limit == BASE_ANGLE_MAX else 'platform'
     return Plot(
-        name.removesuffix('_max'), '', f'Angles of the {joint} joints', 'deg',
+        PLOT_OF[limit], '', f'Angles of the {joint} joints', 'deg',
         _of_legs(p['joints'], slice(first + which.start, first + which.stop)),
         f'between the leg and geometry.{joint}_joint_axes, by default its direction at home',
         _bounds(name, np.degrees(p[limit])))
@@ -216,8 +220,8 @@ def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
     return [
         Plot('measured', '', 'Measured and computed leg force', 'N', {
             leg: [Curve('measured', _BLACK, measured.start + n),
-                  Curve('computed', COLORS[n], computed.start + n),
-                  Curve('residual', '#888888', residual.start + n, 'dot')]
+                  Curve('computed', LEG_COLORS[n], computed.start + n),
+                  Curve('residual', ROLES['faint'], residual.start + n, 'dot')]
             for n, leg in enumerate(joints)}, 'residual: measured less computed',
             contacts=True, spikes=True),
         Plot('residuals', '', 'Residual of every leg', 'N', _of_legs(joints, residual),
@@ -232,12 +236,12 @@ def measured_plots(parameters: Parameters, first: int) -> list[Plot]:
 
 def _of_legs(joints: Sequence[str], channels: slice) -> dict[str, list[Curve]]:
     return {'': [Curve(leg, color, channels.start + n) for n, (leg, color) in
-                 enumerate(zip(joints, COLORS, strict=True))]}
+                 enumerate(zip(joints, LEG_COLORS, strict=True))]}
 
 
 def _of_axes(channels: slice, *names: str) -> dict[str, list[Curve]]:
     return {'': [Curve(name, color, channels.start + n) for n, (name, color) in
-                 enumerate(zip(names, _AXIS_COLORS, strict=True))]}
+                 enumerate(zip(names, AXIS_COLORS, strict=True))]}
 
 
 def _all_or_one(variants: Mapping[str, list[Curve]]) -> dict[str, list[Curve]]:
@@ -253,4 +257,4 @@ def _bounds(name: str, values: Array | None, both: bool = False) -> list[Bound]:
     alike = bool(np.all(values == values[0]))
     return [Bound(sign * float(value), name if alike else '', _BLACK if alike else color)
             for sign in ((1.0, -1.0) if both else (1.0,))
-            for value, color in list(zip(values, COLORS, strict=True))[:1 if alike else 6]]
+            for value, color in list(zip(values, LEG_COLORS, strict=True))[:1 if alike else 6]]

@@ -1,8 +1,8 @@
 'use strict';
 const data = JSON.parse(document.getElementById('data').textContent);
-const FONT = {family: 'system-ui, sans-serif', size: 13, color: '#1d2430'};
+const color = (name) => getComputedStyle(document.body).getPropertyValue(`--${name}`).trim();
+const FONT = {family: 'system-ui, sans-serif', size: 13, color: color('ink')};
 const CONFIG = {responsive: true, displaylogo: false, modeBarButtonsToRemove: ['select2d', 'lasso2d']};
-const GREY = '#8a93a1';
 
 function numbers(text) {
   const bytes = Uint8Array.from(atob(text), (each) => each.charCodeAt(0));
@@ -12,16 +12,16 @@ function numbers(text) {
 function layout(y, more) {
   return {
     font: FONT, margin: {l: 70, r: 16, t: 10, b: 44}, legend: {orientation: 'h', y: 1.12},
-    xaxis: {title: {text: 'time [s]'}, gridcolor: '#e8ecf1', zeroline: false},
-    yaxis: {title: {text: y}, gridcolor: '#e8ecf1', zerolinecolor: '#c4ccd6'},
+    xaxis: {title: {text: 'time [s]'}, gridcolor: color('grid'), zeroline: false},
+    yaxis: {title: {text: y}, gridcolor: color('grid'), zerolinecolor: color('zero')},
     hovermode: 'x unified', ...more,
   };
 }
 
 const columns = data.curves.map(numbers);
 const times = columns[0];
-const line = (name, y, color, width, dash) => (
-  {x: times, y, name, type: 'scatter', mode: 'lines', line: {color, width, dash}, connectgaps: false});
+const line = (name, y, of, width, dash) => (
+  {x: times, y, name, type: 'scatter', mode: 'lines', line: {color: of, width, dash}, connectgaps: false});
 const less = (a, b) => a.map((each, n) => each - b[n]);
 
 // Forces and residuals of one leg.
@@ -29,11 +29,11 @@ let range = null;
 function show(leg) {
   const [effort, before, after] = [1, 7, 13].map((first) => columns[first + leg]);
   Plotly.react('forces', [
-    line('measured', effort, '#222222', 2.2), line('by the file', before, '#e69f00', 1.4),
-    line('by the identified parameters', after, '#0072b2', 1.4, 'dot')], layout('force [N]'), CONFIG);
+    line('measured', effort, color('black'), 2.2), line('by the file', before, color('leg4'), 1.4),
+    line('by the identified parameters', after, color('leg0'), 1.4, 'dot')], layout('force [N]'), CONFIG);
   Plotly.react('residuals', [
-    line('residual by the file', less(effort, before), '#e69f00', 1.2),
-    line('by the identified parameters', less(effort, after), '#0072b2', 1.2)], layout('residual [N]'), CONFIG);
+    line('residual by the file', less(effort, before), color('leg4'), 1.2),
+    line('by the identified parameters', less(effort, after), color('leg0'), 1.2)], layout('residual [N]'), CONFIG);
   document.querySelectorAll('#legs button').forEach((button, n) => button.setAttribute('aria-pressed', n === leg));
 }
 
@@ -58,11 +58,11 @@ const spectra = data.spectra.map(({frequencies, values}) => ({x: numbers(frequen
 if (spectra.length) {
   const traces = spectra.map(({x, y}, n) => ({
     x, y, mode: 'lines', name: n < 6 ? 'by the file' : data.legs[n - 6], legendgroup: n < 6 ? 'file' : data.legs[n - 6],
-    showlegend: n === 0 || n > 5, line: {color: n < 6 ? GREY : data.colors[n - 6], width: n < 6 ? 1 : 1.5},
+    showlegend: n === 0 || n > 5, line: {color: n < 6 ? color('faint') : data.colors[n - 6], width: n < 6 ? 1 : 1.5},
     opacity: n < 6 ? 0.6 : 1,
   }));
   Plotly.newPlot('spectrum', traces, layout('residual [N/√Hz]', {
-    xaxis: {title: {text: 'frequency [Hz]'}, type: 'log', gridcolor: '#e8ecf1'},
-    yaxis: {title: {text: 'residual [N/√Hz]'}, type: 'log', gridcolor: '#e8ecf1'}, hovermode: 'closest',
+    xaxis: {title: {text: 'frequency [Hz]'}, type: 'log', gridcolor: color('grid')},
+    yaxis: {title: {text: 'residual [N/√Hz]'}, type: 'log', gridcolor: color('grid')}, hovermode: 'closest',
   }), CONFIG);
 } else document.getElementById('spectrum').textContent = 'Too few samples for a spectrum.';

@@ -92,6 +92,11 @@ _NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.pisto
 _TOGETHER = 1024
 
 
+def sources_of(parameters: Parameters) -> tuple[str, ...]:
+    """Return SOURCES, without the base's motion, the last, where ``base.source`` is fixed."""
+    return SOURCES[:-1] if parameters['base.source'] == 'fixed' else SOURCES
+
+
 class ForceBreakdownRows:
     """
     The force breakdown of rows of motion, as one array.

@@ -72,7 +72,26 @@ function element(name, options = {}, ...children) {
   return made;
 }
 
-const INK = '#1d2430';
+// A color of the style sheet.
+const color = name => getComputedStyle(document.body).getPropertyValue(`--${name}`).trim();
+
+function swatch(of) {
+  const made = element('i', {className: 'swatch'});
+  made.style.color = of;
+  return made;
+}
+
+// A table: heads, and rows of a first cell and further ones; texts or elements.
+function table(heads, rows) {
+  const cell = (name, content) => element(name, {}, ...[content].flat());
+  return element('table', {}, element('thead', {}, element('tr', {}, ...heads.map(each => cell('th', each)))),
+    element('tbody', {}, ...rows.map(([first, ...others]) => element('tr', {}, cell('th', first),
+      ...others.map(each => each instanceof HTMLTableCellElement ? each : cell('td', each))))));
+}
+
+const empty = () => element('td', {textContent: '–'});
+
+const INK = color('ink'), FAINT = color('faint');
 const FONT = {family: getComputedStyle(document.body).fontFamily, size: 12.5, color: INK};
 // Fingers scroll the page, and turn the hexapod.
 const TOUCH = window.matchMedia('(pointer: coarse)').matches;
@@ -147,10 +166,20 @@ function watch(canvas, drawing) {
   watcher.observe(canvas);
 }
 
-const AXIS = {gridcolor: '#e7ebf0', zerolinecolor: '#b9c1cc', linecolor: '#8a93a1',
-  ticks: 'outside', tickcolor: '#8a93a1', ticklen: 4, showline: true, mirror: true};
+const AXIS = {gridcolor: color('grid'), zerolinecolor: color('zero'), linecolor: FAINT,
+  ticks: 'outside', tickcolor: FAINT, ticklen: 4, showline: true, mirror: true};
 
 // ---- a plot over time
+
+// Of plots over time and over frequency.
+function layoutOf(xTitle, xaxis, yTitle, yaxis, more = {}) {
+  const title = (text, standoff) => ({text, standoff, font: {size: 12.5}});
+  return {
+    height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
+    separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff',
+    xaxis: {...AXIS, zeroline: false, ...xaxis, title: title(xTitle, 6)},
+    yaxis: {...AXIS, ...yaxis, title: title(yTitle, 8)}, ...more};
+}
 
 class TimePlot {
   constructor(spec, place) {
@@ -185,25 +214,21 @@ class TimePlot {
   get curves() { return this.spec.variants[this.variant].curves; }
 
   listValues() {
-    const rows = element('tbody');
-    this.where = element('th', {textContent: 'at the cursor'});
-    const head = element('tr', {}, this.where, element('th', {textContent: `[${this.spec.unit}]`}));
-    this.values = this.curves.map((each, n) => {
-      const cell = element('td', {textContent: '–'});
-      const swatch = element('i', {className: 'swatch'});
-      swatch.style.color = each.color;
-      const toggle = element('button', {title: 'show or hide'}, swatch, each.name);
-      const row = element('tr', {className: this.hidden.has(n) ? 'off' : ''},
-        element('th', {}, toggle), cell);
+    this.where = element('span', {textContent: 'at the cursor'});
+    this.values = this.curves.map(empty);
+    const toggles = this.curves.map(each => element(
+      'button', {title: 'show or hide'}, swatch(each.color), each.name));
+    this.readout.replaceChildren(table(
+      [this.where, `[${this.spec.unit}]`], toggles.map((toggle, n) => [toggle, this.values[n]])));
+    toggles.forEach((toggle, n) => {
+      const show = () => toggle.closest('tr').classList.toggle('off', this.hidden.has(n));
+      show();
       toggle.addEventListener('click', () => {
-        if (this.hidden.has(n)) this.hidden.delete(n); else this.hidden.add(n);
-        row.className = this.hidden.has(n) ? 'off' : '';
+        if (!this.hidden.delete(n)) this.hidden.add(n);
+        show();
         if (this.drawn) this.draw();
       });
-      rows.append(row);
-      return cell;
     });
-    this.readout.replaceChildren(element('table', {}, element('thead', {}, head), rows));
   }
 
   choose(number) {
@@ -286,37 +311,29 @@ class TimePlot {
 
   layout() {
     const shapes = [], notes = [];
-    for (const [begun, ended] of report.warnings) {
-      shapes.push({type: 'rect', layer: 'below', xref: 'x', yref: 'paper', x0: begun,
-        x1: ended === null ? report.end : ended, y0: 0, y1: 1, line: {width: 0},
-        fillcolor: 'rgba(240, 170, 40, 0.22)'});
-    }
-    for (const [begun, ended] of this.spec.contacts ? report.contacts : []) {
-      shapes.push({type: 'rect', layer: 'below', xref: 'x', yref: 'paper', x0: begun, x1: ended,
-        y0: 0, y1: 1, line: {width: 0}, fillcolor: 'rgba(130, 90, 190, 0.2)'});
-    }
+    const bands = (spans, fillcolor) => shapes.push(...spans.map(([begun, ended]) => ({
+      type: 'rect', layer: 'below', xref: 'x', yref: 'paper', x0: begun, x1: ended === null ? report.end : ended,
+      y0: 0, y1: 1, line: {width: 0}, fillcolor})));
+    bands(report.warnings, 'rgba(240, 170, 40, 0.22)');
+    bands(this.spec.contacts ? report.contacts : [], 'rgba(130, 90, 190, 0.2)');
     for (const when of report.crossings) {
       shapes.push({type: 'line', layer: 'below', xref: 'x', yref: 'paper', x0: when, x1: when, y0: 0,
-        y1: 1, line: {color: '#c00000', width: 1.2, dash: 'dot'}});
+        y1: 1, line: {color: color('singular'), width: 1.2, dash: 'dot'}});
     }
-    for (const {value, text, color} of this.spec.bounds) {
+    for (const {value, text, color: of} of this.spec.bounds) {
       shapes.push({type: 'line', xref: 'paper', yref: 'y', x0: 0, x1: 1, y0: value, y1: value,
-        line: {color, width: 1.2, dash: 'dash'}});
+        line: {color: of, width: 1.2, dash: 'dash'}});
       if (text) {
         notes.push({xref: 'paper', yref: 'y', x: 1, y: this.spec.log ? Math.log10(value) : value,
           text, showarrow: false, xanchor: 'right', yanchor: value < 0 ? 'top' : 'bottom',
-          font: {size: 11, color}, bgcolor: 'rgba(255, 255, 255, 0.7)', borderpad: 0});
+          font: {size: 11, color: of}, bgcolor: 'rgba(255, 255, 255, 0.7)', borderpad: 0});
       }
     }
-    return {
-      height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
-      separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff', shapes, annotations: notes,
-      xaxis: {...AXIS, range: time.range.slice(), title: {text: 'time [s]', standoff: 6, font: {size: 12.5}}, zeroline: false},
-      yaxis: {...AXIS, range: this.yRange.slice(), type: this.spec.log ? 'log' : 'linear',
-        title: {text: this.spec.log ? '' : `[${this.spec.unit}]`, standoff: 8, font: {size: 12.5}},
-        exponentformat: this.spec.log ? 'power' : 'none', separatethousands: true,
-        ...(this.spec.log ? {dtick: this.yRange[1] - this.yRange[0] > 1.2 ? 1 : 'D2'} : {})},
-    };
+    const log = this.spec.log;
+    return layoutOf('time [s]', {range: time.range.slice()}, log ? '' : `[${this.spec.unit}]`, {
+      range: this.yRange.slice(), type: log ? 'log' : 'linear', exponentformat: log ? 'power' : 'none',
+      separatethousands: true, ...(log ? {dtick: this.yRange[1] - this.yRange[0] > 1.2 ? 1 : 'D2'} : {})},
+    {shapes, annotations: notes});
   }
 
   draw() {
@@ -388,17 +405,20 @@ class TimePlot {
     this.tools.append(this.offer);
   }
 
+  placeCursor(at, text) {
+    const {xaxis, yaxis} = this.canvas._fullLayout;
+    const x = xaxis.d2p(at);
+    Object.assign(this.cursor.style, {
+      display: x >= -1 && x <= xaxis._length + 1 ? 'block' : 'none', left: `${xaxis._offset + x - 0.75}px`,
+      top: `${yaxis._offset}px`, height: `${yaxis._length}px`});
+    this.cursor.classList.toggle('late', x > 0.8 * xaxis._length);
+    this.cursor.firstChild.textContent = text;
+  }
+
   showCursor() {
     if (!this.drawn || !inView.has(this)) return;
     const when = time.hover === null ? time.cursor : time.hover;
-    const {xaxis, yaxis} = this.canvas._fullLayout;
-    const x = xaxis.d2p(when);
-    this.cursor.style.display = x >= -1 && x <= xaxis._length + 1 ? 'block' : 'none';
-    this.cursor.style.left = `${xaxis._offset + x - 0.75}px`;
-    this.cursor.style.top = `${yaxis._offset}px`;
-    this.cursor.style.height = `${yaxis._length}px`;
-    this.cursor.classList.toggle('late', x > 0.8 * xaxis._length);
-    this.cursor.firstChild.textContent = `${grouped(when, 3)} s`;
+    this.placeCursor(when, `${grouped(when, 3)} s`);
     this.curves.forEach((each, n) => { this.values[n].textContent = shown(valueAt(each.curve, when)); });
   }
 }
@@ -446,16 +466,10 @@ class SpectrumPlot extends TimePlot {
   layout() {
     const {times} = curve(this.curves[0].curve);
     const ends = [Math.log10(times[0]), Math.log10(times[times.length - 1])];
-    const log = range => ({...AXIS, type: 'log', range, exponentformat: 'power', zeroline: false,
-      minor: {ticks: 'outside', ticklen: 2, tickcolor: '#8a93a1', showgrid: true, gridcolor: '#f3f5f8'}});
-    return {
-      height: 270, margin: {l: 96, r: 14, t: 12, b: 42}, font: FONT, showlegend: false, hovermode: false,
-      separators: `.${THIN_SPACE}`, dragmode: TOUCH ? false : 'zoom', paper_bgcolor: '#fff', plot_bgcolor: '#fff',
-      xaxis: {...log(ends), dtick: ends[1] - ends[0] > 1.2 ? 1 : 'D2',
-        title: {text: 'frequency [Hz]', standoff: 6, font: {size: 12.5}}},
-      yaxis: {...log(this.yRange.slice()), dtick: 1,
-        title: {text: `[${this.spec.unit}]`, standoff: 8, font: {size: 12.5}}},
-    };
+    const log = range => ({type: 'log', range, exponentformat: 'power', zeroline: false,
+      minor: {ticks: 'outside', ticklen: 2, tickcolor: FAINT, showgrid: true, gridcolor: color('wash')}});
+    return layoutOf('frequency [Hz]', {...log(ends), dtick: ends[1] - ends[0] > 1.2 ? 1 : 'D2'},
+      `[${this.spec.unit}]`, {...log(this.yRange.slice()), dtick: 1});
   }
 
   follow() {}
@@ -472,7 +486,7 @@ class SpectrumPlot extends TimePlot {
   // The values at the frequency under the mouse; without one, the highest values.
   showCursor() {
     const place = this.drawn && pointedAt !== null;
-    this.cursor.style.display = place ? 'block' : 'none';
+    if (place) this.placeCursor(pointedAt, `${shown(pointedAt)} Hz`); else this.cursor.style.display = 'none';
     this.where.textContent = place ? 'at the cursor' : 'highest';
     const found = this.curves.map(each => highest(curve(each.curve)));
     const least = Math.max(...found.map(each => each.value)) * 10 ** -DECADES;
@@ -481,14 +495,6 @@ class SpectrumPlot extends TimePlot {
       this.values[n].textContent = place ? shown(valueAt(each.curve, pointedAt))
         : value > least ? `${brief(value)} at ${brief(frequency)} Hz` : '0';
     });
-    if (!place) return;
-    const {xaxis, yaxis} = this.canvas._fullLayout;
-    const x = xaxis.d2p(pointedAt);
-    this.cursor.style.left = `${xaxis._offset + x - 0.75}px`;
-    this.cursor.style.top = `${yaxis._offset}px`;
-    this.cursor.style.height = `${yaxis._length}px`;
-    this.cursor.classList.toggle('late', x > 0.8 * xaxis._length);
-    this.cursor.firstChild.textContent = `${shown(pointedAt)} Hz`;
   }
 }
 
@@ -519,9 +525,9 @@ function outline(points, options) {
 }
 
 // A plate over the joints: triangles from the first of them.
-function plate(points, color, opacity) {
+function plate(points, of, opacity) {
   return {type: 'mesh3d', x: column(points, 0), y: column(points, 1), z: column(points, 2),
-    i: [0, 0, 0, 0], j: [1, 2, 3, 4], k: [2, 3, 4, 5], color, opacity, hoverinfo: 'skip',
+    i: [0, 0, 0, 0], j: [1, 2, 3, 4], k: [2, 3, 4, 5], color: of, opacity, hoverinfo: 'skip',
     flatshading: true, showlegend: false};
 }
 
@@ -555,7 +561,7 @@ function scene(numbers, width) {
   const pad = 0.06 * Math.max(...high.map((value, k) => value - low[k]), 1e-9);
   const far = distance(width);
   const axis = (name, k) => ({title: {text: `${name} [m]`}, range: [low[k] - pad, high[k] + pad],
-    gridcolor: '#dde2e8', zerolinecolor: '#c3cad3', backgroundcolor: '#fff', showbackground: false,
+    gridcolor: color('line'), zerolinecolor: color('zero'), backgroundcolor: '#fff', showbackground: false,
     showspikes: false, tickfont: {size: 11}});
   return {xaxis: axis('X', 0), yaxis: axis('Y', 1), zaxis: axis('Z', 2), aspectmode: 'data',
     camera: {eye: {x: 1.15 * far, y: -1.35 * far, z: 0.62 * far}, center: {x: 0, y: 0, z: -0.12}}};
@@ -576,8 +582,8 @@ function baseTraces() {
   const beside = besideBase();
   return [
     plate(report.baseJoints, '#98a2af', 0.35),
-    outline(report.baseJoints, {mode: 'lines+markers', line: {color: '#5d6675', width: 4},
-      marker: {size: 4, color: '#5d6675'}}),
+    outline(report.baseJoints, {mode: 'lines+markers', line: {color: color('soft'), width: 4},
+      marker: {size: 4, color: color('soft')}}),
     {type: 'scatter3d', mode: 'text', x: column(beside, 0), y: column(beside, 1), z: column(beside, 2),
       text: report.legs.map(name => plainText(shortened(name))), textposition: 'middle center', textfont: {size: 11, color: INK}, hoverinfo: 'skip', showlegend: false}];
 }
@@ -613,24 +619,14 @@ class Player {
   }
 
   listValues() {
-    const cells = () => [element('td', {textContent: '–'}), element('td', {textContent: '–'})];
-    this.legValues = report.legs.map(() => cells());
-    const legs = report.legs.map((name, n) => {
-      const swatch = element('i', {className: 'swatch'});
-      swatch.style.color = report.colors[n];
-      return element('tr', {}, element('th', {}, swatch, name), ...this.legValues[n]);
-    });
-    this.poseValues = ['X [m]', 'Y [m]', 'Z [m]', 'alpha [deg]', 'beta [deg]', 'gamma [deg]'].map(
-      name => ({name, cell: element('td', {textContent: '–'})}));
+    this.legValues = report.legs.map(() => [empty(), empty()]);
+    const pose = ['X [m]', 'Y [m]', 'Z [m]', 'alpha [deg]', 'beta [deg]', 'gamma [deg]'];
+    this.poseValues = pose.map(empty);
     this.sample = element('p', {className: 'note'});
     this.readout.replaceChildren(
-      element('table', {}, element('thead', {}, element('tr', {}, element('th', {textContent: 'leg'}),
-        element('th', {textContent: 'force [N]'}), element('th', {textContent: 'length [m]'}))),
-        element('tbody', {}, ...legs)),
-      element('table', {}, element('thead', {}, element('tr', {}, element('th', {textContent: 'platform'}),
-        element('th'))), element('tbody', {}, ...this.poseValues.map(
-        ({name, cell}) => element('tr', {}, element('th', {textContent: name}), cell)))),
-      this.sample);
+      table(['leg', 'force [N]', 'length [m]'], report.legs.map(
+        (name, n) => [[swatch(report.colors[n]), name], ...this.legValues[n]])),
+      table(['platform', ''], pose.map((name, n) => [name, this.poseValues[n]])), this.sample);
   }
 
   appear() {
@@ -692,7 +688,7 @@ class Player {
     });
     const pose = [frame[0], frame[1], frame[2], degrees * Math.atan2(r[7], r[8]),
       degrees * Math.atan2(-r[6], Math.hypot(r[0], r[3])), degrees * Math.atan2(r[3], r[0])];
-    this.poseValues.forEach(({cell}, n) => { cell.textContent = shown(pose[n]); });
+    this.poseValues.forEach((cell, n) => { cell.textContent = shown(pose[n]); });
     this.sample.textContent = `sample at t = ${grouped(frames.times[number], 3)} s`
       + (frames.times.length < report.samples ? `, one of ${grouped(frames.times.length)} shown` : '');
   }
@@ -706,17 +702,13 @@ class InitialAndFinal {
     this.drawn = false;
     this.canvas = element('div', {className: 'canvas tall', id: 'plot_ends'});
     const last = frames.times.length - 1;
-    const row = (color, text) => {
-      const swatch = element('i', {className: 'swatch'});
-      swatch.style.color = color;
-      return element('tr', {}, element('th', {}, swatch, text));
-    };
+    this.ends = [[0, FAINT, 4, 'initial'], [last, report.colors[1], 5, 'final']];
     place.append(element('div', {className: 'plot'}, element('div', {className: 'head'},
       element('h3', {}, 'Platform at initial and final position',
         element('span', {className: 'figure', textContent: ' figure 16 of the paper'}))),
     element('div', {className: 'body'}, this.canvas, element('aside', {className: 'readout'},
-      element('table', {}, row('#8a93a1', `initial, t = ${grouped(frames.times[0], 3)} s`),
-        row('#d55e00', `final, t = ${grouped(frames.times[last], 3)} s`))))));
+      table([], this.ends.map(([number, of, , name]) => [
+        [swatch(of), `${name}, t = ${grouped(frames.times[number], 3)} s`]]))))));
     watch(this.canvas, this);
   }
 
@@ -725,11 +717,11 @@ class InitialAndFinal {
     this.drawn = true;
     const last = frames.times.length - 1;
     const traces = baseTraces();
-    for (const [number, color, width] of [[0, '#8a93a1', 4], [last, '#d55e00', 5]]) {
-      const joints = platformJoints(frameAt(number)), lines = legLines(joints, null);
-      traces.push(plate(joints, color, 0.4), outline(joints, {line: {color, width}, marker: {size: 4, color}}),
+    for (const [number, of, width] of this.ends) {
+      const joints = platformJoints(frameAt(number)), lines = legLines(joints, null), line = {color: of, width};
+      traces.push(plate(joints, of, 0.4), outline(joints, {line, marker: {size: 4, color: of}}),
         {type: 'scatter3d', mode: 'lines', x: lines.x, y: lines.y, z: lines.z, hoverinfo: 'skip',
-          showlegend: false, line: {width, color}});
+          showlegend: false, line});
     }
     Plotly.newPlot(this.canvas, traces, {height: heightOf(this.canvas), margin: {l: 0, r: 0, t: 0, b: 0}, font: FONT,
       showlegend: false, hovermode: false, scene: scene([0, last], this.canvas.clientWidth), paper_bgcolor: '#fff'}, CONFIG_3D);
@@ -819,20 +811,20 @@ function setUp() {
       + 'highest are drawn; values are those of the drawn sample nearest to the cursor.')}));
   const part = (listed, all) => listed.length < all ? `, the first ${listed.length} of ${grouped(all)}` : '';
   const legend = element('div', {className: 'legend'});
-  if (report.warnings.length) {
+  const explain = (style, text) => {
     const box = element('i');
-    box.style.background = 'rgba(240, 170, 40, 0.4)';
-    legend.append(element('span', {}, box, `singularity warning${part(report.warnings, report.allWarnings)}`));
+    box.style.cssText = style;
+    legend.append(element('span', {}, box, text));
+  };
+  if (report.warnings.length) {
+    explain('background: rgba(240, 170, 40, 0.4)', `singularity warning${part(report.warnings, report.allWarnings)}`);
   }
   if (report.crossings.length) {
-    const box = element('i');
-    box.style.cssText = 'width: 0; border-left: 2px dotted #c00000';
-    legend.append(element('span', {}, box, `det(J) crosses zero${part(report.crossings, report.allCrossings)}`));
+    explain('width: 0; border-left: 2px dotted var(--singular)',
+      `det(J) crosses zero${part(report.crossings, report.allCrossings)}`);
   }
   if (report.contacts.length) {
-    const box = element('i');
-    box.style.background = 'rgba(130, 90, 190, 0.35)';
-    legend.append(element('span', {}, box, 'contact: external load on the platform'));
+    explain('background: rgba(130, 90, 190, 0.35)', 'contact: external load on the platform');
   }
   place.append(legend);
   for (const spec of report.plots) {
