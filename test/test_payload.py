@@ -88,17 +88,18 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
         Of the hexapod.
     more
         ``wrench`` on the platform, of which ``known`` is known; ``base`` at times [s], ``offset``
-        of the forces [N].
+        of the forces and their largest, ``clip`` [N].
 
     """
     random = rng(seed)
     times = 2.0 + np.arange(round(seconds * rate) + 1) / rate
     motion, middle = moves(times), moves(times - 0.5 / rate)
     base, wrench = more.get('base'), more.get('wrench')
+    clip = more.get('clip', np.inf)
     result = StewartPlatform(true).inverse_dynamics(
         middle, wrench, None if base is None else base(times - 0.5 / rate))
-    forces = result.forces + more.get('offset', 0.0) + noise.force * random.normal(
-        size=result.forces.shape)
+    forces = np.clip(result.forces + more.get('offset', 0.0) + noise.force * random.normal(
+        size=result.forces.shape), -clip, clip)
     jacobians = StewartPlatform(true).inverse_jacobian(motion)
     rows = motion.rows.copy()
     rows[:, 12:18] += np.linalg.solve(
@@ -234,6 +235,21 @@ def test_a_wrong_friction_costs_width_and_no_error() -> None:
     payload = payload_of(recorded(excited, true=true))
     assert np.abs(errors(payload)).max() < 2.0
     assert abs(payload.fitted.body.mass - TRUE[0]) < 0.2
+
+
+def test_saturated_efforts_do_not_count() -> None:
+    limited = HEXAPOD.replaced({'limits.force_max': 600.0})
+    history = recorded(excited, clip=600.0)
+    payload = payload_of(history, limited)
+    assert 100 < payload.excluded < 1000
+    assert np.abs(errors(payload)).max() < 2.0
+    assert f'; {payload.excluded} measurements not used: efforts at limits.force_max' in (
+        outcome_of(history, limited).message)
+    always = outcome_of(recorded(excited, clip=300.0), HEXAPOD.replaced(
+        {'limits.force_max': 300.0}))
+    assert always.message.startswith('too short: ')
+    assert always.message.endswith(' 4999 measurements not used: efforts at limits.force_max or '
+                                   'legs at their ends')
 
 
 def test_a_known_load_and_a_moving_base_are_no_payload() -> None:

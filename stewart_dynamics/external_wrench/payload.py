@@ -42,7 +42,7 @@ from stewart_dynamics.external_wrench.history import (
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, PLATFORM, VISCOUS_FRICTION)
-from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES
+from stewart_dynamics.mechanics.rows import ACCELERATION, FORCES, LENGTHS
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 FUNCTIONS = inverse_dynamics.solve, regressor.regressors
@@ -65,6 +65,10 @@ _FOURTH_VARIANCE = float(_FOURTH @ _FOURTH)
 # Friction is uncertain by its own size; what holds a leg at rest is anything up to Coulomb's.
 _STATIC = 1.0 / math.sqrt(3.0)
 
+# An effort of these parts of limits.force_max is saturated: sensors have noise. Larger ones are
+# of another unit, or of a drive that does not have this limit.
+_SATURATED = 0.99, 1.02
+
 # What overflows is found by its result.
 _QUIET = np.errstate(over='ignore', invalid='ignore')
 
@@ -86,6 +90,8 @@ class Payload(NamedTuple):
     """Of the last measurement [ns]."""
     seconds: float
     """Time of the measurements."""
+    excluded: int
+    """Measurements that were not used: with saturated efforts, or legs at their ends."""
     fitted: FittedBody
     given: Body
     """The parameters, of which what is not known has the values."""
@@ -127,7 +133,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
         needed = LEAST_WINDOWS * work.half_width
         more = '' if needed < p['payload.window'] else ', more than payload.window'
         yield Outcome(f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps '
-                      f'are needed{more}')
+                      f'are needed{more}{_excluded(work.excluded)}')
         return
     yield None
     if not math.isfinite(work.scale):
@@ -151,7 +157,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
     except np.linalg.LinAlgError as exc:
         yield Outcome(f'the fit failed: {exc}')
         return
-    yield _outcome(Payload(int(stamps[-1]), seconds, fitted, given))
+    yield _outcome(Payload(int(stamps[-1]), seconds, work.excluded, fitted, given))
 
 
 def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
@@ -175,6 +181,10 @@ class _Windows:
     def __init__(self, platform: StewartPlatform, stamps: Stamps) -> None:
         p = platform.parameters
         self._platform, self._stamps = platform, stamps
+        self._force_max, self._shortest, self._longest = (
+            default if p[f'limits.{name}'] is None else p[f'limits.{name}'] for name, default in (
+                ('force_max', math.inf), ('length_min', 0.0), ('length_max', math.inf)))
+        self.excluded = 0
         self._longest_gap = p['setpoint.timeout']
         intervals = np.diff(stamps) * 1e-9
         interval = float(np.median(intervals)) if len(intervals) else 0.0
@@ -209,11 +219,14 @@ class _Windows:
         inner: Integers = every[sound[every - 1] & sound[every]]
         if not len(inner):
             return
+        parts = np.abs(rows[:, ACTED]) / self._force_max
+        saturated: Flags = np.any((parts > _SATURATED[0]) & (parts < _SATURATED[1]), axis=1)
         before, after = steps[inner - 1, None], steps[inner, None]
         both = before + after
         motions = motions_of(rows[inner])
         motions[:, ACCELERATION] = (twists[inner + 1] - twists[inner - 1]) / both
         forces = (rows[inner][:, ACTED] * before + rows[inner + 1][:, ACTED] * after) / both
+        forces[saturated[inner] | saturated[inner + 1]] = np.nan
         values = self._values(motions, rows[inner], forces)
         self._add_windows(seconds[inner], 0.5 * both[:, 0], values)
 
@@ -227,7 +240,12 @@ class _Windows:
     def _values(self, motions: Array, rows: Array, forces: Array) -> Array:
         """Return the columns of each sample and leg, and its force less that of the model."""
         wrenches, bases = rows[:, LOADED], rows[:, OF_BASE]
-        model = self._platform.solve(motions, wrenches, bases)[:, FORCES]
+        results = self._platform.solve(motions, wrenches, bases)
+        model, lengths = results[:, FORCES], results[:, LENGTHS]
+        # Efforts have no part of the force of an end stop.
+        free = (lengths > self._shortest) & (lengths < self._longest)
+        forces[~free.all(axis=1)] = np.nan
+        self.excluded += int(np.isnan(forces[:, 0]).sum())
         matrix = self._platform.regressors(motions, bases)
         if self._middle is None:
             self._middle = motions[:1].copy(), bases[:1].copy()
@@ -301,11 +319,17 @@ def _words(payload: Payload) -> str:
     unknown = [name for name, is_known in zip(NAMES, fitted.known, strict=True) if not is_known]
     text = (f'{", ".join(known)}; platform.mass {more:+.6g} kg; from '
             f'{payload.seconds:.1f} s')
+    text += _excluded(payload.excluded)
     if not fitted.consistent:
         text += '; no real body has the inertia that fits best'
     if unknown:
         text += f'; not identified, as in the parameters: {", ".join(unknown)}'
     return f'{text}; platform: {_parameters(fitted.body)}'
+
+
+def _excluded(count: int) -> str:
+    return '' if not count else (f'; {count} measurements not used: efforts at limits.force_max '
+                                 'or legs at their ends')
 
 
 def with_interval(value: float, half_width: float) -> str:
