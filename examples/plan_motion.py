@@ -15,16 +15,19 @@
 """
 Example: get the leg trajectory of a planned trajectory from stewart_dynamics. Copy what you need.
 
-The trajectory leads from pose to pose, at rest at both ends. It is published as a whole on
-stewart_dynamics/platform_trajectory; the answer on stewart_dynamics/leg_trajectory is what a
-joint_trajectory_controller takes. A rejected one has no answer: /diagnostics states the reason.
+The trajectory leads from pose to pose, at rest at both ends; without --from it starts where the
+measured legs are. It is published as a whole on stewart_dynamics/platform_trajectory; the answer
+on stewart_dynamics/leg_trajectory is what a joint_trajectory_controller takes. A rejected one has
+no answer: /diagnostics states the reason.
 Where the node's topics are remapped, remap those of this program, too:
 --ros-args -r stewart_dynamics/leg_trajectory:=/leg_trajectory_controller/joint_trajectory
+-r stewart_dynamics/measured_legs:=/joint_states
 Exit code: 0 accepted, 1 not.
 """
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 import sys
 import time
 
@@ -33,17 +36,20 @@ from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
 import numpy as np
 import rclpy
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import JointState
+from stewart_dynamics import StewartPlatform
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.mechanics.frames.rotation import to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import to_euler, to_quaternion
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from trajectory_msgs.msg import (
     JointTrajectory, MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint)
 
-HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]  # of config/platform.yaml
+CONFIG = Path(__file__).resolve().parents[1] / 'config'
 
 
 def vector(three: np.ndarray) -> Vector3:
@@ -85,6 +91,12 @@ class Planner(Node):
         self.answer = self.create_subscription(
             JointTrajectory, 'stewart_dynamics/leg_trajectory', self.answers.append, 1)
         self.create_subscription(DiagnosticArray, '/diagnostics', self.on_diagnostics, 10)
+        self.legs: dict[str, float] = {}
+        self.measured = self.create_subscription(
+            JointState, 'stewart_dynamics/measured_legs', self.on_legs, qos_profile_sensor_data)
+
+    def on_legs(self, message: JointState) -> None:
+        self.legs = dict(zip(message.name, message.position, strict=False))
 
     def on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -122,11 +134,26 @@ def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> Jo
     return planner.answers[0]
 
 
+def present_pose(planner: Planner, params: Path, timeout: float) -> list:
+    """Return X Y Z alpha beta gamma of the measured legs; exit with one line without them."""
+    platform = StewartPlatform.from_yaml(params)
+    names = platform.parameters['joints']
+    if not planner.until(lambda: set(names) <= set(planner.legs), timeout):
+        sys.exit(f'no measured legs {", ".join(names)} on {planner.measured.topic_name} within '
+                 f'{timeout:g} s; give --from, or remap the topic')
+    lengths = platform.parameters['geometry.zero_length'] + [planner.legs[name] for name in names]
+    pose = platform.forward_kinematics(lengths, platform.home_pose())
+    return [*pose.position.tolist(), *to_euler(pose.rotation).tolist()]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     pose = {'nargs': 6, 'type': float, 'metavar': ('X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA')}
-    parser.add_argument('--from', dest='start', default=HOME, help='[m, rad]', **pose)
+    parser.add_argument('--from', dest='start', help='[m, rad]; default: the pose of the measured '
+                        'legs, on stewart_dynamics/measured_legs', **pose)
+    parser.add_argument('--params', type=Path, default=CONFIG / 'platform.yaml', metavar='FILE',
+                        help="the node's parameters, for the pose of the measured legs")
     parser.add_argument('--to', default=[0.1, -0.05, 1.2, 0.0, 0.1, 0.3], help='[m, rad]', **pose)
     parser.add_argument('--duration', type=float, default=2.0, help='[s]')
     parser.add_argument('--timeout', type=float, default=10.0,
@@ -138,8 +165,9 @@ def main() -> None:
         sys.exit(f'plan_motion: {exc}')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
-        answer = ask(Planner(), trajectory(options.start, options.to, options.duration),
-                     options.timeout)
+        planner = Planner()
+        start = options.start or present_pose(planner, options.params, options.timeout)
+        answer = ask(planner, trajectory(start, options.to, options.duration), options.timeout)
     except KeyboardInterrupt:
         sys.exit(130)
     except StewartError as exc:

@@ -24,8 +24,8 @@ from pathlib import Path
 import sys
 from typing import Any
 
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -58,7 +58,7 @@ def checked(context: LaunchContext) -> tuple[dict[str, str], float]:
     return files, factor
 
 
-def nodes(context: LaunchContext) -> list[Node]:
+def nodes(context: LaunchContext) -> list[Action]:
     """Return the four nodes, all in one namespace: setpoints go to stewart_dynamics/setpoint/."""
     files, factor = checked(context)
     parameters = Parameters.from_yaml(files['params_file'])
@@ -67,6 +67,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen'}
     package = FindPackageShare('stewart_dynamics')
     return [
+        LogInfo(msg=', '.join(f'{name}: {file}' for name, file in files.items())),
         # With the measured legs of the simulator the node estimates the external wrench.
         Node(package='stewart_dynamics', executable='stewart_dynamics', name='stewart_dynamics',
              parameters=[files['params_file']],

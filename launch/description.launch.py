@@ -23,8 +23,8 @@ its joints on joint_states. It needs robot_state_publisher and rviz2.
 
 from pathlib import Path
 
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -35,16 +35,21 @@ from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.parameters.table import Parameters
 
+PACKAGES = ('robot_state_publisher', 'rviz2')
 JOINT_STATES = '/stewart_dynamics/joint_states'
 
 
-def nodes(context: LaunchContext) -> list[Node]:
-    """Return the three programs, once the file of the hexapod is there and sound."""
+def nodes(context: LaunchContext) -> list[Action]:
+    """Return the three programs, once their packages and the file of the hexapod are found."""
     file = LaunchConfiguration('params_file').perform(context)
     if not Path(file).is_file():
         raise RuntimeError(f'params_file: {file}: no such file')
+    for package in PACKAGES:
+        if package != 'rviz2' or LaunchConfiguration('rviz').perform(context) == 'true':
+            FindPackageShare(package).perform(context)  # raises before anything has started
     description = urdf(Hexapod(Parameters.from_yaml(file)), Path(file).stem)
     return [
+        LogInfo(msg=f'params_file: {file}'),
         Node(package='stewart_dynamics', executable='stewart_dynamics', name='stewart_dynamics',
              parameters=[file], output='screen'),
         # It publishes the transform to the platform as well: publish_tf of the node stays false.

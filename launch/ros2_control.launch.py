@@ -18,8 +18,9 @@ Start controller manager, a joint_trajectory_controller and the node, as an exam
 
     ros2 launch stewart_dynamics ros2_control.launch.py
 
-and then examples/plan_motion.py with its leg_trajectory remapped to
-/leg_trajectory_controller/joint_trajectory.
+and then examples/plan_motion.py, which starts from the measured legs, with two topics remapped:
+stewart_dynamics/leg_trajectory:=/leg_trajectory_controller/joint_trajectory and
+stewart_dynamics/measured_legs:=/joint_states.
 
 Without urdf_file the robot description is that of stewart_describe with the hardware
 mock_components/GenericSystem, whose state follows the commands. It needs ros2_control,
@@ -28,8 +29,8 @@ ros2_controllers and robot_state_publisher.
 
 from pathlib import Path
 
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -39,6 +40,8 @@ from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.urdf import MOCK, Ros2Control, urdf
 from stewart_dynamics.parameters.table import Parameters
 
+PACKAGES = ('controller_manager', 'joint_state_broadcaster', 'joint_trajectory_controller',
+            'robot_state_publisher')
 CONTROLLER = 'leg_trajectory_controller'
 FILES = {
     'params_file': ('platform.yaml', 'YAML file with the parameters of the hexapod'),
@@ -56,8 +59,8 @@ def robot_description(params_file: str, urdf_file: str) -> str:
                 Ros2Control(INTERFACES, MOCK))
 
 
-def nodes(context: LaunchContext) -> list[Node]:
-    """Return all nodes, once the files are there."""
+def nodes(context: LaunchContext) -> list[Action]:
+    """Return all nodes, once their packages and files are found."""
     files = {name: LaunchConfiguration(name).perform(context) for name in FILES}
     for name, file in files.items():
         if not Path(file).is_file():
@@ -65,9 +68,13 @@ def nodes(context: LaunchContext) -> list[Node]:
     urdf_file = LaunchConfiguration('urdf_file').perform(context)
     if urdf_file and not Path(urdf_file).is_file():
         raise RuntimeError(f'urdf_file: {urdf_file}: no such file')
+    for package in PACKAGES:
+        FindPackageShare(package).perform(context)  # raises before anything has started
     description = robot_description(files['params_file'], urdf_file)
     controllers = files['controllers_file']
     return [
+        LogInfo(msg=', '.join(f'{name}: {file}' for name, file in (
+            files | {'urdf_file': urdf_file or 'written from params_file'}).items())),
         Node(package='robot_state_publisher', executable='robot_state_publisher',
              parameters=[{'robot_description': ParameterValue(description, value_type=str)}],
              output='screen'),

@@ -17,8 +17,8 @@
 
 from pathlib import Path
 
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
@@ -29,12 +29,12 @@ TOPICS = {
     'measured_legs': 'topic of the measured legs, as /joint_states'}
 
 
-def node(context: LaunchContext) -> list[Node]:
+def node(context: LaunchContext) -> list[Action]:
     """Return the node, once its file is there."""
     file = LaunchConfiguration('params_file').perform(context)
     if not Path(file).is_file():
         raise RuntimeError(f'params_file: {file}: no such file')
-    return [Node(
+    return [LogInfo(msg=f'params_file: {file}'), Node(
         package='stewart_dynamics',
         executable='stewart_dynamics',
         name='stewart_dynamics',

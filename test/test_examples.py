@@ -24,9 +24,11 @@ import sys
 from geometry_msgs.msg import AccelStamped, PoseStamped, TwistStamped, WrenchStamped
 import numpy as np
 import pytest
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.highlevel import AnyReader
 from running import (
     assert_only_log_lines, DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT)
+from sensor_msgs.msg import JointState
 from stewart_dynamics import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
@@ -76,14 +78,14 @@ def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
         'motion.duration': 2.0, 'rate': 100.0})
     expected = node.platform.inverse_dynamics(motion_at(settings, sample_times(settings) * 1e-9))
     # Rejected ones before and after it, which are not taken for its answer.
-    given = ['--from', *HOME, '--to', *THERE, '--duration', '2.0']
-    for n, arguments in enumerate((given, [])):  # which are those by default
-        program = planned('--duration', '0.3')
+    given = ['--from', *HOME]
+    for n in range(2):
+        program = planned(*given, '--to', *THERE, '--duration', '0.3')
         assert program.wait() == 1
         assert program.stdout == ''
         assert re.fullmatch(r'rejected: at 0\.\d+ s leg_\d: rate .* above limits\.velocity_max\n',
                             program.stderr)
-        program = planned(*arguments)
+        program = planned(*given, '--to', *THERE, '--duration', '2.0')
         assert program.wait() == 0, program.stderr
         assert program.stdout == ('accepted: 201 points over 2 s, largest effort '
                                   f'{np.abs(expected.forces).max():.0f} N\n')
@@ -93,17 +95,71 @@ def test_a_planned_motion_is_answered_or_its_rejection_is_printed(
     assert re.search(r'^STALE  stewart_dynamics: setpoints: no setpoint: setpoint/pose never came',
                      monitor.stdout, re.MULTILINE)
     assert monitor.stop() == 0
-    program = run('plan_motion.py', node.domain, '--timeout', '1.0')
+    program = run('plan_motion.py', node.domain, '--timeout', '1.0', *given)
     assert program.wait() == 1
     assert re.fullmatch(  # the others may have been found by then
         '(no subscriber .+, )?no publisher on /stewart_dynamics/leg_trajectory'
         r'(, no diagnostics .+)? within 1 s; are topics remapped\? See --help\n', program.stderr)
-    program = planned('--duration', '-1.0')
+    program = planned('--duration', '-1.0', *given)
     assert program.wait() == 1
     assert 'motion.duration: -1.0 s: must be more than 0' in program.stderr
 
 
-@pytest.mark.parametrize('name', ['plan_motion.py', 'push_platform.py'])
+@pytest.mark.slow
+def test_a_planned_motion_starts_from_the_measured_legs(
+        start: Callable[..., DynamicsNode], run: Run) -> None:
+    """As under ros2_control with mock hardware, which begins at the home pose."""
+    node = start()
+    node.until_active()
+    answers = node.peer.listen('/stewart_dynamics/leg_trajectory', JointTrajectory)
+    legs = node.peer.writer('/joint_states', JointState)
+    p = node.platform.parameters
+    positions = node.platform.inverse_kinematics(node.platform.home_pose()) - p[
+        'geometry.zero_length']
+    measured = serialize_message(JointState(
+        name=['wheel', *reversed(p['joints'])], position=[7.0, *reversed(positions.tolist())]))
+    program = run('plan_motion.py', node.domain, '--timeout', '60.0', '--ros-args',
+                  '-r', 'stewart_dynamics/measured_legs:=/joint_states')
+    node.until(lambda: legs.publish(measured) or program.ended and answers, 'it is answered')
+    assert program.wait() == 0, program.stderr
+    first = deserialize_message(answers[0], JointTrajectory).points[0]
+    # The controller follows only from within 20 mm.
+    np.testing.assert_allclose(first.positions, positions, atol=1e-9)
+    program = run('plan_motion.py', node.domain, '--timeout', '1.0')
+    assert program.wait() == 1
+    assert program.stderr == (
+        'no measured legs leg_1, leg_2, leg_3, leg_4, leg_5, leg_6 on '
+        '/stewart_dynamics/measured_legs within 1 s; give --from, or remap the topic\n')
+
+
+def test_topics_of_a_node_are_recorded_and_its_service_is_called(
+        start: Callable[..., DynamicsNode], run: Run, tmp_path: Path) -> None:
+    node = start()
+    node.until_active()
+    known = '/stewart_dynamics/leg_states'
+    answered = node.peer.listen(known, JointState)
+    program = run('record_bag.py', node.domain, '--output', tmp_path / 'bag')
+    node.until(lambda: 'bag_recorder' in [
+        each.node_name for each in node.peer.node.get_subscriptions_info_by_topic(known)],
+        'it is recorded')
+    called = run('call_service.py', node.domain)
+    node.until(lambda: node.send() and called.ended, 'the service has answered')
+    assert called.wait() == 1
+    assert called.stdout == 'no measured legs\n'
+    assert program.stop() == 0, program.stderr
+    assert re.search(rf'^ +\d+ {known}$', program.stdout, re.MULTILINE), program.stdout
+    with AnyReader([tmp_path / 'bag']) as reader:
+        recorded: dict[str, list[bytes]] = {each.topic: [] for each in reader.connections}
+        for connection, _, data in reader.messages():
+            recorded[connection.topic].append(bytes(data))
+    assert recorded['/stewart_dynamics/singularity_warning']  # latched
+    assert len(set(recorded[known]) & set(answered)) > 20
+    again = run('record_bag.py', node.domain, '--output', tmp_path / 'bag')
+    assert again.wait() == 1
+    assert len(again.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize('name', ['call_service.py', 'plan_motion.py', 'push_platform.py'])
 def test_without_a_node_it_ends_with_one_line(domain: int, run: Run, name: str) -> None:
     program = run(name, domain, '--timeout', '0.5')
     assert program.wait() == 1

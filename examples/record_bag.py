@@ -1,0 +1,123 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Example: record topics into a bag, where there is no ros2 bag record. Copy what you need.
+
+Without TOPIC it records /joint_states and all topics of stewart_dynamics and stewart_simulator,
+those that appear later, too. It ends with Ctrl-C, or after --duration; the bag is an MCAP for
+stewart_replay and stewart_identify. Only types of ROS itself can be recorded.
+"""
+
+import argparse
+from functools import partial
+import importlib
+from pathlib import Path
+import signal
+import sys
+import time
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+from rosbags.typesys import get_typestore, Stores
+
+TYPES = get_typestore(Stores.ROS2_JAZZY)
+PREFIXES = ('/stewart_dynamics/', '/stewart_simulator/')
+DEPTH = 1000  # messages that wait while the disk is slow
+
+
+class Recorder(Node):
+    """Writes messages as they arrive, with the time of their arrival."""
+
+    def __init__(self, topics: list[str], writer: Writer) -> None:
+        super().__init__('bag_recorder')
+        self.wanted, self.writer, self.counts = topics, writer, {}
+        self.create_timer(0.5, self.look)
+        self.look()
+
+    def look(self) -> None:
+        """Subscribe to topics that have appeared."""
+        for topic, types in self.get_topic_names_and_types():
+            is_wanted = topic in self.wanted if self.wanted else (
+                topic == '/joint_states' or topic.startswith(PREFIXES))
+            if is_wanted and topic not in self.counts and self.count_publishers(topic):
+                self.counts[topic] = 0
+                if len(types) == 1 and types[0] in TYPES.types:
+                    self.record(topic, types[0])
+                else:
+                    print(f'{topic}: not recorded: {" and ".join(types)}', file=sys.stderr)
+
+    def record(self, topic: str, kind: str) -> None:
+        package, _, name = kind.split('/')
+        connection = self.writer.add_connection(topic, kind, typestore=TYPES)
+        # The strictest profile that all publishers match: latched messages are recorded as well.
+        offered = [each.qos_profile for each in self.get_publishers_info_by_topic(topic)]
+        qos = QoSProfile(
+            depth=DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE if all(
+                each.reliability == ReliabilityPolicy.RELIABLE for each in offered)
+            else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if all(
+                each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offered)
+            else DurabilityPolicy.VOLATILE)
+        self.create_subscription(
+            getattr(importlib.import_module(f'{package}.msg'), name), topic,
+            partial(self.write, topic, connection), qos, raw=True)
+
+    def write(self, topic: str, connection: object, data: bytes) -> None:
+        self.writer.write(connection, self.get_clock().now().nanoseconds, data)
+        self.counts[topic] += 1
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('topics', nargs='*', metavar='TOPIC', help='with its namespace')
+    parser.add_argument('--output', type=Path, default=Path('bag'), metavar='FOLDER',
+                        help='the new folder of the bag (default: %(default)s)')
+    parser.add_argument('--duration', type=float, default=float('inf'), help='[s]')
+    signals: list[int] = []
+    # The handlers of rclpy would shut ROS down in the middle of a call.
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as exc:  # bad ROS arguments
+        sys.exit(f'record_bag: {exc}')
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, lambda number, _: signals.append(number))
+    options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    try:
+        with Writer(options.output, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            recorder = Recorder(options.topics, writer)
+            executor = SingleThreadedExecutor()
+            executor.add_node(recorder)
+            end = time.monotonic() + options.duration
+            while not signals and time.monotonic() < end:
+                executor.spin_once(timeout_sec=0.1)
+    except (OSError, WriterError) as exc:
+        sys.exit(f'record_bag: {exc}')
+    finally:
+        rclpy.try_shutdown()
+    for topic, count in sorted(recorder.counts.items()):
+        print(f'{count:8} {topic}')
+    for topic in sorted(set(options.topics) - set(recorder.counts)):
+        print(f'       0 {topic}: no publisher')
+
+
+if __name__ == '__main__':
+    main()
