@@ -22,33 +22,50 @@ import shutil
 from typing import Any
 
 import pytest
-from running import DynamicsNode, Planner
+from running import DynamicsNode, NODE, Planner
+from std_srvs.srv import Trigger
+from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.compilation.machine_code import COMPILED, folder_to_write
 from stewart_dynamics.compile_all import compile_all
+from stewart_dynamics.external_wrench import estimate, payload
 from stewart_dynamics.external_wrench.measured_legs import NOT_COMPILED
+from stewart_dynamics.planned import trajectory
+from stewart_dynamics.setpoints import base_wrench, step
 from test_dynamics_node import MOVING
 from test_external_wrench_node import Felt
 from test_planned_trajectory_node import check, MOTION
 
 # What the test lets the node compile: the first of a planned trajectory, and the external wrench.
-LATER = ('stewart_dynamics.mechanics.kinematics.forward_kinematics.twists',
-         'stewart_dynamics.external_wrench.estimate._one')
+LATER = ('stewart_dynamics.mechanics.kinematics.forward_kinematics',
+         'stewart_dynamics.external_wrench.estimate')
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Path:
+    """Return a folder with all machine code but that of LATER."""
+    compile_all()  # in a workspace this may be the first test that needs it
+    folder = tmp_path / 'kept'
+    folder.mkdir()
+    for file in folder_to_write().glob('*.code'):
+        if not file.name.startswith(LATER):
+            shutil.copy(file, folder)
+    return folder
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
 def test_what_is_needed_later_is_compiled_while_setpoints_are_answered(
-        start: Callable[..., DynamicsNode], tmp_path: Path) -> None:
-    compile_all()  # in a workspace this may be the first test that needs it
-    kept = tmp_path / 'kept'
-    kept.mkdir()
-    for file in folder_to_write().glob('*.code'):
-        if not file.name.startswith(LATER):
-            shutil.copy(file, kept)
+        start: Callable[..., DynamicsNode], kept: Path) -> None:
     node = start(STEWART_DYNAMICS_CACHE_DIR=str(kept))
     node.until_active()
     node.answer(MOVING)
     assert 'compiling' not in node.program.stderr
+    client = node.peer.node.create_client(Trigger, f'{NODE}/identify_payload')
+    node.until(client.service_is_ready, 'the service is there')
+    future = client.call_async(Trigger.Request())
+    node.until(future.done, 'the service answers')
+    assert not future.result().success
+    assert 'is being compiled' in future.result().message
     planner, felt = Planner(node), Felt(node)
     felt.until_connected()
     planner.send(MOTION, step=500_000_000)
@@ -72,3 +89,30 @@ def test_what_is_needed_later_is_compiled_while_setpoints_are_answered(
         assert f'compiling {name} ' in node.program.stderr
         assert list(kept.glob(f'{name}.*.code'))
     node.until_counted()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
+def test_where_parameters_announce_measured_legs_their_code_is_ready_before_active(
+        start: Callable[..., DynamicsNode], kept: Path) -> None:
+    node = start('external_wrench.force_max:=1000.0', STEWART_DYNAMICS_CACHE_DIR=str(kept))
+    node.until_active()
+    said = node.program.stderr
+    assert 0 < said.index(f'compiling {LATER[1]} ') < said.index('dynamics ready after')
+    felt = Felt(node)
+    felt.until_connected()
+
+    def felt_now() -> Any:
+        felt.rest()
+        return felt.raw
+
+    node.until(felt_now, 'the external wrench comes')
+    assert NOT_COMPILED not in node.program.stderr
+
+
+@pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
+def test_all_that_the_node_may_need_is_compiled_in_advance() -> None:
+    compile_all()
+    for functions in (trajectory.FUNCTIONS, estimate.FUNCTIONS, payload.FUNCTIONS,
+                      base_wrench.FUNCTIONS, step.FUNCTIONS):
+        assert Preparation(*functions).ready

@@ -13,22 +13,26 @@
 # limitations under the License.
 
 """
-Write the generated tables of README.md and docs/.
+Write the generated tables of README.md and docs/, and the topics of security/policy.xml.
 
     python docs/figures/tables.py
 
-Parameters come from the tables of the code, measured figures from benchmarks/README.md, the
-errors in the loop from the files in docs/figures/. Each table is between two comments of its page.
+Parameters and topics come from the tables of the code, measured figures from
+benchmarks/README.md, the errors in the loop from the files in docs/figures/. Each table is between
+two comments of its page.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 import json
 import math
 from pathlib import Path
+import re
 from typing import Any
 
+from stewart_dynamics.node.topic_table import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.rules import Parameter
 from stewart_dynamics.parameters.table import Parameters
@@ -61,6 +65,35 @@ def parameters_of(kind: type[ParameterSet]) -> str:
     return rows({name: parameter for name, parameter in kind.table.items()
                  if own or name not in Parameters.table
                  or kind is not SimulatorParameters})
+
+
+def topics(title: str, table: Sequence[Topic], details: bool = True) -> str:
+    """Return a table of topics: all with their details, or those without a parameter."""
+    lines = [f'| {title} | type | meaning |', '| --- | --- | --- |']
+    for topic in table:
+        meaning = topic.meaning + topic.details * details
+        if not details:
+            if topic.parameter:
+                continue
+            meaning = re.sub(r'\]\((\w+\.md)', r'](docs/\1', meaning)
+        if topic.parameter:
+            meaning += f'; with `{topic.parameter}`'
+        lines.append(
+            f'| `{topic.ros_name}` | {topic.kind.replace("/msg", "")} | {meaning} |')
+    return '\n'.join(lines)
+
+
+def granted() -> str:
+    """Return the node's topics in the words of a policy of SROS2."""
+    lines = []
+    for right, table in (('subscribe', SUBSCRIBED), ('publish', PUBLISHED)):
+        for parameter, together in groupby(table, key=lambda topic: topic.parameter):
+            if parameter:
+                lines.append(f'          <!-- {parameter} -->')
+            lines += [f'          <topics {right}="ALLOW">',
+                      *(f'            <topic>{topic.ros_name}</topic>' for topic in together),
+                      '          </topics>']
+    return '\n'.join(lines)
 
 
 def _default(parameter: Parameter) -> str:
@@ -185,8 +218,14 @@ def pages() -> dict[Path, dict[str, str]]:
                                  for name in ('loop', 'ship', 'identify'))
     return {
         ROOT / 'README.md': {
+            'topics': '\n\n'.join((topics('subscribed', SUBSCRIBED, details=False),
+                                  topics('published', PUBLISHED, details=False))),
             'first parameters': rows({name: Parameters.table[name] for name in FIRST}),
             'accuracy and speed': accuracy_and_speed()},
+        ROOT / 'docs' / 'node.md': {
+            'subscribed topics': topics('subscribed', SUBSCRIBED),
+            'published topics': topics('published', PUBLISHED)},
+        ROOT / 'security' / 'policy.xml': {'topics of stewart_dynamics': granted()},
         ROOT / 'docs' / 'parameters.md': {
             'parameters of stewart_dynamics': parameters_of(Parameters),
             'parameters of stewart_trajectory': parameters_of(ReferenceMotionParameters),

@@ -213,6 +213,12 @@ class Preparation:
             self._thread = Thread(target=self._run, daemon=True)
             self._thread.start()
 
+    def finish(self) -> None:
+        """Load or compile what is missing, and return when all of it is ready."""
+        if not self.ready:
+            prepare(self._functions)
+            self.ready = True
+
     def _run(self) -> None:
         try:
             prepare(self._functions)

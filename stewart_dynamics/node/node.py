@@ -48,7 +48,8 @@ from stewart_dynamics.node.model_publisher import ModelPublisher
 from stewart_dynamics.node.payload_service import inertia_message, PayloadService
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.node.repeated_log import RepeatedLog
-from stewart_dynamics.node.topics import LEG_TRAJECTORY, MARKERS, PAYLOAD, Topics
+from stewart_dynamics.node.topic_table import MARKERS, PAYLOAD
+from stewart_dynamics.node.topics import Topics
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
@@ -194,6 +195,10 @@ class DynamicsNode(LifecycleNode):
     def _configure(self) -> None:
         begun = time.monotonic()
         self._models = SIGNALS.interruptible(partial(_Models.of, self._settings))
+        if _expects_measured_legs(self._settings):
+            # Measured legs are expected: none of them is rejected because code is missing.
+            for code in (self._external_wrench_code, self._payload.code):
+                SIGNALS.interruptible(code.finish)
         how = 'compiled ' if machine_code.COMPILED else ''
         self.get_logger().info(f'{how}dynamics ready after {time.monotonic() - begun:.1f} s')
         for mistake in likely_mistakes(self._settings):
@@ -347,6 +352,11 @@ class DynamicsNode(LifecycleNode):
     def _identify_payload(self) -> Iterator[payload.Outcome | None] | payload.Outcome:
         if not self._active:
             return payload.Outcome('the node is not active')
+        if not self._external_wrench_code.ready:
+            self._external_wrench_code.begin()
+            return payload.Outcome(
+                'the code for measured legs is being compiled, which takes seconds, once: move '
+                'the hexapod for payload.window after that, and ask again')
         silence = self._diagnostics.external_wrench.silence(time.monotonic())
         if self._settings['setpoint.timeout'] < silence < math.inf:
             return payload.Outcome(f'measured_legs silent for {silence:.1f} s')
@@ -377,7 +387,7 @@ class DynamicsNode(LifecycleNode):
 
     def _on_outcome(self, outcome: planned.Outcome, came: float) -> None:
         if outcome.answer:
-            self._topics.publishers[LEG_TRAJECTORY].publish(outcome.answer)
+            self._topics.publishers[planned.OUTPUT].publish(outcome.answer)
         self._diagnostics.planned_trajectory.done(outcome, time.monotonic() - came)
         self._report()
 
@@ -439,6 +449,13 @@ class DynamicsNode(LifecycleNode):
             self._diagnostics.limits.parameters = parameters
             self._markers.use(parameters)
         return SetParametersResult(successful=True)
+
+
+def _expects_measured_legs(parameters: Parameters) -> bool:
+    """Return whether parameters announce measured legs."""
+    return (parameters['joint_states.source'] == 'measured'
+            or parameters['external_wrench.force_max'] is not None
+            or parameters['external_wrench.moment_max'] is not None)
 
 
 def main() -> int:

@@ -12,58 +12,28 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics of the dynamics node: types, queues, and what is there while it is configured."""
+"""Publishers and subscriptions of the node, while it is configured; see ``topic_table``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from importlib import import_module
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import (
-    AccelStamped, InertiaStamped, PoseStamped, TwistStamped, WrenchStamped)
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Bool, Float64, Float64MultiArray
+
 from stewart_dynamics.description.joint_states import JOINT_STATES, TF
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
-from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.node.planned_queue import LENGTH
+from stewart_dynamics.node.topic_table import MARKERS, PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.planned import messages as planned
-from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES
-from stewart_dynamics.setpoints.topics import BASE_SOURCES, INPUT_TYPES, SOURCES
-from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
-from visualization_msgs.msg import MarkerArray
+from stewart_dynamics.setpoints.topics import BASE_SOURCES, SOURCES
 
-# Publishers, beside those of OUTPUT_TYPES.
-DIAGNOSTICS, MARKERS, LEG_TRAJECTORY, PAYLOAD = (
-    'diagnostics', 'markers', planned.OUTPUT, 'payload')
-
-# So many messages of a topic may wait in the middleware.
-QUEUE = 1000
-_QUEUES = {planned.INPUT: LENGTH}
-
-_TYPES: dict[str, Any] = {
-    'geometry_msgs/msg/PoseStamped': PoseStamped,
-    'geometry_msgs/msg/TwistStamped': TwistStamped,
-    'geometry_msgs/msg/AccelStamped': AccelStamped,
-    'geometry_msgs/msg/WrenchStamped': WrenchStamped,
-    'trajectory_msgs/msg/MultiDOFJointTrajectory': MultiDOFJointTrajectory,
-    'sensor_msgs/msg/JointState': JointState,
-    'sensor_msgs/msg/Imu': Imu,
-    'std_msgs/msg/Float64MultiArray': Float64MultiArray,
-    'std_msgs/msg/Float64': Float64,
-    'std_msgs/msg/Bool': Bool,
-}
-_INPUT_TYPES = {**INPUT_TYPES, MEASURED_LEGS: 'sensor_msgs/msg/JointState',
-                planned.INPUT: planned.INPUT_TYPE}
+_INPUTS = {topic.name: topic for topic in SUBSCRIBED}
 
 
 class Topics:
@@ -114,31 +84,20 @@ class Topics:
             ``publish_tf`` needs a package that is not installed.
 
         """
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        for topic, name in OUTPUT_TYPES.items():
-            self._publish(topic, _TYPES[name], latched if topic == 'singularity_warning' else
-                          QoSProfile(depth=10))
-        self._publish(PAYLOAD, InertiaStamped, latched)
-        self._publish(EXTERNAL_WRENCH, WrenchStamped, QoSProfile(depth=10))
-        self._publish(LEG_TRAJECTORY, JointTrajectory, QoSProfile(depth=LENGTH))
-        self._publish(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), '/diagnostics')
-        if parameters['visualization_rate']:
-            self._publish(MARKERS, MarkerArray, QoSProfile(depth=1))
-            self._publish(JOINT_STATES, JointState, QoSProfile(depth=10))
-        if parameters['publish_tf']:
-            self._publish(TF, _transforms(), QoSProfile(depth=100), TF)
+        there = {MARKERS: parameters['visualization_rate'] > 0.0, TF: parameters['publish_tf']}
+        there[JOINT_STATES] = there[MARKERS]
+        for topic in PUBLISHED:
+            if there.get(topic.name, True):
+                self._publish(topic)
         # The executor takes messages in the order of the subscriptions: a setpoint needs those of
         # the base that have come before it.
         self.base, self.setpoints = ({
-            topic: self._subscribe(_TYPES[_INPUT_TYPES[topic]], topic, partial(take, topic))
-            for topic in topics} for topics, take in (
-                (BASE_SOURCES[parameters['base.source']], on_base),
-                (SOURCES[parameters['setpoint.source']], on_setpoint)))
+            name: self._subscribe(_INPUTS[name], partial(take, name)) for name in names}
+            for names, take in ((BASE_SOURCES[parameters['base.source']], on_base),
+                                (SOURCES[parameters['setpoint.source']], on_setpoint)))
         inputs = {**self.base, **self.setpoints, **{
-            topic: self._subscribe(
-                _TYPES[_INPUT_TYPES[topic]], topic, callback, _QUEUES.get(topic, QUEUE))
-            for topic, callback in others.items()}}
-        self._names = {topic: subscription.topic_name for topic, subscription in inputs.items()}
+            name: self._subscribe(_INPUTS[name], callback) for name, callback in others.items()}}
+        self._names = {name: subscription.topic_name for name, subscription in inputs.items()}
 
     def writers(self) -> dict[str, int]:
         """Return how many publishers each topic of setpoints and base has."""
@@ -154,18 +113,21 @@ class Topics:
         while self._destroy:
             self._destroy.pop()()
 
-    def _publish(self, topic: str, kind: Any, qos: QoSProfile, name: str = '') -> None:
-        publisher = self._node.create_publisher(kind, name or f'~/{topic}', qos)
+    def _publish(self, topic: Topic) -> None:
+        durability = (DurabilityPolicy.TRANSIENT_LOCAL if topic.latched
+                      else DurabilityPolicy.VOLATILE)
+        publisher = self._node.create_publisher(
+            _message_class(topic.kind), topic.ros_name,
+            QoSProfile(depth=topic.depth, durability=durability))
         self._destroy.append(partial(self._node.destroy_publisher, publisher))
-        self.publishers[topic] = publisher
+        self.publishers[topic.name] = publisher
 
-    def _subscribe(self, kind: Any, topic: str, callback: Callable[[bytes], None],
-                   depth: int = QUEUE) -> Any:
+    def _subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Any:
         subscription = self._node.create_subscription(
-            kind, f'~/{topic}', callback, QoSProfile(depth=depth), raw=True,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            _message_class(topic.kind), topic.ros_name, callback, QoSProfile(depth=topic.depth),
+            raw=True, qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=partial(self._on_incompatible_qos, topic)))
+                incompatible_qos=partial(self._on_incompatible_qos, topic.name)))
         self._destroy.append(partial(self._node.destroy_subscription, subscription))
         return subscription
 
@@ -175,12 +137,13 @@ class Topics:
             f'{qos_policy_name_from_kind(event.last_policy_kind)}: its messages are not received')
 
 
-def _transforms() -> Any:
-    """Return tf2_msgs/TFMessage, which ROS's wheels on PyPI do not contain."""
+def _message_class(name: str) -> Any:
+    """Return the class of a message type; ROS's wheels on PyPI do not contain tf2_msgs."""
+    package, _, message = name.split('/')
     try:
-        from tf2_msgs.msg import TFMessage
+        return getattr(import_module(f'{package}.msg'), message)
     except ImportError as exc:
+        parameter = next(topic.parameter for topic in PUBLISHED if topic.kind == name)
         raise ParameterError(
-            'publish_tf: true: needs the ROS package tf2_msgs, which is not installed (it is part '
+            f'{parameter}: needs the ROS package {package}, which is not installed (it is part '
             'of ROS, but not of its wheels on PyPI)') from exc
-    return TFMessage

@@ -24,9 +24,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 
-# Samples of a topic that wait for those of the others; the oldest is dropped when one more
-# comes. As many as may wait in the node's middleware, which delivers the messages of one topic
-# after those of another.
+# Most samples of a topic that wait for those of the others, and most messages of a topic that wait
+# in the middleware, which may deliver all of one topic before those of another.
 WAITING = 1000
 
 Waiting = dict[int, tuple[float, ...]]
