@@ -43,13 +43,12 @@ from stewart_dynamics.node import parameter_changes
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
-from stewart_dynamics.node.markers_publisher import MarkersPublisher
-from stewart_dynamics.node.model_publisher import ModelPublisher
 from stewart_dynamics.node.payload_service import inertia_message, PayloadService
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.node.repeated_log import RepeatedLog
 from stewart_dynamics.node.topic_table import MARKERS, PAYLOAD
 from stewart_dynamics.node.topics import Topics
+from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory

@@ -13,9 +13,8 @@
 # limitations under the License.
 
 """
-What the dynamics node reports of itself: parts of one protocol, see ``report``.
+The report of the dynamics node: one part for each status, see ``periodic_report``.
 
-``setpoints``, ``singularity``, ``limits``, ``timing``, ``planned_trajectory`` and
-``external_wrench`` have one status each; ``dynamics`` puts them together. They use no ROS and
-no clock: callers pass events and their times, in seconds of a steady clock.
+``dynamics`` puts the parts together. They use no ROS and no clock: callers pass events and their
+times, in seconds of a steady clock.
 """

@@ -16,27 +16,22 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-import math
 
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, Level, LevelLog, LogLine, OK, Status, WARN)
+    ERROR, Held, last_heard, Level, LogLine, NEVER, OK, Part, silent_topics)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base import BaseInput
-from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Setpoint
 
-_NAME = 'base'
-_NEVER = -math.inf
 _QUANTITIES = (('gravity', 'm/s^2', GRAVITY), ('acceleration', 'm/s^2', BASE_ACCELERATION),
                ('angular velocity', 'rad/s', BASE_ANGULAR_VELOCITY),
                ('angular acceleration', 'rad/s^2', BASE_ANGULAR_ACCELERATION))
 
 
-class BaseDiagnostics:
+class BaseDiagnostics(Part):
     """
     Notes what becomes of the base's messages, and for which setpoints its motion is known.
 
@@ -49,17 +44,17 @@ class BaseDiagnostics:
 
     """
 
+    name = 'base'
+
     def __init__(self, parameters: Parameters, topics: Sequence[str]) -> None:
+        super().__init__()
         self._timeout: float = parameters['base.timeout']
-        self._heard = dict.fromkeys(topics, _NEVER)
+        self._heard = dict.fromkeys(topics, NEVER)
         self._samples = 0
-        self._sampled_at = _NEVER
+        self._sampled_at = NEVER
         self._row: Sequence[float] = ()
         self._unknown = 0
-        self._rejections: Counter[Rejection] = Counter()
-        self._held = Held()
         self._unknown_held = Held()
-        self._log = LevelLog(_NAME)
 
     def heard(self, topic: str, now: float) -> None:
         """Note that a message came."""
@@ -82,40 +77,32 @@ class BaseDiagnostics:
             self._unknown += 1
             self._unknown_held.happened(Level(ERROR, self._why(now)), now)
 
-    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
-        """Note a rejection."""
-        self._rejections[rejection] += 1
-        self._held.happened(
-            Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
-
     def level(self, now: float) -> int:
         """Return the present level."""
-        return self._state(now).level if self._heard else OK
+        return self.state(now).level if self._heard else OK
 
-    def status(self, now: float) -> Status | None:
-        """Return the status, None where the base is still."""
+    def state(self, now: float) -> Level:
+        """Return the present level and its cause."""
+        lack, held = self._lack(now), self.held.at(now)
+        return held if held.level > lack.level else lack
+
+    def values(self, now: float) -> list[tuple[str, str]] | None:
+        """Return keys and values, None where the base is still."""
         if not self._heard:
             return None
         values = [('samples', str(self._samples)),
                   ('setpoints without forces, as the base was not known', str(self._unknown))]
         if self._samples:
             values.append(('age of the last sample (s)', f'{now - self._sampled_at:.3f}'))
-        values += [(f'{topic}: last heard (s ago)', 'never' if at == _NEVER
-                    else f'{now - at:.3f}') for topic, at in self._heard.items()]
+        values += last_heard(self._heard, now)
         values += [(f'{name} {axis} ({unit})', f'{number:.6g}') for name, unit, part in _QUANTITIES
                    for axis, number in zip('xyz', self._row[part], strict=False)]
-        values += [(f'rejected, {topic}: {reason}', str(n))
-                   for (topic, reason), n in sorted(self._rejections.items())]
-        return Status(_NAME, *self._state(now), tuple(values))
+        return values + self.rejections()
 
     def log_lines(self, now: float) -> list[LogLine]:
         """Return that there are no forces, and that there are again; rejections are logged."""
         # Where nothing has begun, nothing is wrong.
         return self._log.lines(self._lack(now)) if self._samples or self._unknown else []
-
-    def _state(self, now: float) -> Level:
-        lack, held = self._lack(now), self._held.at(now)
-        return held if held.level > lack.level else lack
 
     def _lack(self, now: float) -> Level:
         """Return whether the base's motion lacks."""
@@ -127,11 +114,9 @@ class BaseDiagnostics:
 
     def _why(self, now: float) -> str:
         """Return why the base's motion is not known."""
-        silent = ', '.join(
-            f'{topic} never came' if at == _NEVER else f'{topic} silent for {now - at:.1f} s'
-            for topic, at in self._heard.items() if now - at > self._timeout)
+        silent = silent_topics(self._heard, self._timeout, now)
         if silent or self.stale(now):
-            return silent or self._held.at(now).message or (
+            return silent or self.held.at(now).message or (
                 'its topics arrive, but are not joined: their stamps differ')
         return ('the stamps of the base and of setpoints differ by more than base.timeout, '
                 f'{self._timeout:g} s')

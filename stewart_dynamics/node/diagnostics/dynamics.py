@@ -22,9 +22,9 @@ from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.node.diagnostics.base import BaseDiagnostics
 from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiagnostics
 from stewart_dynamics.node.diagnostics.limits import LimitsDiagnostics
-from stewart_dynamics.node.diagnostics.payload import PayloadDiagnostics
+from stewart_dynamics.node.diagnostics.outcomes import (
+    PayloadDiagnostics, PlannedTrajectoryDiagnostics)
 from stewart_dynamics.node.diagnostics.periodic_report import Report, TICK
-from stewart_dynamics.node.diagnostics.planned_trajectory import PlannedTrajectoryDiagnostics
 from stewart_dynamics.node.diagnostics.setpoints import Answers, SetpointDiagnostics
 from stewart_dynamics.node.diagnostics.singularity import SingularityDiagnostics
 from stewart_dynamics.node.diagnostics.timing import TimingDiagnostics

@@ -16,25 +16,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 import math
 
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, Level, LevelLog, LogLine, OK, STALE, Status, WARN)
+    ERROR, Level, NEVER, OK, Part, STALE, Status)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.rejections import Rejection
 
-_NAME = 'external wrench'
-_NEVER = -math.inf
 _QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
                'external_wrench.moment_max': ('moment', 'N m')}
 _COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'moment y (N m)',
                'moment z (N m)')
 
 
-class ExternalWrenchDiagnostics:
+class ExternalWrenchDiagnostics(Part):
     """
     Notes what becomes of measured legs.
 
@@ -45,33 +41,27 @@ class ExternalWrenchDiagnostics:
 
     """
 
+    name = 'external wrench'
+
     def __init__(self, parameters: Parameters) -> None:
+        super().__init__()
         self._joints = parameters['joints']
         self._timeout = parameters['setpoint.timeout']
-        self._begun = self._heard = self._estimated_at = _NEVER
+        self._begun = self._heard = self._estimated_at = NEVER
         self._estimated = 0
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
-        self._rejections: Counter[Rejection] = Counter()
-        self._held = Held()
-        self._log = LevelLog(_NAME)
         self._reported = OK  # the level in the last report
 
     def heard(self, now: float) -> None:
         """Note that a message came."""
         self._heard = now
-        if self._begun == _NEVER:
+        if self._begun == NEVER:
             self._begun = now
 
     def silence(self, now: float) -> float:
         """Return how long no message has come [s]."""
         return now - self._heard
-
-    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
-        """Note a rejection."""
-        self._rejections[rejection] += 1
-        self._held.happened(
-            Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
 
     def estimated(self, estimate: Estimate, target: Sequence[float] | None, now: float) -> bool:
         """
@@ -84,40 +74,39 @@ class ExternalWrenchDiagnostics:
             return False
         self._estimated += 1
         self._estimated_at = now
-        self._held.see(Level(ERROR if estimate.overloads else OK,
+        self.held.see(Level(ERROR if estimate.overloads else OK,
                              ', '.join(map(_words, estimate.overloads))), now)
-        return self._held.level(now) != self._reported
+        return self.held.level(now) != self._reported
 
     def level(self, now: float) -> int:
         """Return the present level."""
-        if self._begun == _NEVER:
+        if self._begun == NEVER:
             return OK
-        return STALE if self._is_stale(now) else self._held.level(now)
+        return STALE if self._is_stale(now) else self.held.level(now)
 
-    def status(self, now: float) -> Status | None:
-        """Return the status, None before a measurement has come."""
-        self._reported = self.level(now)
-        if self._begun == _NEVER:
+    def values(self, now: float) -> list[tuple[str, str]] | None:
+        """Return keys and values, None before a measurement has come."""
+        if self._begun == NEVER:
             return None
         values = [('wrenches', str(self._estimated))]
         if self._estimated:
             values.append(('age of the last (s)', f'{now - self._estimated_at:.3f}'))
         if self._estimate is not None:
             values += self._numbers(self._estimate)
-        values += [(f'rejected, {topic}: {reason}', str(n))
-                   for (topic, reason), n in sorted(self._rejections.items())]
-        return Status(_NAME, *self._state(now), tuple(values))
+        return values + self.rejections()
 
-    def log_lines(self, now: float) -> list[LogLine]:
-        """Return the changes of level."""
-        return self._log.lines(self._state(now))
+    def status(self, now: float) -> Status | None:
+        """Return the status for a report, and remember its level."""
+        self._reported = self.level(now)
+        return super().status(now)
 
     def _is_stale(self, now: float) -> bool:
         last = max(self._begun, self._estimated_at)
-        return last != _NEVER and now - last > self._timeout
+        return last != NEVER and now - last > self._timeout
 
-    def _state(self, now: float) -> Level:
-        held = self._held.at(now)
+    def state(self, now: float) -> Level:
+        """Return the present level and its cause."""
+        held = self.held.at(now)
         if not self._is_stale(now):
             return Level(held.level, held.message or 'no overload')
         silent = now - self._heard

@@ -21,12 +21,11 @@ from collections.abc import Callable, Sequence
 from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Status)
+    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Part)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
 
-_NAME = 'limits'
 
 # Legs that are this many times longer than they can be, with positions in mm for m.
 _MILLIMETRES = 1000.0
@@ -37,7 +36,7 @@ class _Limit:
 
     def __init__(self) -> None:
         self.held = Held()
-        self.log = LevelLog(_NAME)
+        self.log = LevelLog(LimitsDiagnostics.name)
         self.setpoints = 0
         """How many have exceeded it."""
         self.worst: Exceedance | None = None
@@ -54,7 +53,7 @@ class _Limit:
         self.worst = max([*exceeded, worst] if worst else exceeded, key=_amount)
 
 
-class LimitsDiagnostics:
+class LimitsDiagnostics(Part):
     """
     Notes which limits setpoints exceed, and the largest force demanded.
 
@@ -67,7 +66,10 @@ class LimitsDiagnostics:
 
     """
 
+    name = 'limits'
+
     def __init__(self, parameters: Parameters, answers: Answers) -> None:
+        super().__init__()
         self._joints: tuple[str, ...] = parameters['joints']
         self.parameters = parameters
         self._answers = answers
@@ -75,7 +77,7 @@ class LimitsDiagnostics:
         self._limits = {name: _Limit() for name in (*LIMITS, JUMP)}
         self._suppressed = 0
         self._exceeding = False
-        self._held = False  # one of them may be held
+        self._any_held = False  # one of them may be held
         self._largest_force, self._its_leg = 0.0, 0
 
     def answered(self, output: Output, now: float) -> None:
@@ -89,7 +91,7 @@ class LimitsDiagnostics:
                 self._largest_force = max(forces, key=abs)
                 self._its_leg = forces.index(self._largest_force)
         if output.exceedances or self._exceeding:
-            self._held = True
+            self._any_held = True
             self._exceeding = bool(output.exceedances)
             suppressed = output.forces is None and output.demanded_forces is not None and (
                 self.parameters['limits.action'] == 'suppress_forces')
@@ -104,17 +106,25 @@ class LimitsDiagnostics:
 
     def level(self, now: float) -> int:
         """Return the present level."""
-        if not self._held:
+        if not self._any_held:
             return OK
         level = max([limit.held.level(now) for limit in self._limits.values()])
-        self._held = level > OK
+        self._any_held = level > OK
         return level
 
-    def status(self, now: float) -> Status:
-        """Return the status."""
+    def state(self, now: float) -> Level:
+        """Return the present level and all causes."""
+        if self._output is None:
+            return Level(OK, 'no setpoint yet')
+        found = [limit.held.at(now).message for limit in self._limits.values()]
+        message = '; '.join(filter(None, found)) or 'all held'
+        return Level(self.level(now), message + self._answers.age(now))
+
+    def values(self, now: float) -> list[tuple[str, str]]:
+        """Return keys and values."""
         output = self._output
         if output is None:
-            return Status(_NAME, OK, 'no setpoint yet', ())
+            return []
         values = [(f'{leg}: length (m)', f'{length:.6g}') for leg, length in
                   zip(self._joints, output.lengths, strict=True)]
         values += [(f'{leg}: rate (m/s)', f'{rate:.6g}') for leg, rate in
@@ -139,16 +149,14 @@ class LimitsDiagnostics:
                            (f'worst since activation, {name}', self._words(limit.worst))]
         if self._suppressed:
             values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
-        found = [limit.held.at(now).message for limit in self._limits.values()]
-        message = '; '.join(filter(None, found)) or 'all held'
-        return Status(_NAME, self.level(now), message + self._answers.age(now), tuple(values))
+        return values
 
     def log_lines(self, now: float) -> list[LogLine]:
         """Return the changes of each kind of limit."""
         return [line for name, limit in self._limits.items()
-                for line in limit.log.lines(self._state(name, limit, now))]
+                for line in limit.log.lines(self._of_kind(name, limit, now))]
 
-    def _state(self, name: str, limit: _Limit, now: float) -> Level:
+    def _of_kind(self, name: str, limit: _Limit, now: float) -> Level:
         state = limit.held.at(now)
         if state.message or limit.worst is None:
             return state

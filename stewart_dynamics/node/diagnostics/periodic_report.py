@@ -20,11 +20,18 @@ A report is due once in a second and whenever the level of a part has changed.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from typing import NamedTuple, Protocol
+from collections import Counter
+from collections.abc import Hashable, Mapping, Sequence
+import math
+from typing import NamedTuple
+
+from stewart_dynamics.setpoints.rejections import Rejection
 
 # Of diagnostic_msgs/DiagnosticStatus.
 OK, WARN, ERROR, STALE = range(4)
+
+# When a message came last that has not come.
+NEVER = -math.inf
 
 # The longest time between two reports [s].
 PERIOD = 1.0
@@ -63,19 +70,6 @@ class LogLine(NamedTuple):
     text: str
     kind: Hashable = None
     """Repeated lines of one kind are limited in number; without it each is logged."""
-
-
-class Part(Protocol):
-    """What has a status of its own."""
-
-    def level(self, now: float) -> int:
-        """Return the present level."""
-
-    def status(self, now: float) -> Status | None:
-        """Return the status for a report, None while there is nothing to report."""
-
-    def log_lines(self, now: float) -> list[LogLine]:
-        """Return what is to be logged since the last report."""
 
 
 class _Seen(NamedTuple):
@@ -150,27 +144,67 @@ class LevelLog:
         return [LogLine(state.level, f'{self._name}: {state.message}')]
 
 
-class LastOutcome:
-    """A status that outcomes change; there is none before the first."""
+class Part:
+    """
+    A part of the report: one status, and the log lines of its changes.
 
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._status: Status | None = None
-        self._log = LevelLog(name)
-        self._lines: list[LogLine] = []
+    Subclasses have a ``name`` and define ``values``, and ``state`` and ``level`` where these are
+    not those of ``held``.
+    """
+
+    name = ''
+
+    def __init__(self) -> None:
+        self.held = Held()
+        self._log = LevelLog(self.name)
+        self._rejections: Counter[Rejection] = Counter()
+
+    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
+        """Note a rejection: it is counted, and a warning while it is held."""
+        self._count(self.held, rejection, details, now)
 
     def level(self, now: float) -> int:
-        """Return the present level."""
-        return self._status.level if self._status else OK
+        """Return the present level, in little time: it is compared behind every answer."""
+        return self.held.level(now)
+
+    def state(self, now: float) -> Level:
+        """Return the present level and its cause."""
+        return self.held.at(now)
+
+    def values(self, now: float) -> list[tuple[str, str]] | None:
+        """Return keys and values of the status; None while there is no status."""
+        raise NotImplementedError
 
     def status(self, now: float) -> Status | None:
-        """Return the status, None before the first outcome."""
-        return self._status
+        """Return the status for a report, None while there is nothing to report."""
+        values = self.values(now)
+        return None if values is None else Status(self.name, *self.state(now), tuple(values))
 
     def log_lines(self, now: float) -> list[LogLine]:
-        """Return the lines since the last call."""
-        lines, self._lines = self._lines, []
-        return lines
+        """Return what is to be logged since the last report: changes of level."""
+        return self._log.lines(self.state(now))
+
+    def _count(self, held: Held, rejection: Rejection, details: str, now: float) -> None:
+        self._rejections[rejection] += 1
+        held.happened(Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
+
+    def rejections(self) -> list[tuple[str, str]]:
+        """Return how often what was rejected, as keys and values."""
+        return [(f'rejected, {topic}: {reason}', str(n))
+                for (topic, reason), n in sorted(self._rejections.items())]
+
+
+def silent_topics(heard: Mapping[str, float], timeout: float, now: float) -> str:
+    """Return the topics without a message for longer than a timeout; empty: none of them."""
+    return ', '.join(
+        f'{topic} never came' if at == NEVER else f'{topic} silent for {now - at:.1f} s'
+        for topic, at in heard.items() if now - at > timeout)
+
+
+def last_heard(heard: Mapping[str, float], now: float) -> list[tuple[str, str]]:
+    """Return when the last message came on each topic, as keys and values."""
+    return [(f'{topic}: last heard (s ago)', 'never' if at == NEVER else f'{now - at:.3f}')
+            for topic, at in heard.items()]
 
 
 class Report:

@@ -16,17 +16,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 import math
 
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, Level, LogLine, STALE, Status, WARN)
+    ERROR, Held, last_heard, Level, LogLine, NEVER, Part, silent_topics, STALE, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_events import SECONDS
 from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection
-
-_NEVER = -math.inf
 
 # Setpoint messages arrive for so long, but no setpoint is complete: that is logged [s].
 _PATIENCE = 0.9
@@ -66,7 +63,7 @@ class Answers:
         return f' (of the last setpoint, {now - self.at:.1f} s ago)'
 
 
-class SetpointDiagnostics:
+class SetpointDiagnostics(Part):
     """
     Notes what becomes of setpoint messages.
 
@@ -83,24 +80,25 @@ class SetpointDiagnostics:
 
     """
 
+    name = 'setpoints'
+
     def __init__(self, parameters: Parameters, topics: Sequence[str], answers: Answers,
                  now: float) -> None:
+        super().__init__()
         self._timeout: float = parameters['setpoint.timeout']
         self._tolerance: float = parameters['setpoint.sync_tolerance']
         self._answers = answers
-        self.heard = dict.fromkeys(topics, _NEVER)
+        self.heard = dict.fromkeys(topics, NEVER)
         """When the last message came on each topic."""
         self._writers: dict[str, int] = {}
         self._readers: dict[str, int] = {}
         self._namesakes = '', 1
         self._lines: list[LogLine] = []
         self._trouble: list[str] = []  # who publishes that should not
-        self._rejections: Counter[Rejection] = Counter()
-        self._rejected = Held()
         self._incomplete = Held()
         # Since when messages arrive that complete no setpoint, as reports have seen it.
         self._incomplete_since = math.inf
-        self._warned_at = _NEVER
+        self._warned_at = NEVER
         # When the last windows of a second began, and how many answers there were.
         self._windows = [(now, 0), (now, 0)]
 
@@ -138,9 +136,8 @@ class SetpointDiagnostics:
 
     def rejected(self, rejection: Rejection, details: str, now: float) -> None:
         """Note a rejection."""
-        self._rejections[rejection] += 1
-        held = self._incomplete if rejection.reason == NOT_JOINED else self._rejected
-        held.happened(Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
+        incomplete = rejection.reason == NOT_JOINED
+        self._count(self._incomplete if incomplete else self.held, rejection, details, now)
 
     def level(self, now: float) -> int:
         """Return the present level."""
@@ -148,10 +145,14 @@ class SetpointDiagnostics:
             return ERROR
         if self._answers.stale(now):
             return STALE
-        return max(self._rejected.level(now), self._incomplete.level(now))
+        return max(self.held.level(now), self._incomplete.level(now))
 
-    def status(self, now: float) -> Status:
-        """Return the status; the rate is that of the last one or two seconds."""
+    def state(self, now: float) -> Level:
+        """Return the present level and its causes."""
+        return Level(self.level(now), self._message(now))
+
+    def values(self, now: float) -> list[tuple[str, str]]:
+        """Return keys and values; the rate is that of the last one or two seconds."""
         answers = self._answers
         (begin, before), (last, _) = self._windows
         seconds = now - begin
@@ -162,13 +163,10 @@ class SetpointDiagnostics:
         values = [('setpoints answered', str(answers.number)), ('rate (Hz)', f'{rate:.1f}')]
         if answers.number:
             values.append(('age of the last (s)', f'{now - answers.at:.3f}'))
-        values += [(f'{topic}: last heard (s ago)', 'never' if at == _NEVER
-                    else f'{now - at:.3f}') for topic, at in self.heard.items()]
+        values += last_heard(self.heard, now)
         values += [(f'{topic}: writers', str(n)) for topic, n in self._writers.items()]
         values += [(f'{topic}: readers', str(n)) for topic, n in self._readers.items()]
-        values += [(f'rejected, {topic}: {reason}', str(n))
-                   for (topic, reason), n in sorted(self._rejections.items())]
-        return Status('setpoints', self.level(now), self._message(now), tuple(values))
+        return values + self.rejections()
 
     def log_lines(self, now: float) -> list[LogLine]:
         """
@@ -184,7 +182,7 @@ class SetpointDiagnostics:
             return lines
         self._incomplete_since = min(self._incomplete_since, now)
         if (last - self._incomplete_since < _PATIENCE or last <= self._warned_at
-                or now - self._warned_at < SECONDS or self._rejected.level(now)):
+                or now - self._warned_at < SECONDS or self.held.level(now)):
             return lines
         self._warned_at = now
         return [*lines, LogLine(WARN, f'setpoints: {self._no_setpoint(now)}')]
@@ -195,14 +193,12 @@ class SetpointDiagnostics:
             found.append(self._no_setpoint(now))
         if found:
             return ', '.join(found)
-        rejected, incomplete = self._rejected.at(now), self._incomplete.at(now)
+        rejected, incomplete = self.held.at(now), self._incomplete.at(now)
         return rejected.message or incomplete.message or 'answered'
 
     def _no_setpoint(self, now: float) -> str:
         """Return why there is no setpoint: silence, rejections or stamps."""
-        silent = ', '.join(
-            f'{topic} never came' if at == _NEVER else f'{topic} silent for {now - at:.1f} s'
-            for topic, at in self.heard.items() if now - at > self._timeout)
-        return 'no setpoint: ' + (silent or self._rejected.at(now).message or (
+        silent = silent_topics(self.heard, self._timeout, now)
+        return 'no setpoint: ' + (silent or self.held.at(now).message or (
             'all topics arrive, but none is joined: their stamps differ by more than '
             f'setpoint.sync_tolerance, {self._tolerance:g} s'))

@@ -18,12 +18,10 @@ from __future__ import annotations
 
 from stewart_dynamics.mechanics.singularity import Cause, LEAVING
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, PERIOD, Status, WARN)
+    ERROR, FINE, Held, Level, LogLine, OK, Part, PERIOD, WARN)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
-
-_NAME = 'singularity'
 
 
 def singularity_state(output: Output, parameters: Parameters) -> Level:
@@ -57,7 +55,7 @@ def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
             f'and is not yet below {LEAVING * bound:g}')
 
 
-class SingularityDiagnostics:
+class SingularityDiagnostics(Part):
     """
     Notes how near a singularity setpoints come.
 
@@ -72,12 +70,14 @@ class SingularityDiagnostics:
 
     """
 
+    name = 'singularity'
+
     def __init__(self, parameters: Parameters, answers: Answers, now: float) -> None:
+        super().__init__()
         self.parameters = parameters
         self._answers = answers
         self._output: Output | None = None
-        self._state, self._crossing = Held(), Held()
-        self._log = LevelLog(_NAME)
+        self._crossing = Held()
         self._crossed = False  # with the last setpoint
         self._crossing_held = False  # it may be
         self._crossings: list[str] = []  # since the last report
@@ -93,7 +93,7 @@ class SingularityDiagnostics:
             self._largest = max(self._largest, output.condition)
         state = singularity_state(output, self.parameters)
         if output.singularity.cause is not Cause.CROSSED:
-            self._state.see(state, now)
+            self.held.see(state, now)
             if self._crossed:
                 self._crossing.see(FINE, now)
                 self._crossed = False
@@ -103,19 +103,27 @@ class SingularityDiagnostics:
         self._crossings.append(crossing.message)
         self._crossing.see(crossing, now)
         stopped = output.singularity.stopped or not output.solvable
-        self._state.see(state if stopped else FINE, now)
+        self.held.see(state if stopped else FINE, now)
         return now - self._crossing_logged_at >= PERIOD
 
     def level(self, now: float) -> int:
         """Return the present level."""
-        level = self._state.level(now)
+        level = self.held.level(now)
         return max(level, self._crossing.level(now)) if self._crossing_held else level
 
-    def status(self, now: float) -> Status:
-        """Return the status."""
+    def state(self, now: float) -> Level:
+        """Return the present level and its causes."""
+        if self._output is None:
+            return Level(OK, 'no setpoint yet')
+        found = [held.at(now).message for held in (self._crossing, self.held)]
+        message = '; '.join(filter(None, found)) or 'clear'
+        return Level(self.level(now), message + self._answers.age(now))
+
+    def values(self, now: float) -> list[tuple[str, str]]:
+        """Return keys and values."""
         output = self._output
         if output is None:
-            return Status(_NAME, OK, 'no setpoint yet', ())
+            return []
         forces = output.unit_load_forces
         worst = max(range(6), key=forces.__getitem__)
         crossing = output.singularity.time_to_crossing
@@ -124,9 +132,7 @@ class SingularityDiagnostics:
         if now - self._second_begin >= 1.0:
             self._second_begin = now
             self._second_before_largest, self._second_largest = self._second_largest, 1.0
-        found = [held.at(now).message for held in (self._crossing, self._state)]
-        message = '; '.join(filter(None, found)) or 'clear'
-        return Status(_NAME, self.level(now), message + self._answers.age(now), (
+        return [
             ('det(J) (m^3)', f'{output.determinant:.9g}'),
             ('d(det(J))/dt (m^3/s)', f'{output.determinant_rate:.9g}'),
             ('time to crossing (s)', f'{crossing:.3f}' if crossing < 1e6 else 'none'),
@@ -135,7 +141,7 @@ class SingularityDiagnostics:
             ('worst condition number of the last second', f'{of_the_last_second:.6g}'),
             ('worst condition number since activation', f'{self._largest:.6g}'),
             ('largest leg force under a unit load', f'{forces[worst]:.6g}'),
-            ('its leg', self.parameters['joints'][worst])))
+            ('its leg', self.parameters['joints'][worst])]
 
     def log_lines(self, now: float) -> list[LogLine]:
         """Return the crossing since the last report, and the change of level besides."""
@@ -143,10 +149,10 @@ class SingularityDiagnostics:
         if self._crossings:
             many = len(self._crossings)
             how_many = f' (the last of {many} crossings)' if many > 1 else ''
-            lines = [LogLine(ERROR, f'{_NAME}: {self._crossings[-1]}{how_many}')]
+            lines = [LogLine(ERROR, f'{self.name}: {self._crossings[-1]}{how_many}')]
             self._crossings = []
             self._crossing_logged_at = now
-        state = self._state.at(now)
+        state = self.held.at(now)
         return lines + self._log.lines(Level(state.level, state.message or 'clear'))
 
 

@@ -20,15 +20,14 @@ from collections import Counter
 from statistics import median
 
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    Held, Level, LevelLog, LogLine, Status, WARN)
+    Level, Part, Status)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 
-_NAME = 'timing'
 _COUNTED = {DROPPED: 'dropped', NOT_JOINED: 'incomplete'}
 
 
-class TimingDiagnostics:
+class TimingDiagnostics(Part):
     """
     Notes processing times and dropped setpoints.
 
@@ -41,10 +40,11 @@ class TimingDiagnostics:
 
     """
 
+    name = 'timing'
+
     def __init__(self, answers: Answers, now: float) -> None:
+        super().__init__()
         self._answers = answers
-        self._held = Held()
-        self._log = LevelLog(_NAME)
         self._counts = Counter(dict.fromkeys(_COUNTED, 0))
         # Processing times [s] of this second and of the one before.
         self._begin = now
@@ -60,15 +60,15 @@ class TimingDiagnostics:
         if rejection.reason in _COUNTED:
             self._counts[rejection.reason] += 1
         if rejection.reason == DROPPED:
-            self._held.happened(
-                Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
+            super().rejected(rejection, details, now)
 
-    def level(self, now: float) -> int:
-        """Return the present level."""
-        return self._held.level(now)
+    def status(self, now: float) -> Status | None:
+        """Return the status; without setpoints now, it says how old the last one is."""
+        status = super().status(now)
+        return status and status._replace(message=status.message + self._answers.age(now))
 
-    def status(self, now: float) -> Status:
-        """Return the status; processing times are those of the last one or two seconds."""
+    def values(self, now: float) -> list[tuple[str, str]]:
+        """Return keys and values; processing times are those of the last one or two seconds."""
         times = self._times_before + self._times
         if now - self._begin >= 1.0:
             self._begin, self._times_before, self._times = now, self._times, []
@@ -77,14 +77,10 @@ class TimingDiagnostics:
             values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
                       ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
         values += [(key, str(self._counts[reason])) for reason, key in _COUNTED.items()]
-        state = self._state(now)
-        return Status(_NAME, state.level, state.message + self._answers.age(now), tuple(values))
+        return values
 
-    def log_lines(self, now: float) -> list[LogLine]:
-        """Return the changes of level."""
-        return self._log.lines(self._state(now))
-
-    def _state(self, now: float) -> Level:
-        state = self._held.at(now)
+    def state(self, now: float) -> Level:
+        """Return the present level and its cause."""
+        state = self.held.at(now)
         return Level(state.level, state.message or (
             'on time' if self._answers.number else 'no setpoint yet'))

@@ -1,0 +1,128 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What shows the hexapod, at most at ``visualization_rate`` and while somebody subscribes.
+
+``~/markers``, ``~/joint_states``, and with every pose the platform's transform on ``/tf``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from stewart_dynamics.description.joint_states import ModelMessages
+from stewart_dynamics.node.markers import Markers
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.step import Output, Setpoint
+
+
+class _PublisherAtRate:
+    """
+    Publishes the last of what is noted, at most at a rate, while somebody subscribes.
+
+    Parameters
+    ----------
+    publisher : Publisher, optional
+        Publishes the bytes that ``_write`` makes; None: nothing is published.
+    rate : float
+        Maximum rate [Hz].
+
+    """
+
+    def __init__(self, publisher: Any, rate: float) -> None:
+        self._publisher = publisher
+        self._period = 1.0 / rate if rate else 0.0
+        self._due = 0.0
+        self._unpublished: tuple[Any, ...] | None = None
+
+    def publish_due(self, now: float) -> None:
+        """Publish the last of what was noted if it is due and there is a subscriber."""
+        if self._unpublished is None or self._publisher is None or now < self._due:
+            return
+        last = self._unpublished
+        # A later subscriber gets nothing of an old setpoint.
+        self._unpublished = None
+        self._due = now + self._period
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(self._write(*last))
+
+    def _write(self, *last: Any) -> bytes:
+        raise NotImplementedError
+
+
+class MarkersPublisher(_PublisherAtRate):
+    """
+    Publishes the markers of the last answer.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        What the markers show, and ``visualization_rate``.
+    publisher : Publisher, optional
+        None where the rate is zero.
+
+    """
+
+    def __init__(self, parameters: Parameters, publisher: Any) -> None:
+        super().__init__(publisher, parameters['visualization_rate'])
+        self.use(parameters)
+
+    def use(self, parameters: Parameters) -> None:
+        """Show other parameters from now on: a payload has another centre of mass."""
+        if self._publisher is not None:
+            self._markers = Markers(parameters)
+
+    def answered(self, setpoint: Setpoint, output: Output) -> None:
+        """Note the last answer."""
+        self._unpublished = setpoint, output
+
+    def _write(self, setpoint: Setpoint, output: Output) -> bytes:
+        return self._markers.write(setpoint.motion, output)
+
+
+class ModelPublisher(_PublisherAtRate):
+    """
+    Publishes the last pose as joint states, and each pose as a transform.
+
+    Parameters
+    ----------
+    messages : ModelMessages
+        Writes their messages.
+    rate : float
+        Maximum rate of ``~/joint_states`` [Hz].
+    joint_states, transforms : Publisher, optional
+        None where the rate is zero, or ``publish_tf`` is false.
+
+    """
+
+    def __init__(self, messages: ModelMessages, rate: float, joint_states: Any, transforms: Any,
+                 ) -> None:
+        super().__init__(joint_states, rate)
+        self._messages, self._transforms = messages, transforms
+        self._read = False  # somebody subscribes to the transforms
+
+    def moved(self, stamp: int, pose: Sequence[float]) -> None:
+        """Note a pose, a row of motion at a stamp [ns], and publish its transform."""
+        self._unpublished = stamp, pose
+        if self._read:
+            self._transforms.publish(self._messages.transform(stamp, pose))
+
+    def look(self) -> None:
+        """Look whether somebody subscribes to the transforms."""
+        self._read = bool(self._transforms and self._transforms.get_subscription_count())
+
+    def _write(self, stamp: int, pose: Sequence[float]) -> bytes:
+        return self._messages.joint_states(stamp, pose)
