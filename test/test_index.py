@@ -59,6 +59,11 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
                 'warnings': 0}, **changes}
 
 
+def rejected(*counts: int) -> list[dict[str, Any]]:
+    return [{'topic': 'setpoint/pose', 'reason': f'reason {n}', 'count': count}
+            for n, count in enumerate(counts)]
+
+
 def row(bag: str, code: int = 0, of: dict[str, Any] | None = None, error: str = '',
         results: str | None = None) -> dict[str, Any]:
     return {**row_of(code, of, error), 'bag': bag, 'results': results}
@@ -75,7 +80,7 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
     limits = [{'limit': f'limits.{limit}', 'leg': leg} for limit, leg in (
         ('length_max', 'leg_2'), ('force_max', 'leg_1'), ('force_max', 'leg_3'))]
     write_fleet(tmp_path, [row('a', 1, summary(
-        [3.0, -120.5, 7.0, 120.0], limits=limits, rejected=[{'count': 3}, {'count': 4}],
+        [3.0, -120.5, 7.0, 120.0], limits=limits, rejected=rejected(3, 4),
         singularity={'determinant_nearest_m3': -1e-7, 'crossings': 2, 'condition_max': 8e3,
                      'warnings': 1}), results='deep/a')])
     assert table(tmp_path) == [{
@@ -89,8 +94,10 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
         'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
         'reason': 'length_max: leg_2; force_max: leg_1, leg_3; 2 crossings of det(J) = 0; '
-                  '1 singularity warning', 'residual_rms_n': '', 'residual_share': '',
-        'contacts': '', 'measured': '', 'results': 'deep/a'}]
+                  '1 singularity warning; setpoint/pose: 4 rejected: reason 1; '
+                  'setpoint/pose: 3 rejected: reason 0',
+        'residual_rms_n': '', 'residual_share': '', 'contacts': '', 'measured': '',
+        'results': 'deep/a'}]
 
 
 def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
@@ -101,8 +108,25 @@ def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
     write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
                            row('b', 3, summary([1.0]), 'cut off')])
     assert [(cells['result'], cells['reason']) for cells in table(tmp_path)] == [
-        ('nothing answered', 'no setpoint could be answered; setpoint/pose: 900 not finite; '
-                             'setpoint/pose: 2 wrong frame_id'), ('incomplete', 'cut off')]
+        ('nothing answered', 'no setpoint could be answered; setpoint/pose: 900 rejected: not '
+                             'finite; setpoint/pose: 2 rejected: wrong frame_id'),
+        ('incomplete', 'cut off')]
+
+
+@pytest.mark.parametrize(('counts', 'code', 'result', 'reason'), [
+    ([10], 0, 'done', 'setpoint/pose: 10 rejected: reason 0'),
+    ([6, 5], 0, 'messages rejected', 'setpoint/pose: 6 rejected: reason 0; setpoint/pose: 5 '
+                                     'rejected: reason 1'),
+    ([900], 1, 'limit or warning', 'setpoint/pose: 900 rejected: reason 0'),
+    ([5, 4, 3, 2, 1], 0, 'messages rejected', '; '.join(
+        f'setpoint/pose: {5 - n} rejected: reason {n}' for n in range(3))
+        + '; 3 rejected for other reasons')])
+def test_rejected_messages_are_a_reason(
+        counts: list[int], code: int, result: str, reason: str, tmp_path: Path) -> None:
+    write_fleet(tmp_path, [row('a', code, summary([1.0], rejected=rejected(*counts)))])
+    cells, = table(tmp_path)
+    assert (cells['result'], cells['reason']) == (result, reason)
+    assert cells['code'] == f'{code}'
 
 
 def test_a_base_that_is_not_known_is_a_reason(tmp_path: Path) -> None:
@@ -293,6 +317,29 @@ def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
     page.page.set_viewport_size({'width': 1047, 'height': 700})
     page.page.emulate_media(media='print')
     assert page.page.eval_on_selector('table', 'it => it.getBoundingClientRect().right') <= 1047
+
+
+@in_browser
+@pytest.mark.parametrize('width', [1440, 390])
+def test_names_are_cut_at_their_beginning(page: Page, tmp_path: Path, width: int) -> None:
+    folder = '/a_folder/of_all_bags/'
+    names = [f'{"long_" * 30}{n}/bag_{n}.mcap' for n in range(2)] + ['short']
+    page.page.set_viewport_size({'width': width, 'height': 600})
+    page.show(tmp_path, [row(f'{folder}{name}', 0, summary([1.0], rejected=rejected(500 * n)),
+                             results=None if n else 'x') for n, name in enumerate(names)])
+    cells = page.page.locator('tbody td:first-child')
+    # without the folder of all of them, which is above
+    assert cells.all_text_contents() == names
+    assert page.page.inner_text('#software').endswith(f'bags in {folder}')
+    assert cells.first.get_attribute('title') == f'{folder}{names[0]}'
+    for n in range(3):
+        cell = cells.nth(n).bounding_box()
+        name = cells.nth(n).locator(':is(a, bdi)').bounding_box()
+        assert name['x'] + name['width'] <= cell['x'] + cell['width']
+    assert page.page.evaluate('document.documentElement.scrollWidth') <= width
+    # many rejected messages are not green
+    assert page.page.locator('tr.code0').count() == 1
+    assert page.page.locator('tr.code1 .pill').all_inner_texts() == ['messages rejected'] * 2
 
 
 @in_browser

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 import json
 from pathlib import Path
+import re
 import time
 from typing import Any, NamedTuple
 
@@ -132,7 +133,8 @@ def failed(task: Task, why: str) -> Ended:
     """Return the outcome of a bag that could not be replayed."""
     why = ' '.join(why.split())
     return Ended(task.bag, task.folder, BAD_INPUT,
-                 row_of(BAD_INPUT, None, why.removeprefix(f'{task.bag}: ')),
+                 # The row has the path already.
+                 row_of(BAD_INPUT, None, re.sub(rf'{re.escape(f"{task.bag}")}(: |/)', '', why)),
                  error=why if why.startswith(f'{task.bag}') else f'{task.bag}: {why}')
 
 

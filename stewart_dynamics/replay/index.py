@@ -43,12 +43,15 @@ Row = Mapping[str, Cell]
 
 RESULTS = ('done', 'limit or warning', 'failed', 'incomplete')
 """The results by exit code."""
+REJECTED = 'messages rejected'
+"""The result of code 0 if messages were rejected, more than a hundredth of the setpoints."""
+_REJECTED_SHARE = 0.01
 NOTHING_ANSWERED = 'nothing answered'
 """The result of code 3 if no setpoint could be answered."""
-SEVERITY = (RESULTS[DONE], RESULTS[LIMIT_MET], RESULTS[PARTLY_READ], NOTHING_ANSWERED,
+SEVERITY = (RESULTS[DONE], REJECTED, RESULTS[LIMIT_MET], RESULTS[PARTLY_READ], NOTHING_ANSWERED,
             RESULTS[BAD_INPUT])
 """The results, the most severe last."""
-# At most so many reasons of rejection are listed in a row.
+# Maximum number of reasons of rejection in a row.
 _LISTED = 3
 
 
@@ -116,6 +119,10 @@ def _exceeded(summary: dict[str, Any]) -> str:
     return '; '.join(f'{limit}: {", ".join(of)}' for limit, of in legs.items())
 
 
+def _rejected(summary: dict[str, Any]) -> int:
+    return sum(each['count'] for each in summary['rejected'])
+
+
 def _singularity(key: str) -> Callable[[dict[str, Any]], Cell]:
     def of(summary: dict[str, Any]) -> Cell:
         cell: Cell = summary['singularity'][key]
@@ -150,8 +157,7 @@ COLUMNS = (
     Column('crossings', 'crossings', '', _singularity('crossings')),
     Column('condition_max', 'condition number', 'max', _singularity('condition_max')),
     Column('warnings', 'warnings', '', _singularity('warnings')),
-    Column('rejected', 'rejected', '',
-           lambda summary: sum(each['count'] for each in summary['rejected'])),
+    Column('rejected', 'rejected', '', _rejected),
     Column('residual_rms_n', 'residual RMS', 'N', _largest_of_legs('residual_rms_n'),
            optional=True),
     Column('residual_share', 'residual share', '',
@@ -182,14 +188,17 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
     if summary is not None:
         cells['software'] = summary['software']
         cells['reason'] = '; '.join([*([error] if error else []), *_reasons(summary)])
-        if not summary['setpoints']['answered']:
+        answered = summary['setpoints']['answered']
+        if not answered:
             cells['result'] = NOTHING_ANSWERED
+        elif code == DONE and _rejected(summary) > _REJECTED_SHARE * answered:
+            cells['result'] = REJECTED
         cells.update({column.key: column.of(summary) for column in COLUMNS if column.of})
     return cells
 
 
 def _reasons(summary: dict[str, Any]) -> list[str]:
-    """Return why a bag that was replayed is not done without limits, warnings and rejections."""
+    """Return limits, warnings and rejections of a bag that was replayed."""
     found = [_exceeded(summary)] if summary['limits'] else []
     found += [f'{name.removeprefix("limits.")} not checked'
               for name in summary['limits_not_checked']]
@@ -200,9 +209,11 @@ def _reasons(summary: dict[str, Any]) -> list[str]:
         found.append(f'{plural(singularity["crossings"], "crossing")} of det(J) = 0')
     if singularity['warnings']:
         found.append(plural(singularity['warnings'], 'singularity warning'))
-    if not points['answered']:
-        most = sorted(summary['rejected'], key=lambda each: -each['count'])
-        found += [f'{each["topic"]}: {each["count"]} {each["reason"]}' for each in most[:_LISTED]]
+    most = sorted(summary['rejected'], key=lambda each: -each['count'])
+    found += [f'{each["topic"]}: {each["count"]} rejected: {each["reason"]}'
+              for each in most[:_LISTED]]
+    if len(most) > _LISTED:
+        found.append(f'{sum(each["count"] for each in most[_LISTED:])} rejected for other reasons')
     return found
 
 
@@ -252,7 +263,8 @@ def _page(output: Path, rows: Sequence[Row]) -> str:
         'software': next((row['software'] for row in rows if 'software' in row), ''),
         'columns': [{'key': column.key, 'head': column.head, 'unit': column.unit,
                      'number': column.number, 'size': column.size} for column in shown],
-        'codes': [row['code'] for row in rows],
+        # The colour of a row.
+        'codes': [LIMIT_MET if row['result'] == REJECTED else row['code'] for row in rows],
         'severity': SEVERITY,
         'links': [_link(output, row) for row in rows],
         'rows': [[_shown(row.get(column.key)) for column in shown] for row in rows],

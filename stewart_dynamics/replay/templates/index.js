@@ -48,6 +48,12 @@ const rows = fleet.rows.map((cells, n) => ({
   text: cells.filter((cell) => typeof cell === 'string').join('\n').toLowerCase(),
 }));
 
+// Names without the folder that all of them are in; a narrow column cuts their beginnings.
+const bags = fleet.rows.map((cells) => cells[at.bag]);
+let folder = bags.length > 1 ? bags[0].slice(0, bags[0].lastIndexOf('/') + 1) : '';
+while (folder && !bags.every((bag) => bag.startsWith(folder))) folder = folder.slice(0, folder.lastIndexOf('/', folder.length - 2) + 1);
+const nameOf = (cells) => cells[at.bag].slice(folder.length);
+
 function lineOf(row) {
   if (row.line) return row.line;
   row.line = element('tr', undefined, 'code' + row.code);
@@ -57,12 +63,10 @@ function lineOf(row) {
     const cell = element('td', undefined, [number ? 'number' : '', marked(key, value)].join(' ').trim());
     if (key === 'bag') {
       cell.title = value;
-      if (fleet.links[row.n] === null) cell.textContent = value;
-      else {
-        const link = element('a', value);
-        link.href = fleet.links[row.n];
-        cell.append(link);
-      }
+      const name = element(fleet.links[row.n] === null ? 'bdi' : 'a', nameOf(row.cells));
+      name.dir = 'ltr';
+      if (name.href !== undefined) name.href = fleet.links[row.n];
+      cell.append(name);
     } else if (key === 'result') {
       const pill = element('span', value, 'pill');
       pill.title = reason;
@@ -180,13 +184,13 @@ function total(name, value, remark) {
   group.append(element('dt', name), about);
   document.getElementById('totals').append(group);
 }
-document.getElementById('software').textContent = fleet.software;
+document.getElementById('software').textContent = [fleet.software, folder].filter((text) => text).join(', bags in ');
 total('bags', shown(rows.length));
 total('setpoints', shown(sum('setpoints')));
 const seconds = sum('duration_s');
 total('recorded', seconds < 120 ? `${seconds.toFixed(1)} s` : seconds < 7200 ? `${(seconds / 60).toFixed(1)} min` : `${(seconds / 3600).toFixed(1)} h`);
 const force = most('force_worst_n', (a, b) => a > b);
-if (force) total('worst force', `${cellText(force.value, at.force_worst_n)} N`, `${force.row.cells[at.force_worst_leg]}, ${force.row.cells[at.bag]}`);
+if (force) total('worst force', `${cellText(force.value, at.force_worst_n)} N`, `${force.row.cells[at.force_worst_leg]}, ${nameOf(force.row.cells)}`);
 const nearest = most('determinant_nearest_m3', (a, b) => a < b);
-if (nearest) total('det(J) nearest 0', `${cellText(nearest.value, at.determinant_nearest_m3)} m³`, nearest.row.cells[at.bag]);
+if (nearest) total('det(J) nearest 0', `${cellText(nearest.value, at.determinant_nearest_m3)} m³`, nameOf(nearest.row.cells));
 show();
