@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters.table import Parameters
+    from stewart_dynamics.planned.approach import approach, rest_to_rest, TimedMotion
     from stewart_dynamics.planned.result import PlannedTrajectory
     from stewart_dynamics.planned.trajectory import check_planned_trajectory
 
@@ -41,8 +42,8 @@ __version__ = '0.1.0'
 __all__ = [
     'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics',
     'Motion', 'MotionError', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
-    'Pose', 'PoseError', 'SingularityError', 'StewartError', 'StewartPlatform', '__version__',
-    'check_planned_trajectory']
+    'Pose', 'PoseError', 'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion',
+    '__version__', 'approach', 'check_planned_trajectory', 'rest_to_rest']
 
 _MODULES = {
     'capability.capability': ('Capability', 'Extent'),
@@ -56,6 +57,7 @@ _MODULES = {
     'mechanics.stewart_platform': ('StewartPlatform',),
     'mechanics.stiffness': ('NaturalModes',),
     'parameters.table': ('Parameters',),
+    'planned.approach': ('TimedMotion', 'approach', 'rest_to_rest'),
     'planned.trajectory': ('check_planned_trajectory',),
     'planned.result': ('PlannedTrajectory',),
 }
@@ -72,5 +74,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return all names, imported or not."""
-    return sorted({*globals(), *__all__})
+    """Return the public names, imported or not."""
+    return sorted(__all__)

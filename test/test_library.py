@@ -35,7 +35,7 @@ PLATFORM = ROOT / 'config' / 'platform.yaml'
 def test_all_names_resolve_and_are_listed() -> None:
     for name in stewart_dynamics.__all__:
         assert getattr(stewart_dynamics, name) is not None
-        assert name in dir(stewart_dynamics)
+    assert dir(stewart_dynamics) == sorted(stewart_dynamics.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'Platform'"):
         _ = stewart_dynamics.Platform
     with pytest.raises(ImportError):

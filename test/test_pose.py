@@ -164,3 +164,14 @@ def test_representations_are_short() -> None:
     assert repr(Pose(POSITION, UPRIGHT)) == (
         '<Pose: position [1, 2, 3] m, quaternion [0, 0, 0, 1]>')
     assert len(repr(motion[0, 0])) < 150
+
+
+def test_angles_may_be_in_degrees() -> None:
+    degrees = np.array([[10.0, -20.0, 30.0], [0.0, 5.0, -170.0]])
+    derivatives = [None, 2.0 * degrees, None, 3.0 * degrees]
+    position = [0.1, 0.2, 1.0]
+    assert Pose.from_euler(position, degrees, degrees=True) == Pose.from_euler(
+        position, np.radians(degrees))
+    given = Motion.from_euler(position, degrees, *derivatives, degrees=True)
+    assert given == Motion.from_euler(position, np.radians(degrees), *(
+        None if each is None else np.radians(each) for each in derivatives))

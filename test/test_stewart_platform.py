@@ -20,6 +20,7 @@ from __future__ import annotations
 import copy
 import inspect
 import pickle
+import sys
 from typing import Any
 
 from hypothesis import given, settings
@@ -80,7 +81,8 @@ def test_other_types_are_rejected(platform: StewartPlatform, given: Any) -> None
                  platform.coriolis_matrix, platform.inverse_jacobian_rate,
                  lambda at: platform.twist(at, np.ones(6)),
                  lambda at: platform.forward_dynamics(at, np.ones(6)),
-                 lambda at: platform.forward_kinematics(np.ones(6), at),
+                 # None is home.
+                 lambda at: platform.forward_kinematics(np.ones(6), '' if at is None else at),
                  lambda at: platform.stiffness(at, 1e6),
                  lambda at: platform.natural_modes(at, 1e6)):
         with pytest.raises(MotionError, match='^(pose|motion|guess): .* must be a (Pose|Motion)'):
@@ -341,3 +343,56 @@ def test_christoffel_symbols_give_the_same_force(platform: StewartPlatform) -> N
     twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)[..., None]
     assert each_relative(platform.coriolis_matrix(motion, christoffel=True) @ twist,
                          platform.coriolis_matrix(motion) @ twist) < 1e-12
+
+
+# Results as text, as a table and as a figure
+
+def test_one_result_shows_its_numbers() -> None:
+    platform = StewartPlatform(EXAMPLE)
+    result = platform.inverse_dynamics(Motion.from_pose(platform.home_pose()))
+    text = repr(result)
+    assert f'forces [{result.forces[0]:.6g}, ' in text
+    assert f'condition number {result.condition_number:.6g}>' in text
+    assert text.startswith(f'<InverseDynamics: lengths [{result.lengths[0]:.6g}, ')
+
+
+@pytest.mark.parametrize('shape', [(), (4,), (2, 3)])
+def test_results_are_columns_of_a_table(shape: tuple[int, ...]) -> None:
+    platform = StewartPlatform(EXAMPLE)
+    position = np.broadcast_to([0.0, 0.0, 1.1], (*shape, 3)) + rng().normal(0.0, 0.01, (*shape, 3))
+    result = platform.inverse_dynamics(Motion(position, np.eye(3)))
+    table = result.to_dict()
+    size = int(np.prod(shape))
+    assert {column.shape for column in table.values()} == {(size,)}
+    for name in ('lengths', 'rates', 'forces', 'unit_load_forces'):
+        columns = np.stack([table[f'{name[:-1]}_{leg}'] for leg in range(1, 7)], axis=-1)
+        assert np.array_equal(columns.reshape(*shape, 6), getattr(result, name))
+    for name in ('determinant', 'determinant_rate', 'condition_number', 'time_to_crossing'):
+        assert np.array_equal(table[name].reshape(shape), getattr(result, name))
+
+
+def test_results_are_drawn_where_matplotlib_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    platform = StewartPlatform(EXAMPLE)
+    position = np.array([[0.0, 0.0, 1.1], [0.0, 0.0, 1.12], [0.0, 0.0, 1.15]])
+    result = platform.inverse_dynamics(Motion(position, np.eye(3)))
+    times = [0.0, 0.1, 0.3]
+    axes = result.plot(times).axes
+    assert [each.get_ylabel() for each in axes] == ['length [m]', 'rate [m/s]', 'force [N]']
+    for each, values in zip(axes, (result.lengths, result.rates, result.forces), strict=True):
+        lines = each.get_lines()
+        assert np.array_equal(lines[0].get_xdata(), times)
+        assert np.array_equal(np.stack([line.get_ydata() for line in lines], axis=-1), values)
+    with pytest.raises(MotionError, match=r'times: shape \(2,\)'):
+        result.plot([0.0, 0.1])
+    with pytest.raises(MotionError, match=r'plot: results of shape \(\): must be \(N,\)'):
+        platform.inverse_dynamics(Motion(position[0], np.eye(3))).plot()
+    monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
+    with pytest.raises(ModuleNotFoundError, match='plot: matplotlib is not installed: pip'):
+        result.plot()
+
+
+def test_forward_kinematics_begins_at_home() -> None:
+    platform = StewartPlatform(EXAMPLE)
+    pose = Pose.from_euler([0.1, -0.05, 1.25], [0.1, 0.05, -0.2])
+    found = platform.forward_kinematics(platform.inverse_kinematics(pose))
+    assert np.abs(found.rows - pose.rows).max() < 1e-11

@@ -79,6 +79,11 @@ class MeasuredLegs:
         self._history = history
         self._last: Estimate | None = None
 
+    @property
+    def motion(self) -> tuple[float, ...] | None:
+        """Row of motion of the last message that was used."""
+        return self._last.motion if self._last else None
+
     def take(self, data: bytes, known: Six, target: tuple[float, ...] | None,
              base: BaseInput | None = None) -> Estimate | None:
         """

@@ -295,7 +295,7 @@ class StewartPlatform:
             lengths = leg_lengths(self.constants, pose.rows)
         return check_finite('leg lengths', lengths, len(pose.shape))
 
-    def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion) -> Pose:
+    def forward_kinematics(self, lengths: ArrayLike, guess: Pose | Motion | None = None) -> Pose:
         """
         Return the pose of six leg lengths, on the guess's side of singularities.
 
@@ -306,9 +306,9 @@ class StewartPlatform:
         ----------
         lengths : (..., 6)
             [m]
-        guess : Pose or Motion
-            Where to begin: the last pose, or the one commanded. From 20 % of the platform's
-            height and 0.2 rad away it converges nearly always (benchmarks/README.md).
+        guess : Pose or Motion, optional
+            Where to begin: the last pose, or the one commanded; by default home. From 20 % of the
+            platform's height and 0.2 rad away it converges nearly always (benchmarks/README.md).
 
         Raises
         ------
@@ -318,6 +318,8 @@ class StewartPlatform:
             The guess is singular, or a pose in the iteration.
 
         """
+        if guess is None:
+            guess = self.home_pose()
         row = self._single.forward_kinematics(lengths, guess)
         if row is not None:
             return Pose.of_rows(row)

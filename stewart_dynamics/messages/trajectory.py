@@ -25,7 +25,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array
+from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.messages.cdr import (
     COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, ORDERS, put_count, put_text,
     READ_ERRORS, sequence, text, TIME_AND_LENGTH)
@@ -169,14 +169,14 @@ class LegTrajectory:
         if self._shared:
             self._records[:1].view('<u4')[:2] = size, 6
 
-    def put(self, first: int, points: NDArray[np.void], positions: Array,
-            velocities: Array, efforts: Array) -> None:
-        """Write points from an index on; their time_from_start is that of the other points."""
-        records = self._records[first:first + len(points)]
+    def put(self, first: int, times: Stamps, positions: Array, velocities: Array,
+            efforts: Array) -> None:
+        """Write points from an index on, with their time_from_start [ns]."""
+        records = self._records[first:first + len(times)]
         records['position'], records['velocity'] = positions, velocities
         if self._effort:
             records['effort'] = efforts
-        records['sec'], records['nanosec'] = points['sec'], points['nanosec']
+        records['sec'], records['nanosec'] = np.divmod(times, 1_000_000_000)
 
     def message(self) -> bytes:
         """Return the message."""

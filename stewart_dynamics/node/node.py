@@ -381,8 +381,11 @@ class DynamicsNode(LifecycleNode):
             return
         # Parameters, load and gravity are those of now, whatever changes meanwhile.
         base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
-        self._planned.add(
-            planned.answer(self._settings, self._setpoints.wrench, data, base), now)
+        measured = (
+            self._measured_legs.motion if self._diagnostics.external_wrench.silence(now)
+            <= self._settings['setpoint.timeout'] else None)
+        self._planned.add(planned.answer(
+            self._settings, self._setpoints.wrench, data, base, measured), now)
 
     def _on_outcome(self, outcome: planned.Outcome, came: float) -> None:
         if outcome.answer:

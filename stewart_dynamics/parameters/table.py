@@ -59,6 +59,8 @@ def _meshes() -> Iterator[Parameter]:
 
 AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'
 """Values of geometry.platform_side."""
+IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'
+"""Values of trajectory.approach."""
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
@@ -180,6 +182,10 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('trajectory.effort', 'bool', 'publish forces with the points of ~/leg_trajectory; '
               'a joint_trajectory_controller without an effort command interface rejects points '
               'with effort', default=True),
+    Parameter('trajectory.approach', 'string', 'where ~/platform_trajectory may start: anywhere; '
+              'check: where the measured legs are, to 1 % of singularity.characteristic_length; '
+              'prepend: a motion from rest there to the first point is put before it', '',
+              IGNORE, choices=(IGNORE, CHECK, PREPEND)),
     Parameter('external_wrench.cutoff', 'double',
               'cut-off frequency of the low-pass filter on ~/external_wrench', 'Hz', 10.0,
               minimum=0.0, above=True, while_active=True),

@@ -21,7 +21,7 @@ setpoints are answered between them.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,15 +29,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Six, Stamps
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LINEAR_ACCELERATION, MOTION,
-    POSITION, ROTATION)
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LENGTHS, LINEAR_ACCELERATION,
+    MOTION, POSE, POSITION, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
+from stewart_dynamics.planned.approach import approach_in_pieces
 from stewart_dynamics.planned.result import PlannedTrajectory
 from stewart_dynamics.planned.trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE)
@@ -54,6 +56,12 @@ _READ = 2 * PIECE
 _WRITTEN = 8 * PIECE
 
 QUEUE_FULL = 'queue full'
+NOT_MEASURED = 'measured legs not known'
+STARTS_ELSEWHERE = 'does not start where the legs are'
+NO_APPROACH = 'no approach to the first point'
+
+# Of trajectory.approach, in characteristic lengths.
+START_TOLERANCE = 0.01
 
 _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 
@@ -86,7 +94,7 @@ def rejected(reason: str, details: str) -> Outcome:
 
 
 def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None = None,
-           ) -> Iterator[Outcome | None]:
+           measured: Sequence[float] | None = None) -> Iterator[Outcome | None]:
     """
     Yield None after each piece of the work, and the outcome at the end.
 
@@ -102,14 +110,21 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
     base : (BASE,), optional
         A row of the base's motion for a trajectory without the base, one of nan: it is not
         known; none: it is still.
+    measured : (MOTION,), optional
+        A row of motion of the platform as measured, for ``trajectory.approach``.
 
     """
+    platform = StewartPlatform(parameters)
     try:
         message = _checked_header(data, parameters['base_frame'])
         times, rows, given = yield from _read(message, parameters)
         if given is None and base is not None and np.isnan(base).any():
             raise _RejectedError(
                 BASE_NOT_KNOWN, 'give it with the points, or publish the topics of the base')
+        bases = base if given is None else given
+        if parameters['trajectory.approach'] != IGNORE:
+            times, rows, bases = yield from _from_measured(
+                platform, times, rows, np.array(wrench), bases, measured)
     except MalformedError as exc:
         yield rejected(MALFORMED, str(exc))
         return
@@ -117,14 +132,13 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
         yield exc.outcome
         return
     result = None
-    for result in check_in_pieces(StewartPlatform(parameters), times, rows, np.array(wrench),
-                                  base if given is None else given):
+    for result in check_in_pieces(platform, times, rows, np.array(wrench), bases):
         if result is None:
             yield None
     assert result is not None  # the last one
     written = b''
     if result.accepted:
-        written = yield from _written(parameters, message, result)
+        written = yield from _written(parameters, message.stamp, times, result)
     yield Outcome(result.message, result.reason, written, result.warning,
                   _values(parameters, result))
 
@@ -178,6 +192,45 @@ def _read(message: PlatformTrajectory, parameters: Parameters,
     return times, rows, bases
 
 
+def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench: Array,
+                   bases: Array | None, measured: Sequence[float] | None,
+                   ) -> Generator[None, None, tuple[Stamps, Array, Array | None]]:
+    """
+    Return times, rows and bases that start where the measured legs are.
+
+    A trajectory that starts elsewhere is rejected, or gets an approach before it.
+    """
+    p = platform.parameters
+    if measured is None:
+        raise _RejectedError(NOT_MEASURED, 'trajectory.approach needs ~/measured_legs')
+    start = np.zeros(MOTION)
+    start[POSE] = measured[POSE]
+    lengths = platform.solve(np.stack([start, rows[0]]))[:, LENGTHS]
+    away = np.abs(lengths[1] - lengths[0])
+    tolerance = START_TOLERANCE * p['singularity.characteristic_length']
+    if away.max() <= tolerance:
+        return times, rows, bases
+    leg = int(np.argmax(away))
+    if p['trajectory.approach'] == CHECK:
+        raise _RejectedError(
+            STARTS_ELSEWHERE, f'{p["joints"][leg]} is {away[leg]:.4g} m from its first length, '
+            f'more than {tolerance:.4g} m')
+    first = bases if bases is None or bases.ndim == 1 else bases[0]
+    found = None
+    try:
+        for found in approach_in_pieces(platform, start, rows[0], wrench, first):
+            if found is None:
+                yield
+    except MotionError as exc:
+        raise _RejectedError(NO_APPROACH, str(exc)) from exc
+    assert found is not None  # the last one
+    before = np.rint(found.times[:-1] * 1e9).astype(np.int64)
+    times = np.concatenate([before, times - times[0] + round(found.times[-1] * 1e9)])
+    if bases is not None and bases.ndim == 2:
+        bases = np.concatenate([np.repeat(bases[:1], len(before), axis=0), bases])
+    return times, np.concatenate([found.motion.rows[:-1], rows]), bases
+
+
 def _numbers(points: NDArray[np.void], joint: int) -> Array:
     """Return pose, twist and acceleration of a joint at points (N, 19)."""
     return np.column_stack([points[part][:, joint] for part in ('pose', 'twist', 'accel')])
@@ -200,17 +253,16 @@ def _rows(first: int, numbers: Array) -> Array:
     return rows
 
 
-def _written(parameters: Parameters, message: PlatformTrajectory, result: PlannedTrajectory,
+def _written(parameters: Parameters, stamp: int, times: Stamps, result: PlannedTrajectory,
              ) -> Generator[None, None, bytes]:
     """Return the trajectory_msgs/JointTrajectory of an accepted trajectory."""
     answer = LegTrajectory(
-        message.stamp, parameters['joints'], result.points, parameters['trajectory.effort'])
+        stamp, parameters['joints'], result.points, parameters['trajectory.effort'])
     for first in range(0, result.points, _WRITTEN):
         some = slice(first, min(first + _WRITTEN, result.points))
         answer.put(
-            first, message.points(some.start, some.stop),
-            result.lengths[some] - parameters['geometry.zero_length'], result.rates[some],
-            result.forces[some])
+            first, times[some], result.lengths[some] - parameters['geometry.zero_length'],
+            result.rates[some], result.forces[some])
         yield
     return answer.message()
 

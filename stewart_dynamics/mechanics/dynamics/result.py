@@ -16,12 +16,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.arguments import as_array
+from stewart_dynamics.mechanics.frames.fields import listed
 from stewart_dynamics.mechanics.rows import (
-    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
+    CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, RESULT, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity import time_to_crossing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class InverseDynamics:
@@ -107,8 +116,65 @@ class InverseDynamics:
     # The arrays are mutable.
     __hash__ = None  # type: ignore[assignment]
 
+    def to_dict(self) -> dict[str, Array]:
+        """
+        Return the numbers as columns, each (N,), as ``pandas.DataFrame`` takes them.
+
+        Leading shapes are flattened; SI units. The columns of the legs end in _1 to _6.
+        """
+        rows = self.rows.reshape(-1, RESULT)
+        legs = {f'{name}_{leg + 1}': rows[:, part.start + leg]
+                for name, part in (('length', LENGTHS), ('rate', RATES), ('force', FORCES),
+                                   ('unit_load_force', UNIT_LOAD_FORCES)) for leg in range(6)}
+        return {**legs, 'determinant': rows[:, DETERMINANT],
+                'determinant_rate': rows[:, DETERMINANT_RATE],
+                'condition_number': rows[:, CONDITION],
+                'time_to_crossing': np.reshape(self.time_to_crossing, -1)}
+
+    def plot(self, times: ArrayLike | None = None) -> Figure:
+        """
+        Return a matplotlib figure of lengths, rates and forces.
+
+        Parameters
+        ----------
+        times : (N,), optional
+            Of the samples [s]; by default their numbers are the axis.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            Matplotlib is not installed.
+        MotionError
+            There is one sample alone, or times do not fit.
+
+        """
+        try:
+            from matplotlib.figure import Figure
+        except ImportError as exc:
+            raise ModuleNotFoundError('plot: matplotlib is not installed: '
+                                      'pip install matplotlib') from exc
+        if self.rows.ndim != 2:
+            raise MotionError(f'plot: results of shape {self.rows.shape[:-1]}: must be (N,)')
+        size = len(self.rows)
+        across = np.arange(size) if times is None else as_array('times', times, (size,))
+        figure = Figure(figsize=(8.0, 8.0), layout='constrained')
+        for axes, name, values in zip(
+                figure.subplots(3, 1, sharex=True),
+                ('length [m]', 'rate [m/s]', 'force [N]'),
+                (self.lengths, self.rates, self.forces), strict=True):
+            axes.plot(across, values, label=[f'leg {leg}' for leg in range(1, 7)])
+            axes.set_ylabel(name)
+            axes.grid(alpha=0.3)
+        axes.set_xlabel('sample' if times is None else 'time [s]')
+        figure.axes[0].legend(ncols=6)
+        return figure
+
     def __repr__(self) -> str:
-        """Return the shape, not the arrays."""
+        """Return the numbers of a single sample, or the shape."""
+        if self.rows.ndim == 1:
+            return (f'<InverseDynamics: lengths {listed(self.lengths)} m, rates '
+                    f'{listed(self.rates)} m/s, forces {listed(self.forces)} N, condition number '
+                    f'{self.condition_number:.6g}>')
         return (f'<InverseDynamics of shape {self.rows.shape[:-1]}: lengths, rates, forces, '
                 'unit_load_forces, determinant, determinant_rate, condition_number, '
                 'time_to_crossing>')

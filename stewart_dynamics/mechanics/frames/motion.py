@@ -126,7 +126,7 @@ class Motion(Posed):
             cls, position: ArrayLike, angles: ArrayLike,
             linear_velocity: ArrayLike | None = None, angle_rates: ArrayLike | None = None,
             linear_acceleration: ArrayLike | None = None,
-            angle_accelerations: ArrayLike | None = None,
+            angle_accelerations: ArrayLike | None = None, *, degrees: bool = False,
     ) -> Motion:
         """
         Return the motion given by the paper's angles and their derivatives, converted exactly.
@@ -138,6 +138,8 @@ class Motion(Posed):
         angles, angle_rates, angle_accelerations : (..., 3)
             alpha, beta, gamma of R = Rz(gamma) Ry(beta) Rx(alpha) [rad], and their first and
             second time derivatives.
+        degrees : bool
+            Angles and their derivatives are in degrees.
 
         """
         angle = as_array('angles', angles, (3,))
@@ -145,6 +147,8 @@ class Motion(Posed):
         acceleration = optional_array('angle_accelerations', angle_accelerations, (3,))
         common_shape(angles=angle.shape[:-1], angle_rates=rate.shape[:-1],
                      angle_accelerations=acceleration.shape[:-1])
+        if degrees:
+            angle, rate, acceleration = map(np.radians, (angle, rate, acceleration))
         with np.errstate(over='ignore', invalid='ignore'):
             e = rotations.euler_rate_matrix(angle)
             omega = _apply(e, rate)

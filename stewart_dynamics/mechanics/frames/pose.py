@@ -98,7 +98,7 @@ class Pose(Posed):
         self.shape = self.rows.shape[:-1]
 
     @classmethod
-    def from_euler(cls, position: ArrayLike, angles: ArrayLike) -> Pose:
+    def from_euler(cls, position: ArrayLike, angles: ArrayLike, *, degrees: bool = False) -> Pose:
         """
         Return the pose of the paper's angles.
 
@@ -108,9 +108,12 @@ class Pose(Posed):
             [m]
         angles : (..., 3)
             alpha, beta, gamma of R = Rz(gamma) Ry(beta) Rx(alpha) [rad].
+        degrees : bool
+            Angles are in degrees.
 
         """
-        return cls(position, rotations.from_euler(as_array('angles', angles, (3,))))
+        given = as_array('angles', angles, (3,))
+        return cls(position, rotations.from_euler(np.radians(given) if degrees else given))
 
     @classmethod
     def from_quaternion(cls, position: ArrayLike, quaternion: ArrayLike) -> Pose:
