@@ -20,8 +20,8 @@ from referees import ROOT
 
 from stewart_dynamics import Parameters
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
-from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
 from stewart_dynamics.node.diagnostics.outcomes import PlannedTrajectoryDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
 from stewart_dynamics.planned.messages import Outcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'

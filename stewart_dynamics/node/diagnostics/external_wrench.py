@@ -75,7 +75,7 @@ class ExternalWrenchDiagnostics(Part):
         self._estimated += 1
         self._estimated_at = now
         self.held.see(Level(ERROR if estimate.overloads else OK,
-                             ', '.join(map(_words, estimate.overloads))), now)
+                            ', '.join(map(_words, estimate.overloads))), now)
         return self.held.level(now) != self._reported
 
     def level(self, now: float) -> int:
