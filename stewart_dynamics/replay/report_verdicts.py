@@ -22,7 +22,7 @@ from datetime import datetime, timezone
 import re
 from typing import Any, NamedTuple
 
-from stewart_dynamics.mechanics.limits import OF_JOINTS, QUANTITIES
+from stewart_dynamics.mechanics.limits import LIMITS, OF_JOINTS, QUANTITIES
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 Summary = Mapping[str, Any]
@@ -107,10 +107,11 @@ def _margin_column(name: str, unit: str) -> MarginColumn:
     suffix = unit.lower().replace('/', '_')
     return MarginColumn(
         name, unit, f'{name.replace(" ", "_")}_margin_{suffix}',
-        tuple(limit for limit, quantity in QUANTITIES.items() if quantity == (name, unit)))
+        tuple(limit for limit in LIMITS if QUANTITIES[limit] == (name, unit)))
 
 
-_MARGINS = [_margin_column(*quantity) for quantity in dict.fromkeys(QUANTITIES.values())]
+_MARGINS = [_margin_column(*quantity) for quantity in dict.fromkeys(
+    QUANTITIES[limit] for limit in LIMITS)]
 
 
 def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
