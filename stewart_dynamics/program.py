@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the programs without ROS have in common: exit codes, messages in one line, signals."""
+"""Exit codes, messages in one line and signals of the programs without ROS."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 class Program:
     """
-    A program: what it prints, and how it ends.
+    A program: its output and its end.
 
     Parameters
     ----------
     name : str
-        Of the executable, before each message on stderr.
+        Name of the executable, in front of each message on stderr.
 
     """
 

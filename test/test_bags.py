@@ -26,7 +26,7 @@ from stewart_dynamics.bags.find import find_bags, folders_of_results
 
 
 def make(folder: Path, *names: str) -> Path:
-    """Make files, all of them empty: what is in a bag is not looked at."""
+    """Make empty files: the content of a bag is not read."""
     for name in names:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)

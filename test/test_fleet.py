@@ -225,7 +225,7 @@ def test_bad_bags_do_not_stop_the_others(bags: Path, tmp_path: Path) -> None:
         'singular': LIMIT_MET}
     assert fleet.code(strict=True) == BAD_INPUT
     assert fleet._replace(ended=(ended['singular'], ended['cut'])).code(True) == PARTLY_READ
-    # each is named, with what is wrong, in one line
+    # each is named, with its error, in one line
     head, *told = fleet.text().splitlines()
     assert head == (
         '16 bags: 10 done, 1 messages rejected, 1 limit or warning, 1 incomplete, 3 failed')

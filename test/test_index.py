@@ -255,7 +255,7 @@ def six() -> list[dict[str, Any]]:
 def test_a_click_on_a_head_sorts(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, six())
     assert page.column('bag') == ['b', 'a10', 'a9', 'C', 'd', 'e']
-    # by size, not as text; what has no value last
+    # by size, not as text; empty cells last
     assert page.sort('force_worst_n') == 'ascending'
     assert page.column('bag') == ['d', 'b', 'C', 'a10', 'e', 'a9']
     assert page.column('force_worst_n')[:5] == [

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Bags of all kinds, whole and damaged: what is read of each, and what is reported."""
+"""Bags of all kinds, whole and damaged: the messages read of each, and its reports."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ TYPES = {f'{NODE}/{topic}': kind for topic, kind in INPUT_TYPES.items()}
 
 
 def mcap(of: Iterable[Recorded], **options: Any) -> bytes:
-    """Return a bag as mcap's own writer writes it, in small chunks unless told otherwise."""
+    """Return a bag as mcap's own writer writes it, in small chunks by default."""
     stream = BytesIO()
     writer = McapWriter(stream, **{
         'chunk_size': 2000, 'compression': CompressionType.NONE, **options})
@@ -183,7 +183,7 @@ def is_part(part: Iterable[Any], whole: Iterable[Any]) -> bool:
 
 
 def check(file: Path, whole: list[Recorded]) -> bool:
-    """Check what is read of a damaged file; return whether all of it was."""
+    """Check the messages read of a damaged file; return whether all were read."""
     try:
         found = read(file)
     except BagError as exc:
@@ -246,7 +246,7 @@ def test_the_rows_of_a_damaged_bag_are_rows_of_the_whole_one(
     file = tmp_path / 'bag.mcap'
 
     def run(content: bytes, out: Path) -> tuple[int, list[str], str]:
-        """Return the exit code, the rows and what is said to be wrong."""
+        """Return the exit code, the rows and stderr."""
         file.write_bytes(content)
         code = main([str(file), '--params', str(PARAMS), '--output', str(out), '--no-report'])
         table = out / 'bag' / 'legs.csv'
@@ -377,7 +377,7 @@ def test_unchunked_bags_are_read_with_a_notice(tmp_path: Path) -> None:
         found = read(file)
         assert found[:2] == (given_, [])
         assert len(found.notices) == 1
-        # what comes before a cut is read
+        # up to a cut it is read
         file.write_bytes(content[:len(content) // 2])
         found = read(file)
         assert 30 < len(found.messages) < 60
@@ -527,7 +527,7 @@ def test_topics_recorded_one_after_the_other_are_merged(tmp_path: Path) -> None:
 # Memory
 
 def peak_of(file: Path, *topics: str) -> int:
-    read(file, *topics)  # what is compiled and loaded once does not count
+    read(file, *topics)  # loading the machine code does not count
     tracemalloc.start()
     try:
         recording = Recording(file)

@@ -77,7 +77,7 @@ Recorded = tuple[str, int, bytes]
 
 
 class Outputs(NamedTuple):
-    """What a replay wrote of one bag, as the independent reader of MCAP gives it."""
+    """Outputs of a replay, as the independent reader of MCAP gives them."""
 
     messages: dict[str, list[tuple[int, Any]]]
     """Of each topic: record times and messages."""
@@ -126,7 +126,7 @@ def nanoseconds(message: Any) -> int:
 
 def write_bag(folder: Path, of: Iterable[Recorded], node: str = NODE,
               plugin: StoragePlugin = StoragePlugin.MCAP, **types: str) -> Path:
-    """Write a rosbag2; topics are made as they come, ``types`` overrides what they are."""
+    """Write a rosbag2; topics are made as they come, ``types`` overrides their types."""
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         connections: dict[str, Any] = {}
         for topic, when, data in of:
@@ -196,7 +196,7 @@ def library_motion(name: str) -> Motion:
     return Motion(position, np.reshape(rotation, (-1, 3, 3)), *rates)
 
 
-# What it writes
+# Outputs
 
 @pytest.mark.parametrize('name', BAGS)
 def test_the_bag_has_the_topics_and_types_of_the_node(
@@ -855,7 +855,7 @@ def test_the_rest_of_a_damaged_bag_is_replayed(
     assert run(whole, tmp_path / 'out') == DONE
     expected = outputs_of(tmp_path / 'out' / 'whole').rows
     lost = [n for n, row in enumerate(expected) if row not in rows]
-    # nothing but what is in the chunk
+    # only the messages in the chunk
     assert lost == list(range(lost[0], lost[-1] + 1))
     assert [row for row in expected if row in rows] == rows
 
@@ -1158,7 +1158,7 @@ def test_combined_by_its_option(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert len(rows_of(tmp_path / 'out' / 'bag')) == 8
 
 
-# What else is written
+# Other files
 
 def test_summary_and_report_are_written(tmp_path: Path) -> None:
     assert run(ROOT / 'bags' / 'flawed', tmp_path) == DONE
@@ -1336,7 +1336,7 @@ def test_poses_are_differentiated(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert times == [when for _, when, _ in of[::3]]
 
 
-# Compared with what was measured
+# Comparison with measured efforts
 
 def joint_state(stamp: int, names: Sequence[str], efforts: Sequence[float]) -> bytes:
     kinds = STORE.types

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Finding bags in folders, and the folders of their results."""
+"""Bags in folders, the files of a bag, and the folders of their results."""
 
 from __future__ import annotations
 
@@ -23,9 +23,13 @@ import os
 from pathlib import Path
 import re
 
-from stewart_dynamics.bags.files import METADATA, STORAGES
-from stewart_dynamics.errors import BagError
+from stewart_dynamics.errors import BagError, ParameterError
+from stewart_dynamics.parameters.yaml_file import read_document
 
+# Suffixes of the files of a bag, also of files compressed as a whole.
+STORAGES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd', '.bag')
+METADATA = 'metadata.yaml'
+_LARGEST_METADATA = 1_000_000
 FLEET_TABLE, FLEET_PAGE = 'fleet.csv', 'index.html'
 
 # rosbag2 numbers the files of a recording: <name of the bag>_0.mcap, ...
@@ -92,6 +96,65 @@ def _holds_results(folder: Path) -> bool:
         return (folder / 'summary.json').is_file() and (folder / 'bag' / METADATA).is_file()
     except PermissionError:
         return False
+
+
+def files_of(bag: Path, missing: list[str], notices: list[str]) -> list[Path]:
+    """
+    Return the files of a bag in their order.
+
+    Parameters
+    ----------
+    bag : Path
+        A file, or a folder with the metadata of rosbag2 or without.
+    missing, notices : list of str
+        Listed files that do not exist, and notices to the user, are appended.
+
+    Raises BagError if there is no file, or if a listed file is outside of the folder.
+
+    """
+    if not bag.is_dir():
+        if not bag.is_file():
+            raise BagError(f'{bag}: not a bag that can be read: no such file or folder')
+        return [bag]
+    found = sorted((file for file in bag.iterdir() if file.name.endswith(STORAGES)
+                    and _is_inside(file, bag)), key=_by_number)
+    # rosbags' own reader of this file opens and decompresses all listed files, or none.
+    try:
+        document = read_document(bag / METADATA, _LARGEST_METADATA)
+        names = document['rosbag2_bagfile_information']['relative_file_paths']
+        listed = [bag / name for name in names]
+    except (ParameterError, KeyError, TypeError) as exc:
+        listed = []
+        why = f'{exc}' if isinstance(exc, ParameterError) else (
+            f'{bag / METADATA}: lists no files')
+    else:
+        why = f'{bag / METADATA}: lists no existing file'
+    # Older recorders put the folder's name before that of the file.
+    listed = list(dict.fromkeys(file if file.exists() else bag / file.name for file in listed))
+    outside = [file for file in listed if file.exists() and not _is_inside(file, bag)]
+    if outside:
+        raise BagError(f'{bag}: not a bag that can be read: metadata.yaml lists '
+                       f'{outside[0]}, which is not a file in the folder')
+    there = [file for file in listed if file.exists()]
+    if there:
+        missing += [f'{file.name}: no such file' for file in listed if file not in there]
+        return there
+    if not found:
+        raise BagError(f'{bag}: not a bag that can be read: {why}')
+    if not all(file.suffix == '.bag' for file in found):  # ROS 1 writes none
+        notices.append('metadata.yaml is missing or damaged: the files in the folder are read')
+    return found
+
+
+def _is_inside(file: Path, folder: Path) -> bool:
+    """Return whether this is a file in a folder, and not a link to another folder."""
+    return file.is_file() and file.resolve().parent == folder.resolve()
+
+
+def _by_number(file: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts names by the numbers in them: rosbag2 numbers its files."""
+    return [(int(part), '') if part.isdecimal() else (-1, part)
+            for part in re.split(r'(\d+)', file.name)]
 
 
 def folders_of_results(paths: Sequence[Path], output: Path) -> list[tuple[Path, Path]]:

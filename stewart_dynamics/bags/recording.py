@@ -22,16 +22,20 @@ from pathlib import Path
 import tempfile
 
 from stewart_dynamics.bags.blocks import of_good_length, Source
-from stewart_dynamics.bags.files import files_of, unpack
+from stewart_dynamics.bags.find import files_of
 from stewart_dynamics.bags.mcap_file import MAGIC, McapFile
 from stewart_dynamics.bags.sqlite_file import SqliteFile
 from stewart_dynamics.errors import BagError, one_line, shown_name
 from stewart_dynamics.messages.recorded import Messages
+import zstandard
 
 _SQLITE = b'SQLite format 3\0'
 _ROS_1 = b'#ROSBAG V'
 # Longer names of topics or types are not valid in ROS.
 _LONGEST_NAME = 255
+# The largest size of a decompressed file, relative to the compressed one, and in bytes.
+_TIMES, _AT_LEAST = 1000, 1 << 26
+_PART = 1 << 20
 # Messages that are read of a file of any size. Of larger ones no more are read than they have
 # bytes: no recording is compressed as well, but files made to occupy the reader for hours are.
 _MESSAGES = 100_000
@@ -129,7 +133,7 @@ class Recording:
             unpacked = file
             if file.suffix == '.zstd':
                 unpacked = self._new_file()
-                if fault := unpack(file, unpacked):
+                if fault := _unpack(file, unpacked):
                     self.missing.append(f'{file.name}: {fault}')
             with unpacked.open('rb') as stream:
                 head = stream.read(len(_SQLITE))
@@ -156,3 +160,20 @@ class Recording:
             self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)
         return folder / f'{len(list(folder.iterdir()))}'
+
+
+def _unpack(file: Path, unpacked: Path) -> str:
+    """Decompress a file by zstd; return what is wrong, or an empty text."""
+    room = max(_AT_LEAST, _TIMES * file.stat().st_size)
+    with file.open('rb') as packed, unpacked.open('wb') as stream:
+        try:
+            reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
+            while part := reader.read(_PART):
+                if len(part) > room:
+                    return (f'unpacks to more than {_TIMES} times its size: the rest is not '
+                            'read')
+                room -= len(part)
+                stream.write(part)
+        except zstandard.ZstdError as exc:
+            return one_line(exc)
+    return ''

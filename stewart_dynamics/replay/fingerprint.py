@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the results of a bag depend on: bag, parameters, options and program, as a digest."""
+"""Digest of the inputs of a replay: bag, parameters, options and program."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ import numpy as np
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 
-# Of summary.json; increased when the meaning of a key changes.
+# Version of summary.json; increased when the meaning of a key changes.
 VERSION = 1
 
 
@@ -49,7 +49,7 @@ def fingerprint(bag: Path, parameters: Parameters, options: Options) -> str:
     """
     Return a digest that changes with whatever the results of a replay depend on.
 
-    Of the files of the bag it covers names, sizes and times of modification.
+    It covers names, sizes and times of modification of the files of the bag.
     """
     files = sorted(bag.iterdir()) if bag.is_dir() else [bag]
     about = {

@@ -181,7 +181,7 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
     summary : dict, optional
         The content of summary.json; None if the bag failed.
     error : str
-        What is wrong with the bag.
+        Why the bag failed or was read in part.
 
     """
     cells: dict[str, Cell] = {'code': code, 'result': RESULTS[code], 'reason': error}

@@ -80,13 +80,13 @@ def replay_fleet(
     bags : sequence of (Path, Path)
         Each with the folder of its results, from bags.folders_of_results.
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     output : Path
         Folder of fleet.csv and index.html.
     options : Options
-        Of every bag. ``run`` is set if it is empty.
+        Options of every bag. ``run`` is set if it is empty.
     jobs : int
-        How many processes; 1: this one.
+        Number of processes; 1: this one.
     scheduler : str, optional
         Address of a Dask scheduler whose workers replay the bags. They must have this package
         and see the bags and ``output`` at the same paths as this process.

@@ -35,7 +35,7 @@ class ProgressBar:
     Parameters
     ----------
     sizes : sequence of int
-        Of all bags [bytes]; zero of those that need not be replayed.
+        Size of each bag [bytes]; zero if it need not be replayed.
     show : bool, optional
         None: only if stderr is a terminal.
     ended : int
