@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What the tests of the executables stand on: the real programs, in processes of their own.
+The real programs in processes of their own, for the tests of the executables.
 
 Nothing is mocked: setpoints go in and answers come out over ROS 2 topics, each test in a domain
 that no other has. What is awaited is waited for with a deadline that a loaded computer keeps,
@@ -104,7 +104,7 @@ SERVICES: dict[str, Any] = {
     'set_parameters_atomically': SetParametersAtomically}
 SEPARATE = ('setpoint/pose', 'setpoint/twist', 'setpoint/accel')
 
-# What a program may print on stderr: lines of ROS's log. Fast DDS reports there what other
+# Lines that a program may print on stderr: those of ROS's log. Fast DDS reports there what other
 # programs, killed ones, have left in shared memory.
 LOG_LINE = re.compile(r'\[(INFO|WARN|ERROR)\] \[\d+\.\d+\] \[[\w.]+\]: \S|.*\[RTPS_')
 
@@ -177,13 +177,13 @@ class Program:
     Parameters
     ----------
     command : sequence of str
-        What is run, ROS arguments included.
+        Command line, ROS arguments included.
     domain : int
         Its ROS domain.
     folder : Path
-        Gets what it writes, on stdout and stderr and as log files.
+        Gets its output on stdout and stderr, and its log files.
     environment : mapping, optional
-        What it has beside the environment of this process.
+        Variables added to the environment of this process.
 
     """
 
@@ -248,9 +248,9 @@ class Program:
 
 class _Stderr:
     """
-    What this process says on stderr while this is entered.
+    The output of this process on stderr while this is entered.
 
-    Nothing is lost of what threads write at any time, as it is with pytest's ``capfd`` between
+    No output of a thread is lost at any time, as it is with pytest's ``capfd`` between
     reading and emptying its file.
     """
 
@@ -474,12 +474,12 @@ def _twist(six: Sequence[float]) -> Twist:
 
 class NodeProcess:
     """
-    The node's process, in a domain that no other has, and what it is started with.
+    The node's process, in a domain that no other has, and its arguments.
 
     Parameters
     ----------
     folder : Path
-        Gets what it writes.
+        Gets its output.
     overrides : str
         Parameters on the command line, ``name:=value``.
     file : Path
@@ -487,7 +487,7 @@ class NodeProcess:
     command : sequence of str, optional
         How it is started; by default its executable.
     environment
-        What its environment has beside.
+        Variables added to its environment.
 
     """
 
@@ -543,11 +543,11 @@ class NodeProcess:
 
 class DynamicsNode:
     """
-    The node in a process of its own, and a peer that feeds it and keeps what it answers.
+    The node in a process of its own, and a peer that feeds it and keeps its answers.
 
     Where the process runs already, the node in it is brought to the state ``unconfigured``, with
     the parameters of its file and these; ``until_active`` configures and activates it then. The
-    peer is new as well, so that nothing is left of what was before.
+    peer is new as well, so that nothing is left of an earlier test.
 
     Parameters
     ----------
@@ -579,7 +579,7 @@ class DynamicsNode:
         self._unconfigured = process.runs or bool(overrides)
         try:
             if process.runs:
-                # Before the others listen: what is latched there is of another test.
+                # Before the others listen: latched messages there are of another test.
                 self.peer.watched = self.program
                 self._clean_up()
             self.writers = {topic: self.peer.writer(f'{NODE}/{topic}', kind)
@@ -609,7 +609,7 @@ class DynamicsNode:
             self._statuses[status.name.rpartition(': ')[2]] = status
             self._reported.append(status)
 
-    # -- what is awaited -------------------------------------------------------------------
+    # -- awaited events -------------------------------------------------------------------
 
     def until(self, condition: Callable[[], Any], what: str) -> None:
         """Take messages until a condition holds."""
@@ -619,7 +619,7 @@ class DynamicsNode:
         """
         Wait until the node answers: it hears us and we hear it.
 
-        Its diagnostics tell that it is active, and how many writers it has found on each topic.
+        Its diagnostics show that it is active, and the number of writers on each topic.
         """
         if self._unconfigured:
             self._unconfigured = False
@@ -684,7 +684,7 @@ class DynamicsNode:
         return bool(warnings[-1].data) if warnings else None
 
     def status(self, name: str) -> DiagnosticStatus:
-        """Return the last diagnostics of a name, empty ones where there are none."""
+        """Return the last diagnostics of a name, empty ones before the first."""
         return self._statuses.get(name, DiagnosticStatus())
 
     def values(self, name: str) -> dict[str, str]:
@@ -773,7 +773,7 @@ class DynamicsNode:
         assert bits(state.effort) == bits(np.clip(result.forces, -bound, bound))
 
     def rejects(self, topic: str, reason: str, number: int = 1) -> None:
-        """Expect that the diagnostics count so many more rejections."""
+        """Expect that the diagnostics count this number of further rejections."""
         self.expected[f'rejected, {topic}: {reason}'] += number
 
     def counted(self) -> Counter[str]:
@@ -868,7 +868,7 @@ class DynamicsNode:
             name: _listed(value)
             for (name, value), message in zip(wanted.items(), values, strict=True)
             if _listed(value) != _listed(parameter_value_to_python(message))}
-        if None in changes.values():  # what is set cannot be unset
+        if None in changes.values():  # a value cannot be unset
             self._process.stop()
             self.peer.watched = self._process.start()
             self._known = False
@@ -890,9 +890,9 @@ class DynamicsNode:
 
     def start_again(self) -> DynamicsNode:
         """
-        Kill the node, as nothing in it can notice, and start it anew with what it had.
+        Kill the node, as nothing in it can notice, and start it anew with the same arguments.
 
-        It has a peer of its own: what is still on its way from the one before does not come there.
+        It has a peer of its own: messages in transit from the one before do not come there.
         """
         self._process.kill()
         self.close()
@@ -940,13 +940,13 @@ class Feeder(Program):
     node : DynamicsNode
         Whom it feeds, on the topics that it listens to.
     folder : Path
-        Gets what it writes.
+        Gets its output.
     rate : int
         Setpoints in a second.
     many : int, optional
-        How many it sends; it ends when the node has them all, or else when it is told to.
+        How many it sends; it ends when the node has them all, or when it is stopped.
     environment
-        What its environment has beside.
+        Variables added to its environment.
 
     """
 
@@ -1005,7 +1005,7 @@ class Planner:
 
     def send(self, samples: Sequence[Sample], step: int = 10 * STEP, frame: str = 'base',
              stamp: int = STEP) -> None:
-        """Send a motion through these samples, so many ns apart."""
+        """Send a motion through these samples, ``step`` ns apart."""
         message = MultiDOFJointTrajectory(header=header(stamp, frame), joint_names=['platform'])
         for n, sample in enumerate(samples):
             point, = sample.combined(0).points
@@ -1019,7 +1019,7 @@ class Planner:
         self._writer.publish(message)
 
     def send_long(self, points: int, stamp: int = STEP, leap: float = 0.0) -> None:
-        """Send a trajectory at home for so many points, 1 ms apart, and a leap to the last."""
+        """Send a trajectory of points at home, 1 ms apart, and a leap to the last."""
         point, = HOME.combined(0).points
         two = raw(MultiDOFJointTrajectory(header=header(stamp, ''), points=[point, point]))
         # Points are of 184 bytes, their times in the last eight.
@@ -1039,7 +1039,7 @@ class Planner:
             self._node.peer.spin(0.1)
 
     def until_answered(self, number: int) -> JointTrajectory:
-        """Return the last answer once so many have come."""
+        """Return the last answer once the given number has come."""
         self._node.until(lambda: len(self.raw) >= number, f'{number} trajectories are answered')
         assert len(self.raw) == number
         return deserialize_message(self.raw[-1], JointTrajectory)

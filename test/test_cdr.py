@@ -56,7 +56,7 @@ KINDS = pytest.mark.parametrize('kind', READERS)
 ENDIAN = pytest.mark.parametrize('little_endian', [True, False], ids=['little', 'big'])
 
 moderately = settings(derandomize=True, deadline=None, max_examples=100)
-# What a string of CDR can hold: anything but a zero.
+# A string of CDR can hold anything but a zero.
 texts = st.text(st.characters(exclude_characters='\0', exclude_categories=['Cs']), max_size=40)
 stamps = st.integers(-2 ** 31 * SECOND, 2 ** 31 * SECOND - 1)
 sixes = st.tuples(*[st.floats()] * 6)

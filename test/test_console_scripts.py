@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The console scripts of the nodes: what they answer before ROS is loaded."""
+"""The console scripts of the nodes: their answers before ROS is loaded."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 HEAVY = ('numba', 'scipy', 'rclpy', 'rosbags')
 
-# Without ROS: none of its modules can be imported. The last line lists what was loaded.
+# Without ROS: none of its modules can be imported. The last line lists the loaded modules.
 RUN = f"""\
 import sys
 if sys.argv.pop(1) == 'without ROS':

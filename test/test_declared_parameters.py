@@ -165,7 +165,7 @@ def test_types_sizes_and_ranges_are_described(declared: Any) -> None:
 
 
 def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
-    # It has none here: rclpy's would reject these two, with its own text.
+    # This node has no check: rclpy's would reject these two, with its own text.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
     assert set_to(ask, 'platform.mass', -1.0) == (True, '')
     assert set_to(ask, 'platform.mass', 'heavy') == (True, '')
@@ -203,7 +203,7 @@ def test_the_last_value_on_the_command_line_is_used(
 
 
 def force_max(arguments: list[str], domain: int) -> tuple[Any, Any]:
-    """Return limits.force_max of a node with a command line: what it uses, what ROS says."""
+    """Return limits.force_max of a node with a command line: as used, and as in ROS."""
     context = rclpy.Context()
     with patch.object(sys, 'argv', ['stewart_dynamics', '--ros-args', *arguments]):
         rclpy.init(args=sys.argv, context=context, domain_id=domain)
@@ -328,7 +328,7 @@ def test_a_time_that_ros_cannot_hold_is_not_followed(
 
 
 def test_null_in_a_file_is_a_parameter_not_given(declared: Any, tmp_path: Path) -> None:
-    # As `ros2 param dump` writes what has no value.
+    # As `ros2 param dump` writes parameters without a value.
     file = tmp_path / 'dump.yaml'
     text = (ROOT / 'config' / 'platform.yaml').read_text(encoding='utf-8')
     file.write_text(text.replace('force_max: 6000.0', 'force_max: null').replace(

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The demo of the identification: its bag, its tables, and what it cannot do in one line."""
+"""The demo of the identification: its bag, its tables, and its errors in one line."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_what_cannot_be_run_is_reported_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
         said: str) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
-        monkeypatch.setenv(name, '1')  # main sets what is missing
+        monkeypatch.setenv(name, '1')  # main sets missing ones
     value = '0.5' if option == '--recorded' else 'nowhere.yaml'
     monkeypatch.setattr(sys, 'argv', [
         'identify.py', '--output', str(tmp_path / 'out'), option, value])

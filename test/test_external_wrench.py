@@ -55,7 +55,7 @@ def six(values: Any) -> Six:
 
 def measured(parameters: Parameters, motion: Motion, loads: Any, stamps: Sequence[int],
              ) -> list[Measurement]:
-    """Return what is measured of a hexapod that moves so under these loads, (N, ...) of each."""
+    """Return measurements of a hexapod that moves so under these loads, (N, ...) of each."""
     result = StewartPlatform(parameters).inverse_dynamics(motion, loads)
     return [Measurement(stamp, six(lengths), six(rates), six(forces))
             for stamp, lengths, rates, forces in zip(
@@ -73,7 +73,7 @@ def resting(parameters: Parameters, motion: Motion, load: Any, stamps: Sequence[
 
 def estimates(step: ExternalWrench, measurements: Sequence[Measurement], target: Motion = HOME,
               known: Any = NO_WRENCH) -> list[Estimate]:
-    """Return what comes of measurements one after the other."""
+    """Return the estimates from measurements one after the other."""
     found: list[Estimate] = []
     row = tuple(target.rows.reshape(-1).tolist())
     for each in measurements:
@@ -82,7 +82,7 @@ def estimates(step: ExternalWrench, measurements: Sequence[Measurement], target:
 
 
 def wrenches(found: Sequence[Estimate]) -> Array:
-    """Return the wrenches of all but the first, which has none, (N - 1, 6)."""
+    """Return an array (N - 1, 6) of wrenches: the first measurement has no wrench."""
     assert found[0].wrench is None
     return np.array([each.wrench for each in found[1:]])
 
@@ -217,7 +217,7 @@ def test_one_not_filtered_is_the_mean_of_many_at_both_ends() -> None:
 # The filter
 
 def test_it_follows_a_step_by_the_closed_form_at_irregular_times() -> None:
-    """And back: 1 - exp(-2 pi cutoff t), then the decay of what it had."""
+    """And back: 1 - exp(-2 pi cutoff t), then the decay of the old value."""
     random = rng(4)
     cutoff = 3.0
     step = ExternalWrench(HEXAPOD.replaced({'external_wrench.cutoff': cutoff}))
@@ -290,7 +290,7 @@ def test_it_is_a_momentum_observer() -> None:
         residual = gain * (momentum[n] - momentum[0] - integral)
         observed.append(residual)
     found = wrenches(estimates(ExternalWrench(frictionless), data))
-    # Euler's rule for the integral: off by K dt / 2 of what there is.
+    # Euler's rule for the integral: off by K dt / 2 of the value.
     assert relative(found, observed) < gain * dt
     assert relative(np.std(found[:2900], axis=0), np.std(observed[:2900], axis=0)) < gain * dt
 
@@ -349,7 +349,7 @@ def test_it_begins_at_the_last_pose_and_then_at_the_setpoint() -> None:
         step(at, flat._replace(stamp=BEGIN - 1), NO_WRENCH, HOME.rows.tolist())
 
 
-# What cannot be
+# Impossible
 
 def test_lengths_of_no_pose_are_an_error() -> None:
     at = resting(HEXAPOD, HOME, None, [BEGIN])[0]
@@ -392,7 +392,7 @@ def test_an_exceeded_threshold_is_reported() -> None:
 
 @dataclass
 class Course:
-    """What the plant did under control, and what was estimated of it."""
+    """A run of the plant under control, and its estimates."""
 
     applied: Array
     found: Array

@@ -132,7 +132,7 @@ def values(messages: list[WrenchStamped]) -> Any:
 
 
 def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> None:
-    """Of a hexapod in motion, measured with noise at irregular times."""
+    """Messages of a hexapod in motion, measured with noise at irregular times."""
     felt = begin()
     random = rng(11)
     stamps = times(random, 300)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How short steps must be: a bound that holds in every pose, and what it rejects."""
+"""How short steps must be: a bound that holds in every pose, and rejections."""
 
 from __future__ import annotations
 

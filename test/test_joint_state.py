@@ -36,7 +36,7 @@ from test_recorded_efforts import joined, joint_state, JOINTS
 
 
 def significant(data: bytes, names: Sequence[str], numbers: int) -> list[bytes]:
-    """Return the fields of a JointState's bytes, and nothing of what stands between them."""
+    """Return the fields of a JointState's bytes, without the padding between them."""
     at = 4
     fields = [data[:4]]
 
@@ -124,7 +124,7 @@ def one_by_one(reader: JointStateReader, messages: Sequence[bytes],
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(st.data(), st.lists(st.sampled_from(FIELDS), min_size=1, max_size=3, unique=True))
 def test_many_are_what_they_are_one_by_one(data: st.DataObject, fields: list[str]) -> None:
-    """Of any layouts, some of them corrupted; through readers that have read others before."""
+    """Messages of any layouts, some of them corrupted; readers have read others before."""
     messages = []
     for _ in range(data.draw(st.integers(0, 12))):
         names = data.draw(st.permutations(data.draw(st.sampled_from(

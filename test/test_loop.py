@@ -75,7 +75,7 @@ def test_feed_forward_cuts_the_tracking_error(
     assert len(alone.errors.seconds) == len(forward.errors.seconds) == 501
     for name, error in forward.errors.rms.items():
         assert 0.0 < times * error < alone.errors.rms[name], name
-    # PD alone carries the weight by its error: what is missing is the node's force.
+    # PD alone carries the weight by its error: it lacks the node's force.
     assert 100.0 < alone.errors.rms['all legs'] < 10e3  # [um]
 
 
@@ -133,7 +133,7 @@ def test_what_cannot_be_run_is_reported_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
         value: str | Path, said: str) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
-        monkeypatch.setenv(name, '1')  # main sets what is missing
+        monkeypatch.setenv(name, '1')  # main sets missing ones
     monkeypatch.setattr(sys, 'argv', ['loop.py', '--output', str(tmp_path), option, str(value)])
     with pytest.raises(SystemExit) as ended:
         demo.main()

@@ -60,7 +60,7 @@ def message_of(at: Measurement, **options: Any) -> bytes:
 
 
 class Followed:
-    """Measured legs, and what was reported of them."""
+    """Measured legs, and the reports of them."""
 
     def __init__(self, parameters: Parameters = HEXAPOD) -> None:
         self.rejected: list[tuple[Rejection, str]] = []
@@ -135,7 +135,7 @@ def test_any_order_of_names_with_others_among_them(data: st.DataObject) -> None:
 
 
 def test_padding_bytes_are_ignored() -> None:
-    """Fast DDS fills messages up to four bytes, and what aligns numbers may be anything."""
+    """Fast DDS fills messages up to four bytes, and padding may be anything."""
     followed = Followed()
     for at, filling in zip(REST[:8], (b'', b'\0', b'\0', b'\xff\xff\xff', b'', b'\1', b'\2', b''),
                            strict=True):

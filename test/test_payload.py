@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The payload from measured legs: against Pinocchio, its intervals, what cannot be told."""
+"""The payload from measured legs: against Pinocchio, its intervals, identifiability."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def at_rest(seconds: Any) -> Motion:
 def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Noise = SENSORS,
              seed: int = 1, true: Parameters = LOADED, **more: Any) -> LegHistory:
     """
-    Return what is measured of a hexapod in motion, its forces those of its own parameters.
+    Return measurements of a hexapod in motion, with the forces of its own parameters.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
     seconds, rate
         How long, and how often.
     noise, seed
-        Of the measurements.
+        Noise and seed of the measurements.
     true : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     more
         ``wrench`` on the platform, of which ``known`` is known; ``base`` at times [s], ``offset``
         of the forces and their largest, ``clip`` [N].
@@ -137,7 +137,7 @@ def errors(payload: Payload, true: Array = TRUE) -> Array:
 
 
 def known(payload: Payload) -> list[str]:
-    """Return the names of what is known."""
+    """Return the names of the identified numbers."""
     return [name for name, is_known in zip(NAMES, payload.fitted.known, strict=True) if is_known]
 
 

@@ -132,7 +132,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_step() -> None:
 
 
 def test_the_energy_lost_is_the_work_of_friction() -> None:
-    """In free motion the energy falls all the time, by what friction times rate amount to."""
+    """In free motion the energy falls all the time, by the product of friction and rate."""
     plant = Plant(random_simulated(7, rate=1000.0))
     set_moving(plant, [0.5, -0.3, 0.2, 0.4, 0.5, -0.6])
     plant.state = plant._run(0)
@@ -150,7 +150,7 @@ def test_the_energy_lost_is_the_work_of_friction() -> None:
     assert abs(lost) < 1e-3 * abs(taken)
 
 
-# Against what needs no integration
+# Against solutions without integration
 
 def top(step: float, omega: list[float]) -> tuple[Plant, Array]:
     """Return a symmetrical body on legs without mass, spinning, and its inertia."""
@@ -237,7 +237,7 @@ def test_a_rotation_stays_a_rotation() -> None:
         assert abs(math.hypot(*state.pose[3:]) - 1.0) < 1e-15
 
 
-# End stops and what saturates
+# End stops and saturation
 
 def test_end_stops_hold_a_hexapod_that_falls_on_them() -> None:
     parameters = simulated()
@@ -381,7 +381,7 @@ def test_the_energy_of_a_released_stiff_hexapod_never_increases(seed: int) -> No
     assert not plant.fault
 
 
-# What cannot be computed
+# Motions that cannot be computed
 
 def finite(state: State) -> bool:
     """Return whether all numbers of a state are."""

@@ -158,7 +158,7 @@ def test_steps_within_a_period_follow_the_base_as_well() -> None:
     assert 0.0 < relative(ends[0], ends[1]) < 1e-6
 
 
-# Against what needs no dynamics of a moving base
+# Against solutions without dynamics of a moving base
 
 def test_a_free_body_does_not_feel_the_base() -> None:
     """On legs without mass and force its path in the world is a parabola, h is constant."""

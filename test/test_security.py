@@ -60,7 +60,7 @@ Start = Callable[..., DynamicsNode]
 
 # The policy
 
-# sros2's policy.xsd of version 0.2.0: each element's attributes and what may stand inside.
+# sros2's policy.xsd of version 0.2.0: each element's attributes and children.
 SCHEMA: dict[str, tuple[set[str], set[str]]] = {
     'policy': ({'version'}, {'enclaves'}),
     'enclaves': (set(), {'enclave'}),
@@ -259,7 +259,7 @@ LISTENS = """\
 
 @pytest.fixture
 def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Return a function that sets variables; what they are about is in tmp_path."""
+    """Return a function that sets variables; their files are in tmp_path."""
     (tmp_path / 'keystore' / 'enclaves' / 'mine').mkdir(parents=True)
     (tmp_path / 'key.pem').touch()
     (tmp_path / 'profile.xml').write_text(LISTENS)
@@ -462,7 +462,7 @@ def printed(program: Program) -> str:
 
 
 def flows(receiver: Partner, mark: int, more: int = 20) -> Callable[[], bool]:
-    """Return a condition: the receiver has so many more answers to setpoints of a mark."""
+    """Return a condition: the receiver has ``many`` more answers to setpoints of a mark."""
     begun = receiver.heard('leg_states', mark)
     return lambda: receiver.heard('leg_states', mark) >= begun + more
 
@@ -488,7 +488,7 @@ def assert_left_out(intruder: Partner) -> None:
 # One host
 
 def _another_address() -> str:
-    """Return an address of this computer that others reach, empty where it has none."""
+    """Return an address of this computer that others reach, empty if not found."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(('192.0.2.1', 9))  # sends nothing
@@ -534,7 +534,7 @@ def test_one_host(crowd: Crowd, tmp_path: Path) -> None:
 
 # TLS
 
-# What a profile lacks that has no certificate, and so verifies none.
+# Elements that a profile without a certificate lacks, and so verifies no other.
 NO_CERTIFICATE = 'private_key_file|cert_chain_file|verify_mode|verify_file'
 
 
@@ -683,7 +683,7 @@ def test_a_key_that_cannot_be_read_is_said_in_one_line(
 
 
 def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> None:
-    """Nobody else can read a key, each opens one side only, and what exists is left alone."""
+    """Nobody else can read a key, each opens one side only, and existing keys are kept."""
     folder = keys('source', 'controller')
     files = [path for path in folder.rglob('*') if path.is_file()]
     assert {path.stat().st_mode & 0o777 for path in files} == {0o600}

@@ -120,7 +120,7 @@ def test_what_cannot_be_run_is_reported_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
         value: str, said: str) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
-        monkeypatch.setenv(name, '1')  # main sets what is missing
+        monkeypatch.setenv(name, '1')  # main sets missing ones
     if value == 'large':
         file = tmp_path / 'large.yaml'
         file.write_text(MOTION.replace('0.02, 0.02, 0.03', '0.5, 0.5, 0.3'), encoding='utf-8')

@@ -75,7 +75,7 @@ class Simulator:
     domain : int
         Its ROS domain.
     folder : Path
-        Gets what it writes.
+        Gets its output.
     overrides : str
         Parameters on the command line, ``name:=value``.
     files : sequence of Path
@@ -268,7 +268,7 @@ NOISY = ('noise.length:=1.0e-5', 'noise.rate:=1.0e-3', 'noise.force:=2.0')
 
 
 def test_step_by_step_the_same_commands_give_the_same_bits(start: Start) -> None:
-    """Two processes, and the library in this one; however long each takes for what."""
+    """Two processes, and the library in this one, at any speed."""
     random = rng()
     commands = np.array(holding()) + random.uniform(-300.0, 300.0, (40, 6))
     seen = []
@@ -319,7 +319,7 @@ def test_each_command_is_one_period_and_nothing_else_advances_time(begin: Start)
             stamps = sorted(set(stamps))
         assert [each for each in stamps if each > FIRST] == list(
             range(FIRST + PERIOD, end + 1, PERIOD))
-    # Subscribers of the clock are best effort: it repeats what is not answered, nothing else.
+    # Subscribers of the clock are best effort: it is repeated until answered, nothing else.
     many = len(simulator.raw['clock'])
     simulator.until(lambda: len(simulator.raw['clock']) > many + 2, 'it says so again')
     assert simulator.stamps('clock')[-1] == simulator.stamps()[-1] == end
@@ -706,7 +706,7 @@ def test_bad_motions_of_the_base_are_rejected(begin: Start) -> None:
         simulator.until_said('WARN', f"{topic} rejected: wrong frame_id: 'base'")
     base.publish(FIRST, Motion([0.0, 0.0, 0.0], np.eye(3), [0.0, 0.0, 0.0], [1e200, 0.0, 0.0]))
     base.until_heard()
-    # What overflows is not followed.
+    # A motion that overflows is not followed.
     simulator.step(holding())
     assert np.isfinite(numbers_of(simulator.last('accel'))).all()
     assert not simulator.said('ERROR', '')

@@ -61,14 +61,14 @@ stewart_trajectory:
 
 class Trajectory:
     """
-    The publisher, and a peer that keeps what it sends.
+    The publisher, and a peer that keeps its messages.
 
     Parameters
     ----------
     domain : int
         Its ROS domain.
     folder : Path
-        Gets what it writes.
+        Gets its output.
     file : Path
         Its parameter file.
     overrides : str
@@ -96,12 +96,12 @@ class Trajectory:
         return [deserialize_message(data, INPUTS[topic]) for data in self._raw[topic]]
 
     def until(self, numbers: dict[str, int]) -> None:
-        """Wait until so many messages have come on these topics."""
+        """Wait until these numbers of messages have come on these topics."""
         self.peer.until(lambda: all(len(self._raw[topic]) >= number
                                     for topic, number in numbers.items()), f'{numbers} come')
 
     def at(self, now: int, number: int, topics: Sequence[str] = SEPARATE) -> None:
-        """Set the clock [ns] and wait until so many messages have come on these topics."""
+        """Set the clock [ns] and wait until a number of messages has come on each topic."""
         def answered() -> bool:
             # Time is best effort: a message of it may be lost, all others come.
             self._clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
@@ -217,7 +217,7 @@ def test_the_final_pose_is_held_until_a_signal(begin: Start, tmp_path: Path, kin
     trajectory.at(SECOND, 1, topics)
     trajectory.at(SECOND + 300 * PERIOD, 301, topics)
     trajectory.at(SECOND + 301 * PERIOD, 302, topics)
-    # Of those that are due at once while it holds, the last one is published.
+    # While it holds, only the last one of several that are due is published.
     trajectory.at(1000 * SECOND, 303, topics)
     trajectory.program.kill()
     stamps, rows = _combined(trajectory)
@@ -281,7 +281,7 @@ def test_in_simulated_time_what_is_due_comes_with_the_clock(begin: Start, tmp_pa
     for n in range(1, 11):
         trajectory.at(SECOND + n * PERIOD, n + 1, topics)
         assert len(trajectory.received(*topics)) == n + 1
-    # What has become due meanwhile comes at once, and then it is done.
+    # The samples that have become due meanwhile come at once, and then it is done.
     trajectory.at(2 * SECOND, 21, topics)
     assert trajectory.program.wait() == 0
     stamps, rows = _combined(trajectory)

@@ -17,8 +17,8 @@ Mass, center of mass and inertia of the platform from efforts, where friction is
 
 The efforts differ from those of the model by ``y = P x + Z e + noise``: P are the ten columns of
 the regressor for a change x of mass, first moment and inertia, all about the given center of
-mass, so that what the motion does not tell keeps the given center and inertia. Z are for each leg
-Coulomb friction, viscous friction and what static friction can hold, each for one standard
+mass, so that parameters that are not identifiable keep the given values. Z are for each leg
+Coulomb friction, viscous friction and the limit of static friction, each for one standard
 deviation: the given friction is uncertain by its own size. e has unit variance and is eliminated
 leg by leg (a ridge regression, Hoerl, Kennard, "Ridge regression: biased estimation for
 nonorthogonal problems", Technometrics 12(1), 1970, doi:10.1080/00401706.1970.10488634).
@@ -54,7 +54,7 @@ FRICTION = 3
 # the mean of the given one. A direction is known if its standard error is at most a quarter of it.
 _MASS, _CENTER, _INERTIA = 0.2, 0.1, 0.4
 
-# ``solve`` rejects what is told by no more than TIMES_NOISE the noise. Here the noise is
+# ``solve`` rejects directions below TIMES_NOISE times the noise. Here the noise is
 # subtracted: a fifth of that is enough.
 _NOISE = 0.2
 
@@ -94,11 +94,11 @@ class FittedBody(NamedTuple):
     Attributes
     ----------
     body : Body
-        What is not known has the given values.
+        Numbers that are not known have the given values.
     half_widths : (10,)
-        Of the 95 % intervals of mass, center and inertia.
+        Halves of the 95 % intervals of mass, center and inertia.
     known : (10,)
-        Which of them the samples tell.
+        Whether each of them is identifiable.
     consistent : bool
         False: no real body has the inertia that fits best; it has the given one.
     residual : float
@@ -115,12 +115,12 @@ class FittedBody(NamedTuple):
 
 class Samples(NamedTuple):
     """
-    What was measured, N samples one after the other, and how a wrong acceleration changes it.
+    N consecutive measurements, and how a wrong acceleration changes them.
 
     Attributes
     ----------
     columns : (N, 6, 10)
-        Of the regressor, of ``about(center)``.
+        Columns of the regressor, of ``about(center)``.
     friction : (N, 6, FRICTION)
         Effort [N] for one standard deviation of each kind of friction.
     differences : (N, 6)
@@ -169,7 +169,7 @@ class BodyFit:
     given : Body
         The model's.
     size : float
-        Of the platform: its joints' distance from their center [m].
+        Distance of the platform joints from their center [m].
 
     """
 
@@ -185,7 +185,7 @@ class BodyFit:
         strongest = np.abs(self._y).max() + np.abs(self._p[..., 0]).max() * given.mass
         self._least = (_LEAST_NOISE * strongest) ** 2
         self._variance = max(float(np.mean(self._y ** 2)), self._least)
-        # Bartlett's window leaves so many degrees of freedom of the correlations.
+        # Share of the degrees of freedom of the correlations that Bartlett's window leaves.
         self._freedom = 1.5 * len(samples.differences) / LAGS
         self._solution: Solution | None = None
 
@@ -273,9 +273,9 @@ class BodyFit:
 
     def _covariance(self, solution: Solution) -> Array:
         """Return the covariance of the change, for residuals that are correlated in time."""
-        # Of the degrees of freedom the fit takes these.
+        # The fit takes these degrees of freedom.
         meat = self._meat * (self._freedom / (self._freedom - FRICTION - TEN / 6))
-        # What the friction, uncertain as it is, may shift.
+        # Shift that the uncertain friction may cause.
         by_friction = self._eliminate @ self._p
         meat += np.einsum('ikp,ikq->pq', by_friction, by_friction)
         covariance: Array = solution.covariance @ meat @ solution.covariance

@@ -69,10 +69,10 @@ EXTERNAL_WRENCH = 'external_wrench'
 # The outcome of a measurement, besides the codes of forward_kinematics.
 _OUT_OF_RANGE = 3
 
-# One measurement as numbers, since an array costs time to pass: what is given, what is written.
+# One measurement as numbers, since an array costs time to pass: inputs, then results.
 _MOTION_AFTER, _AFTER, _DIFFERENCES, _STEPS, _RESIDUAL, _CODE = consecutive(
     MOTION, WRENCH, 6, 1, 1, 1)
-# The motion given is the one before, or the guess where there is none.
+# The motion given is the previous one, or the guess.
 (_PLATFORM, _LENGTHS, _RATES, _FORCES, _KNOWN, _BEFORE, _GAIN, _INTERVAL, _MOTION, _BASE_BEFORE,
  _BASE, _WRITTEN, _RESULT, _TILE) = consecutive(
     CONSTANTS, 6, 6, 6, WRENCH, WRENCH, 1, 1, MOTION, BASE, BASE, _CODE.stop, RESULT,
@@ -82,7 +82,7 @@ _GIVES = Struct(f'{_CODE.stop}d')
 
 
 class Measurement(NamedTuple):
-    """What was measured of the six legs at one time."""
+    """Measurement of the six legs at one time."""
 
     stamp: int
     """[ns]"""
@@ -118,12 +118,12 @@ class Estimate(NamedTuple):
 
     @property
     def force(self) -> float:
-        """Of the wrench [N]."""
+        """Force of the wrench [N]."""
         return math.hypot(*self.wrench[:3]) if self.wrench else 0.0
 
     @property
     def moment(self) -> float:
-        """Of the wrench [N m]."""
+        """Moment of the wrench [N m]."""
         return math.hypot(*self.wrench[3:]) if self.wrench else 0.0
 
 
@@ -164,7 +164,7 @@ def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: A
     motions : (N, 12) or (N, MOTION)
         Rows of motion, of which only the poses are used.
     model_forces, measured_forces : (N, 6)
-        Of the inverse dynamics, and of the actuators [N], + pushes.
+        Forces of the inverse dynamics, and of the actuators [N], + pushes.
 
     Returns
     -------

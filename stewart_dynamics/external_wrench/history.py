@@ -30,7 +30,7 @@ _STAMP, MOVED, ACTED, LOADED, OF_BASE = consecutive(1, TWIST.stop, 6, WRENCH, BA
 TURNED = slice(MOVED.start + TWIST.start, MOVED.start + TWIST.stop)  # the twist
 _ROW = Struct(f'q{OF_BASE.stop - 1}d')
 
-# Of measurements that come at a higher rate, the memory holds a shorter time [Hz].
+# Rate above which the memory holds a shorter time [Hz].
 HIGHEST_RATE = 2000.0
 
 
@@ -41,7 +41,7 @@ class LegHistory:
     Parameters
     ----------
     seconds : float
-        What it holds at HIGHEST_RATE.
+        Time that it holds at HIGHEST_RATE.
 
     """
 
@@ -59,7 +59,7 @@ class LegHistory:
         Parameters
         ----------
         forces : six numbers
-            Of the actuators since the last measurement [N].
+            Forces of the actuators since the last measurement [N].
         estimate : Estimate
             Its stamp, pose and twist; the motion of the base.
         known : six numbers

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-From messages on ``~/measured_legs`` to the external wrench; what is rejected is reported.
+From messages on ``~/measured_legs`` to the external wrench; rejections are reported.
 
 A message that is rejected is as one that never came: the estimate goes on with the next one, over
 the time between the two.
@@ -96,7 +96,7 @@ class MeasuredLegs:
         known, target
             See ``ExternalWrench``.
         base : BaseInput, optional
-            The motion of the base; none: it is still.
+            The motion of the base; by default it is still.
 
         """
         measurement = self._sound(data)

@@ -50,10 +50,10 @@ FUNCTIONS = inverse_dynamics.solve, regressor.regressors
 # Measurements between two yields.
 PIECE = 64 if COMPILED else 1
 
-# Half the width of a window [s], and at least so many measurements.
+# Half the width of a window: minimum [s], and minimum in measurements.
 _HALF_WIDTH = 0.05
 _MEASUREMENTS = 5
-# Fewer windows tell too little about the correlation of their noise.
+# With fewer windows the correlation of their noise is too uncertain.
 LEAST_WINDOWS = 40
 # A window counts if measurements cover this part of it.
 _COVERED = 0.9
@@ -69,7 +69,7 @@ _STATIC = 1.0 / math.sqrt(3.0)
 # of another unit, or of a drive that does not have this limit.
 _SATURATED = 0.99, 1.02
 
-# What overflows is found by its result.
+# An overflow is found by its result.
 _QUIET = np.errstate(over='ignore', invalid='ignore')
 
 _LEGS = np.arange(6)
@@ -98,7 +98,7 @@ class Payload(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What became of a request."""
+    """The result of a request."""
 
     message: str
     payload: Payload | None = None
@@ -173,7 +173,7 @@ def _range(history: LegHistory, seconds: float) -> tuple[int, int]:
 
 
 class _Windows:
-    """Means of what the fit needs, over windows."""
+    """Means of the inputs of the fit over windows."""
 
     scale: float
     """Of the forces, by those of the model."""
@@ -199,7 +199,7 @@ class _Windows:
         self._coulomb_velocity = p['actuator.coulomb_velocity']
         self._noise, self._noises = np.zeros((6, 6)), 0
         self._middle: tuple[Array, Array] | None = None
-        # Of the noise of an acceleration, by that of a twist: the window's slope.
+        # Noise of an acceleration divided by the noise of a twist: the window's slope.
         self._noise_gain = math.pi ** 2 * interval / (4.0 * self.half_width ** 3)
 
     @_QUIET
@@ -283,7 +283,7 @@ class _Windows:
         differences, modelled = means[..., _COLUMNS], means[..., _COLUMNS + 1]
         self.scale = 1.0 + float(np.sum(differences * modelled) / np.sum(modelled ** 2))
         friction = means[..., TEN:_COLUMNS]
-        # Not a part of it: noise in the rates would vary the column, and seem to tell its size.
+        # Not a part of it: noise in the rates would vary it, and it would seem identifiable.
         friction[..., 2] = np.abs(friction[..., 1]) < self._coulomb_velocity
         columns, model = self._by_acceleration(*self._middle)
         noise = self._noise_gain / (self._noises * _FOURTH_VARIANCE) * self._noise
@@ -311,7 +311,7 @@ def _outcome(payload: Payload) -> Outcome:
 
 
 def _words(payload: Payload) -> str:
-    """Return what is known and what is not, in one line, with the parameters to be set."""
+    """Return the identified numbers, the others' names and the parameters to set, in one line."""
     fitted, more = payload.fitted, payload.fitted.body.mass - payload.given.mass
     known = [f'{name} {with_interval(value, half)} {unit}' for name, unit, value, half, is_known
              in zip(NAMES, UNITS, numbers_of(fitted.body), fitted.half_widths, fitted.known,

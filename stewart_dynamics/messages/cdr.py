@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What all messages have in common as bytes: byte order, stamps, texts and sequences.
+The common parts of all messages as bytes: byte order, stamps, texts and sequences.
 
 ROS 2 sends messages as XCDR1 ("plain CDR"): four bytes that give the byte order, then the
 fields, each aligned to its own size (OMG DDS-XTypes 1.3, 7.4.3). Reading and writing the few
@@ -40,7 +40,7 @@ COUNT = {0: Struct('>I'), 1: Struct('<I')}
 SIX = {0: Struct('>6d'), 1: Struct('<6d')}
 SEVEN = {0: Struct('>7d'), 1: Struct('<7d')}
 
-# What reading fields at the wrong places raises: handled by the reader of the whole message.
+# Errors of reading fields at wrong places: handled by the reader of the whole message.
 READ_ERRORS = IndexError, KeyError, StructError
 
 

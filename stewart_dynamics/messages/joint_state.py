@@ -42,7 +42,7 @@ FIELDS = ('position', 'velocity', 'effort')
 MISSING_JOINTS = 'lacks one of the joints'
 UNEVEN = 'not as many numbers as names'
 
-# So many names are shown in the details of a rejection, and so many characters of each.
+# Maximum number of names in the details of a rejection, and of characters of each.
 _SHOWN = 60
 
 # Layouts that are remembered, the newest ones.
@@ -62,7 +62,7 @@ class JointStateError(ValueError):
 
 
 class JointStates(NamedTuple):
-    """What was read of many messages, K of which can be used."""
+    """The contents of many messages, K of which can be used."""
 
     stamps: Stamps
     """(K,) [ns]"""
@@ -240,7 +240,7 @@ class JointStateReader:
         return known
 
     def _judge(self, data: bytes, fields: _Fields) -> _Known:
-        """Return what is known of messages with the layout of this one."""
+        """Return the layout of this message, for messages alike."""
         names, many = fields.names, len(fields.names)
         wanted = {field: fields.numbers[n] for n, field in enumerate(FIELDS)
                   if field in self._fields}
@@ -257,7 +257,7 @@ class JointStateReader:
             reason = UNEVEN
             details = f'{many} names, {", ".join(uneven)}'
         numbers = [] if reason else list(wanted.values())
-        # What is not wanted may be anything.
+        # Other fields may have any value.
         free = [slice(at, at + 8 * count) for at, count in fields.numbers]
         columns = [] if reason else [
             list(wanted).index(field) * many + names.index(joint)
@@ -299,7 +299,7 @@ class JointStateWriter:
 
     def write(self, stamp: int, position: Iterable[float], velocity: Sequence[float],
               effort: Sequence[float] | None) -> bytes:
-        """Return the message; its effort is empty where there is none."""
+        """Return the message, without effort if not given."""
         sec, nanosec = divmod(stamp, 1_000_000_000)
         if effort is None:
             return self._without_effort.pack(

@@ -86,7 +86,7 @@ class Layout:
             *([(4, 'iI')] if stamped else [])]))
 
     def _prepare_one(self, order: str, places: Sequence[tuple[int, str]]) -> None:
-        """Prepare reading a single message by a Struct of what is not free, by offset."""
+        """Prepare reading a single message by a Struct of its fixed fields, by offset."""
         layout, constant, values, many = order, list[int](), list[int](), 0
         for at, place in places:
             layout += f'{at - Struct(layout).size}x{place}'

@@ -42,13 +42,13 @@ class _Writer:
     Parameters
     ----------
     head : bytes
-        What comes before the doubles, with the encapsulation.
+        Bytes before the doubles, with the encapsulation.
     stamp : int
         Where the stamp is in it.
     number : int
-        Of doubles.
+        Number of doubles.
     tail : bytes
-        What comes behind them.
+        Bytes behind them.
 
     """
 
@@ -99,7 +99,7 @@ class TransformsWriter:
     Parameters
     ----------
     frames : sequence of (frame, child)
-        Of the transforms (K,).
+        Stamps of the transforms (K,).
 
     """
 

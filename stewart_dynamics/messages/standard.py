@@ -27,7 +27,7 @@ from stewart_dynamics.messages.layout import Layout
 _FLOAT64 = Struct('<4sd')
 _CLOCK = Struct('<4siI')
 _BOOL = Struct('<4s?')
-# an empty layout's two numbers, the number of entries, and what aligns them
+# an empty layout's two numbers, the number of entries, and padding
 _FLOAT64_ARRAY = Struct('<4sIII4x6d')
 
 

@@ -146,7 +146,7 @@ class LegTrajectory:
     stamp : int
         [ns]
     names : sequence of str
-        Of the joints; frame_id is empty.
+        Names of the joints; frame_id is empty.
     size : int
         How many points it has.
     effort : bool

@@ -38,7 +38,7 @@ from stewart_dynamics.ros.run import run
 from stewart_dynamics.setpoints import topics as inputs
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-# Samples are computed so many at once: one by one they cost more than to publish.
+# Number of samples computed at once: one by one they cost more than publishing.
 _BLOCK = 256
 
 _SETTLE = 500_000_000  # [ns]
@@ -49,7 +49,7 @@ class TrajectoryNode(Node):
     Publishes the motion's samples when they are due, then holds the final pose or is done.
 
     With ``use_sim_time`` they are due by /clock and published as soon as it comes: a simulation
-    may run as fast or as slowly as it can, or wait for what it is answered.
+    may run as fast or as slowly as it can, or wait for the answers to it.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class TrajectoryNode(Node):
         self._wait(now)
         if self._begun and self._simulated:
             self._timer.cancel()
-            self._publish_due(0)  # the clock may wait for what comes of it
+            self._publish_due(0)  # the clock may wait for the answer
 
     def _on_clock(self, jump: Any) -> None:
         """Go on in simulated time."""
@@ -127,7 +127,7 @@ class TrajectoryNode(Node):
         self._publish_due(now)
 
     def _publish_due(self, now: int) -> None:
-        """Publish what is due, each sample with its own stamp, however late it is [ns]."""
+        """Publish the samples that are due, each with its own stamp, however late it is [ns]."""
         if self._held:  # of these the last one is enough
             self._index = max(self._index, int(now * 1e-9 * self._settings['rate']))
         while not self._done.done():

@@ -33,7 +33,7 @@ def parameter_files(arguments: Sequence[str]) -> list[str]:
 
 
 def check_arguments(arguments: Sequence[str], kind: type[ParameterSet]) -> None:
-    """Raise ParameterError for what the parser of ROS rejects in words of its own."""
+    """Raise ParameterError for arguments that the parser of ROS rejects in its own words."""
     for option, argument in zip(arguments, [*arguments[1:], ''], strict=True):
         if option in ('-p', '--param') and ':=' not in argument:
             raise ParameterError(f'command line: {option} {argument}: must be NAME:=VALUE')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The console scripts of the nodes: what needs no ROS is answered before rclpy is imported.
+The console scripts of the nodes; whatever needs no ROS is answered before rclpy is imported.
 
 ``--help``, a parameter file that breaks a rule, and that ROS is missing.
 """

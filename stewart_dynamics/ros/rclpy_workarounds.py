@@ -138,9 +138,9 @@ class OneShotTimer:
     After each ``reset`` of a timer the events executor looks at all timers of its clock, and at
     each look it calls those that are due. When it falls behind, several looks come before the
     first call: then a timer that is reset at each call is called again at once, and a timer beside
-    it is called so many times that its next call is minutes away (``UpdateTimers`` in
+    it is called often enough that its next call is minutes away (``UpdateTimers`` in
     https://github.com/ros2/rclpy/blob/7.1.5/rclpy/src/rclpy/events_executor/timers_manager.cpp;
-    no upstream issue). So each one has a clock of its own, and a call before its time is none.
+    no upstream issue). So each one has a clock of its own, and a call before its time is ignored.
     Until test_a_timer_that_starts_itself_again_is_late_and_never_early passes without this.
 
     Parameters
@@ -245,7 +245,7 @@ def shut_down(executor: Executor | None, node: Node | None) -> None:
     All on the thread that has made them and before the interpreter ends, else rclpy crashes there
     (similar: https://github.com/ros2/rclpy/issues/1644).
 
-    DDS is told that the process leaves, and its shared memory is freed, when nothing refers to the
+    The process leaves DDS, and its shared memory is freed, when nothing refers to the
     node any more. ``destroy_node`` of a lifecycle node leaves its state machine, and a node whose
     constructor raised waits for the collector (no upstream issue; until
     test_a_signal_ends_it_with_exit_code_0 passes without the state machine's end).
@@ -264,9 +264,9 @@ def end_process(code: int) -> NoReturn:
     """
     End the process after ``shut_down``, without the destructors of libraries.
 
-    Those of Fast DDS and OpenSSL crash over TLS now and then, after the interpreter has ended:
-    exit code -11 in one of a few runs of test_tls while other programs load the computer (no
-    upstream issue).
+    The destructors of Fast DDS and OpenSSL crash over TLS now and then, after the interpreter has
+    ended: exit code -11 in one of a few runs of test_tls while other programs load the computer
+    (no upstream issue).
     """
     sys.stdout.flush()
     sys.stderr.flush()

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-# A series ends when no event of its kind came for so long; while it lasts, one is logged so often.
+# Time without an event after which a series ends, and interval of the lines while it lasts [s].
 SECONDS = 5.0
 
 
@@ -45,7 +45,7 @@ class Series:
         self._of_kind: dict[Hashable, _One] = {}
 
     def add(self, kind: Hashable, text: str, now: float) -> str | None:
-        """Return the line to log for one more event, None where there is none yet."""
+        """Return the line to log for one more event, None if it is too early for one."""
         one = self._of_kind.get(kind)
         if one is None:
             self._of_kind[kind] = _One(text, now, now)

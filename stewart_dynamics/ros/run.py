@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the nodes share: start, spinning, exit codes."""
+"""Start, spinning and exit codes of the nodes."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ PROFILES = _profiles()
 
 def check_environment(arguments: Sequence[str]) -> str:
     """
-    Return the text of a warning, nothing where there is none.
+    Return the text of a warning, empty without a reason for one.
 
     Raises StewartError, naming the variable, where security that is required would be missing.
     """
@@ -68,7 +68,7 @@ def check_environment(arguments: Sequence[str]) -> str:
 def without_security_libraries() -> Iterator[None]:
     """Raise StewartError where the node cannot be made because Fast DDS has no DDS Security."""
     with warnings.catch_warnings():
-        # of rclpy: two lines about what it could not clean up
+        # of rclpy: two lines about an incomplete cleanup
         warnings.filterwarnings('ignore', 'Failed to fini', RuntimeWarning)
         try:
             yield

@@ -36,7 +36,7 @@ _LOOK = 0.1  # [s]
 
 
 class Signals:
-    """What has been received since ``watch``."""
+    """The signals received since ``watch``."""
 
     def __init__(self) -> None:
         self.received = False

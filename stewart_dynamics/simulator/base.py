@@ -113,7 +113,7 @@ class BaseOfTopics:
     parameters : SimulatorParameters
         Frame of the world, gravity and ``base.timeout``.
     rejections : Rejections
-        Counts what is rejected.
+        Counts rejections.
     noticed : callable
         Called with texts for the log.
 

@@ -32,7 +32,7 @@ class ImuWriter:
     Parameters
     ----------
     frame : str
-        Of the IMU.
+        Frame of the IMU.
     angular_velocity, specific_force : float
         Standard deviations of the readings [rad/s, m/s^2]; the covariances are made of them.
 

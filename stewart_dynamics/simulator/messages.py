@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The messages of the simulator: what it publishes for states of the plant and of its base."""
+"""The messages of the simulator, for states of the plant and of its base."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ OUTPUT_TYPES = {
     'twist': 'geometry_msgs/msg/TwistStamped',
     'accel': 'geometry_msgs/msg/AccelStamped',
 }
-# Those of the base: published where its motion is generated, subscribed where it comes by topics.
+# Topics of the base: published if its motion is generated, subscribed if it comes by topics.
 BASE_TYPES = {topic: inputs.INPUT_TYPES[topic] for topic in inputs.BASE_SOURCES['motion']}
 IMU = 'imu'
 IMU_TYPE = inputs.INPUT_TYPES[inputs.BASE_IMU]

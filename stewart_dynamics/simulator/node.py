@@ -77,8 +77,8 @@ class SimulatorNode(Node):
     whose motion is generated is at rest until the first command, and then goes on.
 
     In real time it takes the periods that are due by a steady clock, several where it is late;
-    what is later than 0.1 s is skipped. With ``use_sim_time`` each command is one period, and
-    nothing else advances time.
+    periods that are later than 0.1 s are skipped. With ``use_sim_time`` each command is one
+    period, and nothing else advances time.
 
     Raises ParameterError where the parameters break a rule.
     """
@@ -140,7 +140,7 @@ class SimulatorNode(Node):
             self._start: int | None = None
             self._timer(1.0 / self._rate, self._on_time)
         self._timer(_WATCH_SECONDS, self._on_watch)
-        # What exists now stays: see DynamicsNode.
+        # The objects that exist now stay: see DynamicsNode.
         gc.collect()
         gc.freeze()
 
@@ -237,7 +237,7 @@ class SimulatorNode(Node):
             *self._state_messages.write(stamp, self._plant.measured())]
 
     def _announce(self) -> None:
-        """Publish again what is not answered: all messages until the first command."""
+        """Publish again the messages that are not answered: all until the first command."""
         if self._commands is None:
             self._publish()
         else:

@@ -189,7 +189,7 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     stops : (STOPS,)
         The end stops, see ``end_stops``.
     largest_forces : (6,)
