@@ -30,7 +30,7 @@ import struct
 import subprocess
 import tempfile
 import time
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
@@ -51,6 +51,9 @@ from stewart_dynamics.whole_file import write_files
 from tqdm import tqdm
 import yaml
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -62,6 +65,9 @@ PLOTS = {'font.size': 10, 'axes.grid': True, 'grid.color': '0.88', 'axes.spines.
 BANDWIDTH = 8.0  # natural frequency of a leg under PD control [Hz]
 # Longer than any wait on an idle computer, including the compilation of two programs [s].
 PATIENCE = 60.0
+# Time of a demo for each second of motion, until it is measured: on the computer of
+# benchmarks/README.md, with all compiled.
+PACE = 2.5
 LOOK = 0.1  # interval between checks of programs and progress [s]
 
 UNITS = {**{f'leg {n}': 'um' for n in range(1, 7)}, 'all legs': 'um', 'position': 'um',
@@ -290,7 +296,44 @@ def demonstration(command: str) -> Iterator[None]:
         rclpy.try_shutdown()
 
 
-def progress_bar(seconds: float) -> tqdm[Any]:
-    """Return a bar of the simulated time of all runs [s], on a terminal only."""
-    return tqdm(total=seconds, unit='s', ncols=79, mininterval=0.5, disable=None,
-                bar_format='{desc} {bar} {n:.1f} of {total:.1f} s')
+class Progress:
+    """
+    Shows the simulated time of all runs: a bar on a terminal, else a line for each stage.
+
+    Parameters
+    ----------
+    seconds : float
+        Simulated time of all stages [s].
+
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._bar = tqdm(total=seconds, unit='s', ncols=79, mininterval=0.5, disable=None,
+                         bar_format='{desc} {bar} {n:.1f} of {total:.1f} s')
+        self._done = self._stage = 0.0
+        self._begun = time.monotonic()
+        self._pace = PACE
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the bar."""
+        self._bar.close()
+
+    def stage(self, text: str, seconds: float) -> None:
+        """Begin a stage of this simulated time; it takes as long as the previous one."""
+        now = time.monotonic()
+        if self._stage:
+            self._pace = (now - self._begun) / self._stage
+        self._done, self._stage, self._begun = self._done + self._stage, seconds, now
+        self._bar.set_description_str(text)
+        if self._bar.disable:
+            print(f'{text}: {seconds:g} s of motion, about {self._pace * seconds:.0f} s',
+                  flush=True)
+
+    def reached(self, nanoseconds: int) -> None:
+        """Show the simulated time of this stage [ns]."""
+        shown = self._done + min(nanoseconds * 1e-9, self._stage)
+        self._bar.update(max(shown - self._bar.n, 0.0))

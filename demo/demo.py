@@ -176,7 +176,7 @@ def main() -> None:
             executor = SingleThreadedExecutor()
             executor.add_node(demo)
             print(f'starting {NODE} with {options.params.name}; the first start compiles, which '
-                  'takes seconds')
+                  'takes seconds', flush=True)
             _wait(executor, 'the node is not active', 60.0, demo.connected, process)
             play(demo, executor, process)
             print()

@@ -33,7 +33,7 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, BEGIN, demonstration, Errors, Failure, PLOTS, progress_bar, Recorder, ROOT, save,
+    BANDWIDTH, BEGIN, demonstration, Errors, Failure, PLOTS, Progress, Recorder, ROOT, save,
     stamp_of, UNITS)
 from loop import Loop, RATE
 import matplotlib
@@ -179,32 +179,26 @@ def main() -> None:
         folder.mkdir(parents=True, exist_ok=True)
         true = Parameters.from_yaml(options.params).replaced(TRUE)
         loop = Loop(options.params, options.motion, options.seconds, BANDWIDTH)
+        print('designing the motion: about 30 s', flush=True)
         stewart_identify('--design', '--params', options.params, '--duration', options.recorded,
                          '--rate', RATE, '--output', folder / 'designed', '--force')
         rclpy.init()
         runs = []
-        with progress_bar(options.recorded + 3 * options.seconds) as progress:
-            done = 0.0
-
-            def reach(reached: int) -> None:
-                progress.update(max(done + reached * 1e-9 - progress.n, 0.0))
-
-            progress.set_description_str('recording')
+        with Progress(options.recorded + 3 * options.seconds) as progress:
+            progress.stage('recording', options.recorded)
             recorder = Recorder()
             Loop(options.params, folder / 'designed' / 'trajectory.yaml', options.recorded,
-                 BANDWIDTH).errors(True, {**TRUE, **NOISE}, reach, recorder)
+                 BANDWIDTH).errors(True, {**TRUE, **NOISE}, progress.reached, recorder)
             many = write_bag(folder / 'bag', recorder.states)
-            progress.set_description_str('identifying')
             stewart_identify(folder / 'bag', '--params', options.params,
                              '--output', folder / 'identified', '--force')
-            done = options.recorded
             true.to_yaml(folder / 'true.yaml')
             for name, hexapod in ((BEFORE, options.params),
                                   (AFTER, folder / 'identified' / 'identified.yaml'),
                                   (BEST, folder / 'true.yaml')):
-                progress.set_description_str(name)
-                runs.append(Run(name, loop.errors(True, TRUE, reach, Recorder(), hexapod)))
-                done += options.seconds
+                progress.stage(name, options.seconds)
+                runs.append(Run(name, loop.errors(
+                    True, TRUE, progress.reached, Recorder(), hexapod)))
         document = json.loads((folder / 'identified' / 'identification.json').read_text(
             encoding='utf-8'))
         numbers = values(document, true)

@@ -32,7 +32,7 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, progress_bar, Recorder, ROOT,
+    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, Progress, Recorder, ROOT,
     save, simulate, UNITS)
 import matplotlib
 import numpy as np
@@ -236,17 +236,14 @@ def main() -> None:
         rclpy.init()
         print(f'each leg: {loop.bandwidth:g} Hz, damping ratio 1, with the {loop.leg_mass:.0f} kg '
               f'that it moves alone: {loop.gains["proportional_gain"]:.3g} N/m, '
-              f'{loop.gains["derivative_gain"]:.3g} N s/m')
+              f'{loop.gains["derivative_gain"]:.3g} N s/m', flush=True)
         begun = time.monotonic()
-        with progress_bar(4 * options.seconds) as progress:
+        with Progress(4 * options.seconds) as progress:
             for payload in (1.0, HEAVIER):
                 for feed_forward in (False, True):
-                    progress.set_description_str(
-                        f'{"PD + forces" if feed_forward else "PD only"}, {payload_name(payload)}')
-                    before = len(runs) * options.seconds
-                    runs.append(loop.run(feed_forward, payload, lambda reached, before=before: (
-                        progress.update(before + min(reached * 1e-9, options.seconds)
-                                        - progress.n))))
+                    name = 'PD + forces' if feed_forward else 'PD only'
+                    progress.stage(f'{name}, {payload_name(payload)}', options.seconds)
+                    runs.append(loop.run(feed_forward, payload, progress.reached))
         print(f'\n{table(runs, [payload_name(run.payload) for run in runs[::2]])}\n')
         draw(options.output / 'loop.png', runs)
         write_json(options.output / 'loop.json', summary(loop, runs))

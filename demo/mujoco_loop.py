@@ -28,7 +28,7 @@ from pathlib import Path
 import sys
 import time
 
-from closed_loop import BANDWIDTH, demonstration, progress_bar, ROOT
+from closed_loop import BANDWIDTH, demonstration, Progress, ROOT
 from loop import Loop, Run, summary, table
 import rclpy
 from stewart_dynamics.whole_file import write_json
@@ -53,15 +53,12 @@ def main() -> None:
         options.output.mkdir(parents=True, exist_ok=True)
         rclpy.init()
         begun = time.monotonic()
-        with progress_bar(4 * options.seconds) as progress:
+        with Progress(4 * options.seconds) as progress:
             for name, command in PHYSICS.items():
                 for feed_forward in (False, True):
-                    progress.set_description_str(
-                        f'{name}, {"PD + forces" if feed_forward else "PD only"}')
-                    before = len(runs) * options.seconds
-                    runs.append(loop.run(feed_forward, 1.0, lambda reached, before=before: (
-                        progress.update(before + min(reached * 1e-9, options.seconds)
-                                        - progress.n)), command))
+                    progress.stage(f'{name}, {"PD + forces" if feed_forward else "PD only"}',
+                                   options.seconds)
+                    runs.append(loop.run(feed_forward, 1.0, progress.reached, command))
         print(f'\n{table(runs, [*PHYSICS])}\n')
         write_json(options.output / 'mujoco.json', summary(loop, runs) | {'physics': [*PHYSICS]})
         print(f'{time.monotonic() - begun:.0f} s; {options.output}: mujoco.json')

@@ -31,7 +31,7 @@ import time
 from typing import Any, NamedTuple
 
 from closed_loop import (
-    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, progress_bar, Recorder, ROOT,
+    BANDWIDTH, demonstration, Errors, Failure, leg_mass, PLOTS, Progress, Recorder, ROOT,
     save, simulate, SIMULATOR, UNITS)
 import matplotlib
 import numpy as np
@@ -234,12 +234,10 @@ def main() -> None:
         options.output.mkdir(parents=True, exist_ok=True)
         rclpy.init()
         begun = time.monotonic()
-        with progress_bar(len(RUNS) * options.seconds) as progress:
+        with Progress(len(RUNS) * options.seconds) as progress:
             for name in RUNS:
-                progress.set_description_str(name)
-                before = len(runs) * options.seconds
-                runs.append(ship.run(name, lambda reached, before=before: progress.update(
-                    before + min(reached * 1e-9, options.seconds) - progress.n)))
+                progress.stage(name, options.seconds)
+                runs.append(ship.run(name, progress.reached))
         print(f'\n{table(runs)}\n')
         draw(options.output / 'ship.png', ship, runs)
         write_json(options.output / 'ship.json', summary(ship, runs))

@@ -24,6 +24,7 @@ from pathlib import Path
 import re
 import signal
 import sys
+import time
 from types import ModuleType
 from typing import Any
 
@@ -116,6 +117,20 @@ def test_a_program_that_ends_early_ends_the_demo(domain: int, tmp_path: Path) ->
     said = program.stderr.splitlines()[-1]
     assert re.match('demo-loop: stewart_simulator ended with exit code -9: .*dynamics ready', said)
     assert not list((tmp_path / 'looped').iterdir())
+
+
+def test_without_a_terminal_a_line_for_each_stage_has_its_expected_time(
+        demo: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+        ) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(time, 'monotonic', lambda: clock[0])
+    with demo.Progress(30.0) as progress:
+        progress.stage('first', 10.0)
+        progress.reached(10 ** 10)
+        clock[0] = 50.0
+        progress.stage('second', 20.0)
+    assert capsys.readouterr().out == (
+        'first: 10 s of motion, about 25 s\nsecond: 20 s of motion, about 100 s\n')
 
 
 def _children(pid: int) -> list[int]:
