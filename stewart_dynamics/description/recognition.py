@@ -35,7 +35,9 @@ from stewart_dynamics.description.mechanism import (
 from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
 from stewart_dynamics.description.xml_text import LIMITS, NOT_CHECKED
 from stewart_dynamics.errors import shown
-from stewart_dynamics.parameters.table import PARAMETERS, Parameters, STANDARD_GRAVITY
+from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
+from stewart_dynamics.parameters.table import (
+    NEGATIVE, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 
 # In terms of the length of a leg, or [rad]; what is smaller is rounding.
 _SMALL = 1e-6
@@ -44,6 +46,8 @@ _ACROSS = math.radians(45.0)
 _OFF_AXIS = 1e-3
 _UNEQUAL = 0.01
 _THICK = 0.05
+# A platform that is closer to the plane of the base joints, in larger radii, is on neither side.
+_FLAT = 0.05
 
 
 class Recognized(NamedTuple):
@@ -99,7 +103,8 @@ def recognized(mechanism: Mechanism) -> Recognized:
     given = {name: value for name, value in (values | _carried(mechanism)).items()
              if value is not None}
     remarks += _missing(given, mechanism)
-    return Recognized(Parameters(given, mechanism.source), tuple(dict.fromkeys(remarks)))
+    parameters = _with_side(Parameters(given, mechanism.source), found)
+    return Recognized(parameters, tuple(dict.fromkeys(remarks)))
 
 
 def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
@@ -259,6 +264,17 @@ def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[
             remarks.append("gravity: not in the file: 9.80665 m/s^2 along the world's -z")
     turn = found.base.placement.rotation
     return {'gravity': gravity if np.array_equal(turn, np.eye(3)) else turn.T @ gravity}
+
+
+def _with_side(p: Parameters, found: Topology) -> Parameters:
+    """Return parameters whose home pose is on the side of the base where the platform is."""
+    shape = shape_of(p)
+    middle = found.base.placement.inside(found.platform.placement.point(
+        p['geometry.platform_joints'].mean(axis=0))) - p['geometry.base_joints'].mean(axis=0)
+    height = float(shape.axes[2] @ middle)
+    if abs(height) < _FLAT * shape.radius or height * reach_of(p, shape).side > 0.0:
+        return p
+    return p.replaced({'geometry.platform_side': POSITIVE if height > 0.0 else NEGATIVE})
 
 
 def _carried(mechanism: Mechanism) -> dict[str, Any]:
