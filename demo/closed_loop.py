@@ -217,7 +217,7 @@ def simulate(commands: Mapping[str, Sequence[str | Path]], files: Mapping[str, S
     Parameters
     ----------
     commands : mapping of str to sequence
-        Of each program, by its name; the last one is started when the others are connected.
+        Commands by the name of the program; the last one is started when the others are connected.
     files : mapping of str to sequence of Path
         Their parameter files.
     given : mapping

@@ -72,7 +72,7 @@ class Run(NamedTuple):
 
 class Loop:
     """
-    What all runs have in common: hexapod, motion and gains.
+    Hexapod, motion and gains, common to all runs.
 
     Parameters
     ----------

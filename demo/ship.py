@@ -65,7 +65,7 @@ PROGRAMS: dict[str, list[str | Path]] = {
     'leg_controller': [sys.executable, ROOT / 'examples' / 'leg_controller.py'],
     'motion_compensation': [sys.executable, ROOT / 'examples' / 'motion_compensation.py']}
 
-# base.source of the node by the name of the run; none: no feed-forward
+# base.source of the node by the name of the run; without one, no feed-forward.
 RUNS = {'PD only': None, 'PD + forces, fixed base': 'fixed', 'PD + forces, IMU': 'imu',
         'PD + forces, base motion': 'motion'}
 COLORS = ('#d55e00', '#e69f00', '#009e73', '#0072b2')
@@ -94,7 +94,7 @@ class ShipRecorder(Recorder):
 
 class Ship:
     """
-    What all runs have in common: hexapod, ship, motion and gains.
+    Hexapod, ship, motion and gains, common to all runs.
 
     Parameters
     ----------

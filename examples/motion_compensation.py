@@ -50,9 +50,9 @@ def seen_from(base: Motion, platform: Pose) -> Motion:
     Parameters
     ----------
     base : Motion
-        Of the base frame in the world, world axes.
+        Motion of the base frame in the world, world axes.
     platform : Pose
-        Of the platform frame in the world.
+        Pose of the platform frame in the world.
 
     """
     to_base = base.rotation.T

@@ -71,7 +71,7 @@ def trajectory(start: list, end: list, duration: float) -> MultiDOFJointTrajecto
         message.points.append(MultiDOFJointTrajectoryPoint(
             transforms=[Transform(translation=vector(motion.position[n]),
                                   rotation=Quaternion(x=x, y=y, z=z, w=w))],
-            # Of the platform's origin, in base axes.
+            # Twist of the platform's origin, in base axes.
             velocities=[Twist(linear=vector(motion.linear_velocity[n]),
                               angular=vector(motion.angular_velocity[n]))],
             accelerations=[Twist(linear=vector(motion.linear_acceleration[n]),
@@ -106,7 +106,7 @@ class Planner(Node):
                 self.rejected, self.reason = int(values['rejected']), status.message
 
     def missing(self) -> str:
-        """Return what is not connected yet: the node answers only once."""
+        """List missing connections: the node answers only once."""
         ends = {f'subscriber on {self.motions.topic_name}': self.motions.get_subscription_count(),
                 # which follows remaps
                 f'publisher on {self.answer.topic_name}':
@@ -122,7 +122,7 @@ class Planner(Node):
 
 
 def ask(planner: Planner, motion: MultiDOFJointTrajectory, timeout: float) -> JointTrajectory:
-    """Return the answer to a trajectory; exit with one line if there is none."""
+    """Return the answer to a trajectory; without an answer, exit with one line."""
     if not planner.until(lambda: not planner.missing(), timeout):
         sys.exit(f'{planner.missing()} within {timeout:g} s; are topics remapped? See --help')
     before = planner.rejected

@@ -35,7 +35,7 @@ def executable(name: str) -> Path:
     Raises
     ------
     StewartError
-        There is none; names the folders.
+        Not found; the message lists the folders that were searched.
 
     """
     beside = Path(sys.executable).parent

@@ -56,11 +56,11 @@ def foxglove(name: str = LIVE) -> dict[str, Any]:
     return layout
 
 
-# Displays of rviz_default_plugins in Jazzy (its plugins_description.xml) and what they take.
+# Displays of rviz_default_plugins in Jazzy (plugins_description.xml), with their message types.
 DISPLAYS = {
     'Grid': None, 'Axes': None, 'MarkerArray': 'visualization_msgs/msg/MarkerArray',
     'Wrench': 'geometry_msgs/msg/WrenchStamped'}
-# What Foxglove's panels take of the topics that are named in them; the field that a Plot shows.
+# Message types that Foxglove's panels accept; the field that a Plot shows.
 MARKERS = 'visualization_msgs/msg/MarkerArray'
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 FIELDS = {

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The command stewart_describe: what it writes, says and returns."""
+"""The command stewart_describe: its files, messages and exit codes."""
 
 from pathlib import Path
 import subprocess

@@ -35,13 +35,13 @@ from stewart_dynamics.reference_motion.parameters import ReferenceMotionParamete
 
 PAGE = (ROOT / 'docs' / 'from_cad_to_controller.md').read_text(encoding='utf-8')
 HEXAPOD, MOVEMENT = re.findall(r'```yaml\n(.*?)```', PAGE, flags=re.DOTALL)
-# What is run, and what it prints: the last by itself, with the node.
+# Programs of the page with their output: the last by itself, with the node.
 *PARTS, WITH_NODE = re.findall(r'```python\n(.*?)```\n```text\n(.*?)```', PAGE, flags=re.DOTALL)
 
 
 @pytest.fixture(scope='module')
 def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Run the page's program, compare what it prints, and return its names."""
+    """Run the page's program, compare its output, and return its names."""
     folder = tmp_path_factory.mktemp('hexapod')
     (folder / 'my_hexapod.yaml').write_text(HEXAPOD, encoding='utf-8')
     assert len(PARTS) + 1 == PAGE.count('```python') == 6
@@ -100,9 +100,9 @@ def test_the_motion_on_the_page_begins_at_home_and_keeps_all_limits(
     assert result.condition_number.max() < limits['singularity.warn_condition']
 
 
-# What the node reports of a mistake: the words on the page, and the mistake.
+# Mistakes by the words with which the node reports them on the page.
 def mistakes(names: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """Return of each mistake that is told the changes that make it."""
+    """Return the changes that make each reported mistake."""
     p = names['parameters']
     in_mm = {name: 1e3 * p[name] for name in ('geometry.base_joints', 'geometry.platform_joints')}
     moments = names['inertia'][np.diag_indices(3)]

@@ -79,7 +79,7 @@ def peer(ros_environment: None) -> Iterator[Peer]:
 
 @pytest.fixture
 def launch(peer: Peer, prefix: Path, tmp_path: Path) -> Iterator[Launch]:
-    """Return a function that launches a file; what it started ends with the test."""
+    """Return a function that launches a file; all processes end with the test."""
     begun: list[Program] = []
 
     def begin(file: str, *arguments: str) -> Program:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Launch files without launch: what they look up and print before anything starts."""
+"""Launch files without launch: packages are looked up and files printed before a start."""
 
 from __future__ import annotations
 

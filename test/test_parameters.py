@@ -315,7 +315,8 @@ def test_a_value_that_breaks_a_rule_is_rejected(name: str, value: Any, rule: str
 
 
 @pytest.mark.parametrize('case', BAD)
-def test_the_error_of_a_bad_file_names_all(tmp_path: Path, case: str) -> None:
+def test_the_error_of_a_bad_file_names_parameter_value_and_rule(
+        tmp_path: Path, case: str) -> None:
     old, new, words = BAD[case]
     assert GOOD.count(old) == 1
     message = rejection(tmp_path, GOOD.replace(old, new))
@@ -465,7 +466,7 @@ def check_any(file: Path) -> None:
                 assert not known.above or np.all(value > known.minimum)
 
 
-# A place in the valid file, how many characters are removed, and what is inserted.
+# A place in the valid file, the number of characters removed there, and the text inserted.
 cuts = st.tuples(st.integers(0, len(GOOD)), st.integers(0, 40))
 SPECIAL = '{}[],:-&?!|>\'"%@`# \n\t\r\0\\01.e+<*~_\ufeff\u2028'
 scalars = st.sampled_from([
@@ -645,7 +646,7 @@ def test_an_error_about_an_argument_is_a_value_error() -> None:
         Parameters({**GIVEN, 'platform.mass': -1})
 
 
-# What is written
+# Written files
 
 @pytest.mark.parametrize('file', ['platform.yaml', 'simulator.yaml', 'trajectory_sine.yaml'])
 def test_a_whole_file_is_written_that_reads_back_equal(tmp_path: Path, file: str) -> None:
@@ -693,7 +694,7 @@ TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str
     'nan', '1_000', '2020-01-01', '010', '=', '<<', '%', '@', '`', '|', '>'])), min_size=6,
     max_size=6, unique=True), st.floats(1e-300, 1e300), st.lists(
     st.floats(-1e300, 1e300, allow_subnormal=False), min_size=3, max_size=3))
-def test_whatever_is_written_reads_back_equal(
+def test_written_values_read_back_equal(
         tmp_path: Path, joints: list[str], mass: float, center: list[float]) -> None:
     parameters = Parameters({**GIVEN, 'joints': joints, 'base_frame': joints[0],
                              'platform.mass': mass, 'platform.center_of_mass': center})

@@ -98,7 +98,7 @@ class Tree:
         tau = pin.rnea(model, data, q, v, a)
         legs = [model.joints[model.getJointId(name)].idx_v for name in p['joints']]
         pushes = np.linalg.solve(freedoms[legs].T, freedoms.T @ tau)
-        # What URDF has no place for, or Pinocchio's recursion leaves out.
+        # Terms that are not in a URDF, or left out by Pinocchio's recursion.
         forces: Array = pushes + p['actuator.reflected_mass'] * a[legs] + friction(p, v[legs])
         return forces
 

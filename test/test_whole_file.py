@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Files are written as a whole or not at all, and what is read is a bounded regular file."""
+"""Files are written as a whole or not at all; only bounded regular files are read."""
 
 from __future__ import annotations
 

@@ -43,9 +43,9 @@ AXIAL_INERTIA = 1e-6
 requires one: in the model it is zero."""
 
 PASSIVE_RATE = 1000.0
-"""What a format that requires a limit of every joint is given for passive ones [m/s, rad/s]."""
+"""Limit of passive joints in formats that require a limit of every joint [m/s, rad/s]."""
 _UNLIMITED_LENGTH = 10.0
-"""Of a leg without a limit, in terms of its length at home."""
+"""Longest leg without a limit, in terms of its length at home."""
 UNLIMITED = 1e9
 """Force or rate of a leg without a limit, where a format requires one [N, m/s]."""
 
@@ -63,7 +63,7 @@ class Body(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A leg: its names, its joints, its two bodies, and what its actuator does."""
+    """A leg: its names, its joints, its two bodies, and the properties of its actuator."""
 
     name: str
     cross: str
@@ -92,7 +92,7 @@ class Leg(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """The limits of a leg; none: not checked."""
+    """The limits of a leg; None where it is unlimited."""
 
     length_min: float | None
     length_max: float | None
@@ -100,7 +100,7 @@ class Limits(NamedTuple):
     force_max: float | None
 
     def lengths(self, home_length: float) -> tuple[float, float]:
-        """Return the shortest and longest length [m]; where not checked, any that makes sense."""
+        """Return the shortest and longest length [m], wide bounds where a leg is unlimited."""
         return (0.0 if self.length_min is None else self.length_min,
                 _UNLIMITED_LENGTH * home_length if self.length_max is None else self.length_max)
 
@@ -112,7 +112,7 @@ class Hexapod:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
 
     Attributes
     ----------

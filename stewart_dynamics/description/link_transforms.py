@@ -41,7 +41,7 @@ class LinkTransforms:
     Parameters
     ----------
     urdf : str
-        Of revolute, prismatic and fixed joints, as ``urdf`` writes it.
+        A robot of revolute, prismatic and fixed joints, as ``urdf`` writes it.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class LinkTransforms:
         Parameters
         ----------
         positions : (N, K)
-            Of the joints that move, in the order of the file [m, rad].
+            Positions of the moving joints, in the order of the file [m, rad].
 
         """
         shifts = np.where(self._revolute, 0.0, positions)

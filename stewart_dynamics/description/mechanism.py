@@ -75,7 +75,7 @@ class Part:
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     """About the center of mass, axes of the body [kg m^2]."""
     note: str = ''
-    """What the reader had to assume of it."""
+    """Assumption of the reader about it."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Joint:
     child_anchor: Array | None = None
     """The same point on the child's side, where it is given on its own [m]."""
     position: float = 0.0
-    """Of a slide, at the placements of the file [m]."""
+    """Position of a slide at the placements of the file [m]."""
     lower: float | None = None
     upper: float | None = None
     velocity_max: float | None = None
@@ -105,7 +105,7 @@ class Joint:
 
 @dataclass
 class Mechanism:
-    """All that a file says of a mechanism."""
+    """A mechanism with its gravity, and parameters that stewart_describe has added."""
 
     source: str
     name: str
@@ -118,4 +118,4 @@ class Mechanism:
     order: tuple[str, ...] = ()
     """Names of slides in the order of their actuators."""
     remarks: list[str] = field(default_factory=list)
-    """What the reader had to assume, one line each."""
+    """Assumptions of the reader, one line each."""

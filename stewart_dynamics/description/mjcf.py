@@ -39,7 +39,7 @@ from stewart_dynamics.description.xml_text import (
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 
 _TIMESTEP = 0.0005  # [s]
-# Of constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and
+# Constraints: time constant [s] and damping ratio; impedance, 1 for a rigid one, at no gap and
 # at one of the third number [m].
 _SOLREF = (2.0 * _TIMESTEP, 1.0)
 _SOLIMP = (0.9999, 0.9999, 0.001)
@@ -55,7 +55,7 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     add(root, 'compiler', angle='radian', autolimits='true')
     add(root, 'option', timestep=numbers(_TIMESTEP), gravity=numbers(p['gravity']),
         integrator='implicitfast', solver='Newton', tolerance=numbers(_TOLERANCE))
-    # What is in the hexapod's world collides with it, but not its parts with each other.
+    # Other bodies collide with the hexapod, but its parts do not collide with each other.
     add(add(root, 'default'), 'geom', contype='1', conaffinity='0', mass='0')
     add(add(root, 'visual'), 'headlight', ambient='0.4 0.4 0.4', diffuse='0.5 0.5 0.5')
     looks = shapes(hexapod, uris=False)  # MuJoCo knows paths alone

@@ -112,7 +112,7 @@ def end_of(joint: ET.Element, side: str, source: Path) -> str:
 
 
 def origin_of(element: ET.Element, source: Path) -> Placement:
-    """Return where a joint is in its parent, or what is in a link in that link."""
+    """Return the placement of a joint in its parent, or of an element of a link in that link."""
     origin = element.find('origin')
     if origin is None:
         return HERE

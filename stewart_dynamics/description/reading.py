@@ -36,7 +36,7 @@ _XACRO = 'http://www.ros.org/wiki/xacro'
 
 def read_hexapod(path: Path) -> Recognized:
     """
-    Return the parameters of the hexapod in a file, and what had to be assumed.
+    Return the parameters of the hexapod in a file, with remarks on all assumptions.
 
     Raises
     ------

@@ -14,7 +14,7 @@
 
 
 """
-The parameters of the hexapod in a mechanism, and in one line each what had to be assumed.
+The parameters of the hexapod in a mechanism, with one remark for each assumption.
 
 A leg is made of two slender bodies here: all bodies on one side of its slide become one, its
 center of mass and its inertia are taken along the line between the joints.
@@ -39,7 +39,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
 from stewart_dynamics.parameters.table import (
     NEGATIVE, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
 
-# In terms of the length of a leg, or [rad]; what is smaller is rounding.
+# Smaller parts of the length of a leg, or smaller angles [rad], are rounding errors.
 _SMALL = 1e-6
 _INCLINED = 1e-3
 _ACROSS = math.radians(45.0)
@@ -55,7 +55,7 @@ class Recognized(NamedTuple):
 
     parameters: Parameters
     remarks: tuple[str, ...]
-    """What was assumed or not found, one line each."""
+    """Assumptions and missing values, one line each."""
 
 
 class _Body(NamedTuple):
@@ -108,7 +108,7 @@ def recognized(mechanism: Mechanism) -> Recognized:
 
 
 def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
-    """Return what a leg gives the parameters."""
+    """Return the parameters of one leg."""
     at, base = chain.slide, found.base.placement
     slide, out = chain.steps[at].joint, chain.steps[at].from_parent
     lower, upper = chain.steps[:at], chain.steps[at + 1:]
@@ -298,7 +298,7 @@ def _carried(mechanism: Mechanism) -> dict[str, Any]:
 
 
 def _missing(given: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
-    """Return what the file does not have, one line each."""
+    """Return one line for each value that is not in the file."""
     said = [f'{name}: not in the file: unlimited' for name in LIMITS
             if name not in {**given, **mechanism.carried}]
     if not (mechanism.carried or np.any(given['actuator.reflected_mass'])):

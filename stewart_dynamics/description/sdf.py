@@ -49,7 +49,7 @@ _NAMESPACE = 'https://stewart-dynamics.example/sdf'
 _NOT_IN_SDF = ('gravity', 'geometry.zero_length', 'actuator.reflected_mass')
 # The tips add to it.
 _OF_PLATFORM = ('platform.mass', 'platform.center_of_mass', 'platform.inertia')
-# Of a tip: its mass as a part of the platform's, and its radius of gyration [m].
+# Mass of a tip as a part of the platform's, and its radius of gyration [m].
 _TIP_MASS, _TIP_GYRATION = 1e-8, 0.1
 _COMMENT = 'Positions of joints are counted from the home pose.'
 
@@ -121,7 +121,7 @@ def _leg(model: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[S
 
 
 def _tip(model: ET.Element, hexapod: Hexapod, leg: Leg) -> None:
-    """Write a ball joint, the tip that it leads to, and what fixes that to the platform."""
+    """Write a ball joint, the tip that it leads to, and the plugin that fixes the tip."""
     mass = _TIP_MASS * hexapod.platform_body.mass
     tip = _link(model, leg.tip, hexapod.platform, leg.platform_joint, np.eye(3))
     _inertial(tip, Body(leg.tip, mass, np.zeros(3), mass * _TIP_GYRATION ** 2 * np.eye(3)))

@@ -14,7 +14,7 @@
 
 
 """
-What a hexapod looks like: plates, cylinders and balls, or meshes from files.
+The shapes of a hexapod: plates, cylinders and balls, or meshes from files.
 
 Sizes follow from the geometry, as those of the node's markers do. They have no influence on
 masses.
@@ -41,7 +41,7 @@ COLORS: dict[str, Color] = {
 
 # Radii and thickness in terms of the mean distance of the platform joints from their center.
 _BARREL, _ROD, _BALL, _PLATE = 0.05, 0.0275, 0.07, 0.05
-# Of a leg's shortest length, or of that at home where none is given.
+# Parts of the shortest leg length, or of the length at home if there is no limit.
 _BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
 
 

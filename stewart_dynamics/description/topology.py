@@ -188,7 +188,7 @@ def _open_ends(mechanism: Mechanism, groups: _Groups) -> str:
 
 def _close(mechanism: Mechanism, groups: _Groups, base: str) -> bool:
     """
-    Close the loops of a tree whose legs all begin at the base, and say so; False if it is none.
+    Close the loops of a tree whose legs all begin at the base; return False for other models.
 
     One leg carries the platform, as in a URDF from CAD. Where all legs have as many joints, the
     last bodies of the others are fixed to it; where they have one less, they end in ball joints.
@@ -248,7 +248,7 @@ def _hint(slides: list[Joint]) -> str:
 
 
 def _baseness(mechanism: Mechanism, groups: _Groups, group: str) -> tuple[int, int, float]:
-    """Return what is smallest for the base: in the world, carried by nothing, low."""
+    """Return a key that is smallest for the base: in the world, carried by nothing, low."""
     members = groups.members(group)
     carried = any(groups.of(joint.child) == group and joint.child_anchor is None
                   for joint in groups.at(group))
@@ -290,7 +290,7 @@ def _chain(mechanism: Mechanism, groups: _Groups, base: str, platform: str, insi
 
 
 def _main(mechanism: Mechanism, groups: _Groups, group: str) -> Part:
-    """Return the body of a group that its legs are at; the heaviest where there is none."""
+    """Return the body of a group to which its legs are attached, or else the heaviest."""
     ends = Counter(end for joint in groups.at(group) for end in (joint.parent, joint.child))
     members = [mechanism.parts[name] for name in groups.members(group) if name in mechanism.parts]
     return max(members, key=lambda part: (

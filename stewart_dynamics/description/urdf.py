@@ -42,7 +42,7 @@ from stewart_dynamics.mechanics.kinematics.leg_joints import PLATFORM_JOINTS
 
 _NOT_IN_URDF = ('gravity', 'actuator.reflected_mass')
 _AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
-# Of the virtual joints of the platform, and the largest angles of their closed form.
+# Axes of the platform's virtual joints, and the largest angles of their closed form.
 _VIRTUAL = {'yaw': ('z', math.pi), 'pitch': ('y', math.pi / 2), 'roll': ('x', math.pi)}
 _COMMENT = ('The loops of a hexapod are open here; its joints close them where they have the '
             'positions of one pose, as the topic joint_states gives them.')
@@ -69,9 +69,9 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str
     Parameters
     ----------
     hexapod : Hexapod
-        What is described.
+        The hexapod.
     name : str
-        Of the robot.
+        Name of the robot.
     control : Ros2Control, optional
         Adds a block ros2_control for the six legs.
 

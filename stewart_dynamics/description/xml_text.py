@@ -27,7 +27,7 @@ from stewart_dynamics import __version__
 from stewart_dynamics.parameters.table import Parameters
 
 CARRIED = 'stewart_dynamics'
-"""Name of the block, or prefix of the elements, of parameters that a format has no place for."""
+"""Name of the block, or prefix of the elements, of parameters without an own element."""
 LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 """Limits that joints have in URDF and SDFormat."""
 LEG_BODIES = ('legs.cylinder.mass', 'legs.cylinder.inertia', 'legs.piston.mass',

@@ -157,7 +157,7 @@ class ParameterSet(Mapping[str, Any]):
         path : str or Path
             The file.
         comments : mapping of name to str, optional
-            What is written behind the unit of a parameter.
+            Texts behind the units of parameters.
 
         Raises
         ------

@@ -40,7 +40,7 @@ class Parameter(NamedTuple):
     text : str
         Meaning, for the documents, ``--help`` and ROS's description.
     unit : str
-        SI; empty if it has none.
+        SI; empty for a number without a unit.
     default : object
         The value if it is not given; an empty tuple: no value, unlimited.
     required : bool

@@ -223,7 +223,7 @@ def _without_parameters(
 
 
 def other_nodes(path: str | Path, node: str) -> str:
-    """Return the sections of a file as text if none is for the node; else an empty text."""
+    """List the sections of a file without a section for the node; else return an empty text."""
     names = [section for section, _ in _all_sections(read_document(path))]
     return '' if any(_is_meant(name, node) for name in names) else _listed(names)
 
