@@ -26,9 +26,10 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE,
     UNIVERSAL, WORLD)
-from stewart_dynamics.description.read_urdf import numbers_of, unit
+from stewart_dynamics.description.read_urdf import INERTIA, numbers_of, unit
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.parameters.table import inertia_matrix
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}
@@ -115,13 +116,9 @@ class _Model:
             return Part(name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), note=(
                 f'{name}: no mass: {_DEFAULT_MASS:g} kg, as SDFormat has it'))
         own = self._own(inertial)
-        tensor = np.eye(3)
-        for key, (i, j) in {'ixx': (0, 0), 'ixy': (0, 1), 'ixz': (0, 2), 'iyy': (1, 1),
-                            'iyz': (1, 2), 'izz': (2, 2)}.items():
-            text = inertial.findtext(f'inertia/{key}')
-            if text is not None:
-                tensor[i, j] = tensor[j, i] = numbers_of(
-                    text, 1, self._source, f'{name}: {key}')[0]
+        tensor = inertia_matrix(numbers_of(' '.join(
+            inertial.findtext(f'inertia/{key}', '1' if key in ('ixx', 'iyy', 'izz') else '0')
+            for key in INERTIA), 6, self._source, f'{name}: inertia'))
         r = own.rotation
         text = inertial.findtext('mass')
         return Part(name, self.place(name), _DEFAULT_MASS if text is None else float(

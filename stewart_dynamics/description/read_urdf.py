@@ -28,6 +28,9 @@ from stewart_dynamics.description.mechanism import (
     UNIVERSAL)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
+from stewart_dynamics.parameters.table import inertia_matrix
+
+INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'ball': BALL, 'spherical': BALL, 'revolute2': UNIVERSAL}
@@ -135,11 +138,9 @@ def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Pa
     what = f'inertial of link {name!r}'
     origin = origin_of(inertial, source)
     mass, given = inertial.find('mass'), inertial.find('inertia')
-    tensor = np.zeros((3, 3))
-    if given is not None:
-        for key, (i, j) in {'ixx': (0, 0), 'ixy': (0, 1), 'ixz': (0, 2), 'iyy': (1, 1),
-                            'iyz': (1, 2), 'izz': (2, 2)}.items():
-            tensor[i, j] = tensor[j, i] = numbers_of(given.get(key, '0'), 1, source, what)[0]
+    six = np.zeros(6) if given is None else numbers_of(
+        ' '.join(given.get(key, '0') for key in INERTIA), 6, source, what)
+    tensor = inertia_matrix(six)
     r = origin.rotation
     return Part(name, placement,
                 None if mass is None else float(numbers_of(mass.get('value'), 1, source, what)[0]),
