@@ -56,7 +56,7 @@ QUATERNION = Rotation.from_matrix(TURN).as_quat()
 
 
 class Feed:
-    """Setpoints on a base; what is said is recorded."""
+    """Setpoints on a base; notices are recorded."""
 
     def __init__(self, source: str, **given: object) -> None:
         self.said: list[tuple[Rejection, str]] = []
@@ -91,7 +91,7 @@ class Feed:
 
     @property
     def reasons(self) -> Counter[tuple[str, str]]:
-        """Return what is rejected."""
+        """Return the rejections."""
         return Counter({tuple(rejection): n
                         for rejection, n in self.setpoints.counts.items()})  # type: ignore
 
@@ -235,7 +235,7 @@ def test_samples_that_setpoints_have_waited_for_are_kept() -> None:
     assert not known(feed.setpoints.base.at(SECOND + 999 * MS))
 
 
-# What may be wrong
+# Invalid messages
 
 BAD: Sequence[tuple[str, Callable[[int], bytes], str]] = (
     (BASE_POSE, lambda t: messages.pose(t, (math.nan, 0.0, 0.0), frame='world'), NOT_FINITE),

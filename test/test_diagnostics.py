@@ -176,11 +176,11 @@ def test_frequent_reports_do_not_change_the_rate() -> None:
     assert max(rates[20:]) <= 6.0
 
 
-# What is warned of in the log
+# Warnings in the log
 
 def come(diagnostics: DynamicsDiagnostics, seconds: float, topics: tuple[str, ...],
          begin: float = BEGIN) -> list[str]:
-    """Let messages of topics come at 100 Hz, none complete; return what is logged."""
+    """Let messages of topics come at 100 Hz, none complete; return the log lines."""
     lines = []
     for n in range(round(100 * seconds)):
         now = begin + 0.01 * n

@@ -93,7 +93,7 @@ def test_node_and_replay_give_the_same_bits(bag: str, fresh: Fresh, tmp_path: Pa
     for at, topic, data in _recorded(ROOT / 'bags' / bag):
         node.publish(topic, data)
         if at in completed:
-            # What is on its way on several topics could arrive in another order.
+            # Messages on their way on several topics could arrive in another order.
             answers += 1
             node.until(lambda: len(node.raw['leg_states']) >= answers,  # noqa: B023
                        'the setpoint is answered')

@@ -235,7 +235,7 @@ def test_a_bag_that_loops_is_followed(at_work: DynamicsNode) -> None:
     for n in range(1, 4):
         for topic, data in played:
             node.publish(topic, data)
-        # What is on its way on several topics could arrive in another order.
+        # Messages on their way on several topics could arrive in another order.
         node.until(lambda n=n: len(node.raw['leg_states']) == before + n * len(played) // 3,
                    'the bag is answered')
     states = node.raw['leg_states'][before:]
@@ -358,7 +358,7 @@ def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -
                           if key.startswith('rejected, ')})
     passed = node.expected[f'rejected, setpoint: {DROPPED}']
     incomplete = node.expected[f'rejected, setpoint/pose: {NOT_JOINED}']
-    # What the middleware drops of more than a thousand on one topic, is not counted.
+    # Messages that the middleware drops, of more than a thousand on one topic, are not counted.
     assert len(answered) + passed + incomplete <= len(stamps)
     assert 'more came at once than can be answered' in node.program.stderr
 

@@ -89,7 +89,7 @@ class Feed:
 
     @property
     def counts(self) -> dict[tuple[str, str], int]:
-        """Return what is rejected; the callback must have got each."""
+        """Return the rejections; the callback must have got each."""
         assert Counter(rejection for rejection, _ in self.said) == self.setpoints.counts
         return {tuple(rejection): n for rejection, n in self.setpoints.counts.items()}
 
@@ -701,7 +701,7 @@ def together(given: Sequence[tuple[str, bytes]]) -> Messages:
 
 
 def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **options: object) -> int:
-    """Check that messages taken together give what they give one by one; return how many."""
+    """Check that messages give the same together and one by one; return their number."""
     one, many = Feed(**options), Feed(**options)
     expected, times = [], []
     for n, (topic, data) in enumerate(given):

@@ -77,14 +77,14 @@ class Fed:
         self.send(*stamps, sample=sample)
 
     def answered(self, number: int) -> list[int]:
-        """Return the stamps of the answers, once there are so many."""
+        """Return the stamps of the answers, once there are ``number``."""
         self.peer.until(lambda: len(self.states) >= number, f'{number} answers')
         return [nanoseconds(deserialize_message(each, JointState).header.stamp) - BEGIN
                 for each in self.states]
 
     @property
     def counts(self) -> dict[Rejection, int]:
-        """Return what was rejected."""
+        """Return the counts of rejections."""
         return dict(self.node._setpoints.counts)
 
 

@@ -29,7 +29,8 @@ from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatfor
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
 from stewart_dynamics.mechanics.singularity import (
-    Cause, LEAVING, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
+    Cause, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
+from stewart_dynamics.parameters.table import HYSTERESIS
 
 PARAMETERS = symmetric_parameters().replaced({
     'singularity.warn_condition': 50.0, 'singularity.stop_condition': 500.0,
@@ -91,7 +92,7 @@ def test_a_determinant_of_exactly_zero_is_crossed_when_the_sign_has_changed() ->
 
 
 def test_a_warning_of_the_condition_ends_below_a_part_of_where_it_began() -> None:
-    assert LEAVING == 0.8
+    assert HYSTERESIS == 0.8
     assert not after((0.2, 0.0, 49.9)).warning
     warned = after((0.2, 0.0, 50.0))
     assert warned.warning

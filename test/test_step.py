@@ -61,7 +61,7 @@ def answered(step: Step, setpoint: Setpoint, wrench: Six = NO_WRENCH,
     return output
 
 
-# What it gives
+# Results
 
 def test_it_gives_what_the_library_gives_bit_for_bit() -> None:
     random = rng()

@@ -31,15 +31,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import inlined
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
 
 # At this condition number a solution of J_inv^T f = wrench has fewer than four valid digits of
 # sixteen: forces are neither computed nor published.
 UNSOLVABLE_CONDITION = 1e12
-
-# Hysteresis: a warning or stop ends below this part of the condition number at which it began,
-# or when the predicted time to the crossing exceeds the time divided by it.
-LEAVING = 0.8
 
 
 class Cause(IntEnum):
@@ -112,7 +108,7 @@ def advance(state: Array, limits: Array, determinant: float, determinant_rate: f
         Of the sample.
 
     """
-    leaving = LEAVING if state[CAUSE] > 0.0 else 1.0
+    hysteresis = HYSTERESIS if state[CAUSE] > 0.0 else 1.0
     time = -determinant / determinant_rate if determinant_rate != 0.0 else math.inf
     if not time >= 0.0:
         time = math.inf
@@ -120,11 +116,11 @@ def advance(state: Array, limits: Array, determinant: float, determinant_rate: f
     if determinant * state[LAST] < 0.0:
         cause = Cause.CROSSED.value
         state[CROSSINGS] += 1.0
-    elif condition >= limits[WARN_CONDITION] * leaving:
+    elif condition >= limits[WARN_CONDITION] * hysteresis:
         cause = Cause.CONDITION.value
-    elif time < limits[WARN_TIME] / leaving:
+    elif time < limits[WARN_TIME] / hysteresis:
         cause = Cause.PREDICTED.value
-    stop = limits[STOP_CONDITION] * (LEAVING if state[STOPPED] > 0.0 else 1.0)
+    stop = limits[STOP_CONDITION] * (HYSTERESIS if state[STOPPED] > 0.0 else 1.0)
     state[CAUSE], state[STOPPED], state[TIME] = cause, condition >= stop, time
     if determinant != 0.0:
         state[LAST] = determinant

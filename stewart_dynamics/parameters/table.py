@@ -35,6 +35,9 @@ from stewart_dynamics.parameters.rules import Parameter
 
 # The length of a given quaternion may differ from one by this; the quaternion is normalized.
 QUATERNION_TOLERANCE = 1e-3
+# A singularity warning or stop ends below this part of the condition number at which it began, or
+# when the predicted time to the crossing exceeds warn_time divided by it.
+HYSTERESIS = 0.8
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """[m/s^2]"""
 
@@ -140,10 +143,12 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),
     Parameter('singularity.warn_condition', 'double', 'condition number of J_inv at which the '
-              'singularity warning begins; it ends below 0.8 of this', '', 20.0, minimum=1.0,
+              f'singularity warning begins; it ends below {HYSTERESIS:g} of this', '', 20.0,
+              minimum=1.0,
               while_active=True),
     Parameter('singularity.stop_condition', 'double',
-              'condition number at which singularity.action begins; it ends below 0.8 of this', '',
+              'condition number at which singularity.action begins; it ends below '
+              f'{HYSTERESIS:g} of this', '',
               100.0, minimum=1.0, while_active=True),
     Parameter('singularity.warn_time', 'double',
               'warn when the predicted time to a crossing of det(J) = 0 is shorter than this', 's',

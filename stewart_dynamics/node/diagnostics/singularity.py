@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
-from stewart_dynamics.mechanics.singularity import Cause, LEAVING
+from stewart_dynamics.mechanics.singularity import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LogLine, OK, Part, PERIOD, WARN)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
 from stewart_dynamics.setpoints.step import Output
 
 
@@ -42,7 +42,7 @@ def singularity_state(output: Output, parameters: Parameters) -> Level:
     if state.cause is Cause.CONDITION:
         return Level(WARN, _condition(output, parameters, 'warn_condition'))
     time, bound = state.time_to_crossing, parameters['singularity.warn_time']
-    ends = '' if time < bound else f' (the warning ends above {bound / LEAVING:g} s)'
+    ends = '' if time < bound else f' (the warning ends above {bound / HYSTERESIS:g} s)'
     return Level(WARN, f'crossing of det(J) = 0 predicted in {time:.3g} s, singularity.warn_time '
                  f'is {bound:g} s{ends}')
 
@@ -52,7 +52,7 @@ def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
     if condition >= bound:
         return f'condition number {condition:.4g} exceeds singularity.{threshold}, {bound:g}'
     return (f'condition number {condition:.4g} has exceeded singularity.{threshold}, {bound:g}, '
-            f'and is not yet below {LEAVING * bound:g}')
+            f'and is not yet below {HYSTERESIS * bound:g}')
 
 
 class SingularityDiagnostics(Part):
