@@ -52,7 +52,7 @@ from stewart_dynamics.whole_file import write_files
 FOLDER = Path(__file__).with_name('templates')
 # A frame of the moving platform: position, rotation, lengths, forces.
 _FRAME = 24
-# At most so many times of one kind are listed, the first ones.
+# Maximum number of listed times of one kind, the first ones.
 _MOST_TIMES = 20
 
 

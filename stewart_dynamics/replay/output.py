@@ -42,7 +42,7 @@ import yaml  # type: ignore[import-untyped]
 _LIBRARY = 'stewart_dynamics'
 # Late subscribers get their last message, in `ros2 bag play`, too.
 _LATCHED = 'singularity_warning', TF_STATIC, ROBOT_DESCRIPTION
-# Of a message record: opcode, length, channel, sequence, log time and publish time.
+# Bytes of a message record before the message: opcode, length, channel, sequence, two times.
 _HEAD = 31
 # Opcode, length, times of first and last message, size, checksum, no compression, size.
 _CHUNK_HEAD = Struct('<BQQQQIIQ')
@@ -65,7 +65,7 @@ class OutputBag:
     model : RecordedModel
         Serializes those that show the hexapod as a model.
     rate : float
-        At most so many of these are written in a second [Hz]; 0: none, and no topics of them.
+        Highest rate of these [Hz]; 0: they are not written and have no topics.
 
     """
 
@@ -101,7 +101,7 @@ class OutputBag:
     def write(self, times: Stamps, motions: Array, outputs: Outputs, base_wrenches: Array,
               ) -> None:
         """
-        Write a chunk: what each setpoint gives.
+        Write a chunk: the messages of setpoints.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class OutputBag:
         outputs : Outputs
             N of them.
         base_wrenches : (N, 6)
-            Their base wrenches [N, N m]; nan: there is none.
+            Their base wrenches [N, N m]; nan: not known.
 
         """
         if not len(times):

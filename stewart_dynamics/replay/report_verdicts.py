@@ -93,7 +93,7 @@ class MarginColumn(NamedTuple):
     name: str
     unit: str
     key: str
-    """Of a leg in summary.json."""
+    """Key of a leg in summary.json."""
     limits: tuple[str, ...]
 
 

@@ -57,7 +57,7 @@ class _Block(NamedTuple):
 
 
 class _Exceeded(NamedTuple):
-    """Of each leg, the number of setpoints that exceed a limit, and the time of the first."""
+    """Number of setpoints that exceed a limit, of each leg, and the time of the first."""
 
     setpoints: Integers
     first_at: Array

@@ -210,8 +210,8 @@ def _heading(setpoints: Mapping[str, Any]) -> str:
     return text
 
 
-# Of the table of legs: group, title, key, width, decimals. With the leg's name and the mark they
-# have the width _WIDTH.
+# Columns of the table of legs: group, title, key, width, decimals. With the leg's name and the
+# mark, they have the width _WIDTH.
 _COLUMNS = (
     ('force [N]', 'peak', 'force_peak_n', 10, 1), ('force [N]', 'at [s]', 'force_peak_at_s', 9, 2),
     ('force [N]', 'RMS', 'force_rms_n', 9, 1), ('force [N]', 'margin', 'force_margin_n', 9, 1),
@@ -245,7 +245,7 @@ def _legs_table(legs: Mapping[str, Mapping[str, float | None]],
 
 
 def _fitted(value: float | None, width: int, digits: int) -> str:
-    """Return a number with so many decimals, or fewer if it would be too wide."""
+    """Return a number with these decimals, or fewer if it would be too wide."""
     if value is None:
         return f'{"-":>{width}}'
     for text in (f'{value:.{digits}f}', f'{value:.0f}'):

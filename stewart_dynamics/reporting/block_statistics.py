@@ -27,9 +27,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 
-# At most so many crossings and warnings are listed; all are counted.
+# Maximum number of crossings and of warnings that are listed; all are counted.
 LISTED = 100
-# A step longer than so many usual steps (and than setpoint.timeout) is a gap; the usual step is
+# A step longer than this number of usual steps (and than setpoint.timeout) is a gap; the usual is
 # the median of the steps between the first setpoints, FIRST of them.
 _GAP = 10.0
 FIRST = 1000
@@ -44,7 +44,7 @@ def longest_step(first: Array, timeout: float) -> float:
 
 class Extreme:
     """
-    Of each column the value that is the greatest by a measure, and when it first occurs.
+    Greatest value of each column by a measure, and the time when it first occurs.
 
     Values that are nan, or whose measure is -inf, are left out.
     """
@@ -72,7 +72,7 @@ class Extreme:
 
 class Integral:
     """
-    Of each column the integral over time by trapezoids, and the mean.
+    Integral of each column over time by trapezoids, and its mean.
 
     Rows with a nan are left out, with the steps to and from them.
     """

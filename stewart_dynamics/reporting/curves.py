@@ -63,7 +63,7 @@ class Curves:
         self._timeout = timeout
         self._lowest = np.full((channels, buckets), np.inf)
         self._highest = np.full((channels, buckets), -np.inf)
-        # when [s]; the last: of the first missing value in a bucket, inf if there is none
+        # times [s]; the last: of the first missing value in a bucket, inf if no value is missing
         self._lowest_at = np.full((channels, buckets), np.inf)
         self._highest_at = np.full((channels, buckets), np.inf)
         self._missing_at = np.full((channels, buckets), np.inf)

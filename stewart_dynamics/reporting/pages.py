@@ -44,7 +44,7 @@ _THIN_SPACE = '\u202f'
 
 
 def number(value: float | None, decimals: int) -> str:
-    """Return a number with so many decimals, without any from 1e5 on."""
+    """Return a number with a given number of decimals, without decimals from 1e5 on."""
     if value is None or not math.isfinite(value):
         return '–'
     return _typeset(f'{value:,.{decimals}f}') if abs(value) < 1e5 else digits(value)

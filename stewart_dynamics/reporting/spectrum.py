@@ -22,6 +22,10 @@ the mean of each removed, Hann windows, the mean of their power spectra.
 The length of a bag is not known before its end, and a short one needs short segments. So the first
 samples are kept: as many as make ENOUGH of the longest segments. At their end, or at the end of
 the bag, the segments get the greatest length, a power of two, of which there are enough.
+
+``scipy.signal.welch`` gives the same numbers (see the tests) for samples that are all in memory.
+Its import takes longer than the spectra of a million samples, and only
+--differentiate requires SciPy.
 """
 
 from __future__ import annotations
@@ -36,7 +40,7 @@ from stewart_dynamics.reporting.block_statistics import FIRST, longest_step
 
 # Samples in a segment.
 SHORTEST, LONGEST = 2 ** 6, 2 ** 15
-# So many segments make a spectrum; of the shortest ones, one will do.
+# Number of segments that make a spectrum; one of the shortest is enough.
 ENOUGH = 4
 _KEPT = (ENOUGH + 1) * LONGEST // 2
 # A step in time that differs by less than this part from a multiple of the usual one is even.
@@ -178,7 +182,7 @@ class Spectrum:
         self._last = None
 
     def _add_run(self, steps: Array, values: Array) -> None:
-        """Add samples that go on from the last one, or begin a run if there is none."""
+        """Add samples that continue the present run, or begin one."""
         places = np.cumsum(steps)
         if self._last is None:
             places -= places[0]
@@ -220,7 +224,7 @@ def _segments(samples: int, length: int) -> int:
 
 
 def _length_for(runs: Sequence[int]) -> int:
-    """Return the length of segments for runs of so many samples; 0: there are too few."""
+    """Return the length of segments for runs of these numbers of samples; 0: too few."""
     length = LONGEST
     while length > SHORTEST and sum(_segments(run, length) for run in runs) < ENOUGH:
         length //= 2
