@@ -155,9 +155,9 @@ def run(rounds: int) -> tuple[list[str], list[Figure]]:
     node, call = COLD
     return ['', *markdown(cells), '', f'{processor_name()}. Medians of {rounds} starts, of '
             f'{len(cold[node])} of the first ones.', ''], [
-        Figure('compiling for the node', compiling[node], 8.0, 'processor s'),
+        Figure('compiling for the node', compiling[node], 6.0, 'processor s'),
         Figure('compiling for the first inverse dynamics', compiling[call], 3.0, 'processor s'),
         Figure('start of the node', of(warm[node]).seconds, 0.5, 's'),
-        Figure('`import stewart_dynamics`', of(warm['`import stewart_dynamics`']).seconds, 0.12,
+        Figure('`import stewart_dynamics`', of(warm['`import stewart_dynamics`']).seconds, 0.06,
                's'),
         Figure('`stewart_replay --help`', of(warm['`stewart_replay --help`']).seconds, 0.2, 's')]

@@ -24,27 +24,27 @@ from importlib import import_module
 import time
 
 from stewart_dynamics.compilation.functions import EntryPoint, prepare
-from stewart_dynamics.compilation.machine_code import folder_to_write, HINT
+from stewart_dynamics.compilation.machine_code import folder_to_write, HINT, load, PACKAGE
 
-MODULES = (
-    'mechanics.dynamics.inverse_dynamics', 'mechanics.dynamics.forward_dynamics',
-    'mechanics.dynamics.base_wrench', 'mechanics.dynamics.friction',
-    'mechanics.dynamics.regressor', 'mechanics.kinematics.forward_kinematics',
-    'mechanics.kinematics.joint_angles', 'simulator.plant_dynamics', 'setpoints.step',
-    'external_wrench.estimate', 'bags.blocks', 'bags.mcap_scan', 'capability.travel')
-"""Those with functions that Python calls."""
+
+def modules() -> list[str]:
+    """Return the names of the modules with functions that Python calls as machine code."""
+    return sorted('.'.join(path.relative_to(PACKAGE.parent).with_suffix('').parts)
+                  for path in PACKAGE.rglob('*.py')
+                  if '\n@entry_point(' in path.read_text(encoding='utf-8'))
 
 
 def compile_all() -> int:
-    """Compile what is not on disk, print what was done, and return the exit code."""
+    """Compile all functions that are not on disk, print their number, return the exit code."""
     if HINT:
         print(f'stewart_dynamics: nothing is compiled: {HINT}')
         return 1
     begun = time.monotonic()
-    functions = [each for name in MODULES for each in vars(
-        import_module(f'stewart_dynamics.{name}')).values() if isinstance(each, EntryPoint)]
-    missing = [each for each in functions if not each.load()]
-    prepare(missing)
-    print(f'stewart_dynamics: {len(functions)} functions are compiled, {len(missing)} of them now '
-          f'in {time.monotonic() - begun:.0f} s; their machine code is in {folder_to_write()}')
+    names = modules()
+    functions = [each for name in names for each in vars(import_module(name)).values()
+                 if isinstance(each, EntryPoint)]
+    missing = [name for name in names if not load(name)]
+    prepare(functions)
+    print(f'stewart_dynamics: {len(names)} modules are compiled, {len(missing)} of them now in '
+          f'{time.monotonic() - begun:.0f} s; their machine code is in {folder_to_write()}')
     return 0 if all(each.compiled for each in functions) else 1

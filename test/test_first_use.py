@@ -35,7 +35,7 @@ from test_dynamics_node import MOVING
 from test_external_wrench_node import Felt
 from test_planned_trajectory_node import check, MOTION
 
-# What the test lets the node compile: the first of a planned trajectory, and the external wrench.
+# Modules that the test lets the node compile: for planned trajectories and external wrenches.
 LATER = ('stewart_dynamics.mechanics.kinematics.forward_kinematics',
          'stewart_dynamics.external_wrench.estimate')
 
@@ -54,7 +54,7 @@ def kept(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
-def test_what_is_needed_later_is_compiled_while_setpoints_are_answered(
+def test_later_functions_are_compiled_while_setpoints_are_answered(
         start: Callable[..., DynamicsNode], kept: Path) -> None:
     node = start(STEWART_DYNAMICS_CACHE_DIR=str(kept))
     node.until_active()

@@ -413,6 +413,15 @@ def test_what_is_no_file_of_ours_neither_blocks_nor_fails(kept: Path, kind: str)
     assert not is_kept('scaled_sums')
 
 
+def test_a_module_that_two_threads_load_stays_where_it_is(kept: Path) -> None:
+    function = imported('scaled_sums')
+    assert function.load()
+    check(function)
+    engine = machine_code._engines['scaled_sums']
+    machine_code._load('scaled_sums', machine_code._kept(kept, 'scaled_sums'))
+    assert machine_code._engines['scaled_sums'] is engine
+
+
 def test_a_fork_while_threads_load_code_does_not_hang(
         kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     loading = Event()
@@ -441,11 +450,3 @@ def test_a_fork_while_threads_load_code_does_not_hang(
     thread.join()
     assert os.waitpid(child, 0)[1] == 0
     check(function)
-
-
-def test_all_functions_that_are_called_are_compiled_at_installation() -> None:
-    from stewart_dynamics.compile_all import MODULES
-    package = ROOT / 'stewart_dynamics'
-    assert set(MODULES) == {
-        '.'.join(path.relative_to(package).with_suffix('').parts)
-        for path in package.rglob('*.py') if '@entry_point(' in path.read_text()}

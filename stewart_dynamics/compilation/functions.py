@@ -204,23 +204,20 @@ class Preparation:
     def __init__(self, *functions: EntryPoint) -> None:
         self._functions = functions
         self._thread: Thread | None = None
-        self.ready = all(function.load() for function in functions)
+        for function in functions:
+            function.load()
+
+    @property
+    def ready(self) -> bool:
         """Whether nothing remains to be compiled."""
+        return all(machine_code.prepared(each.function.__module__) for each in self._functions)
 
     def begin(self) -> None:
         """Start to compile missing functions in a thread, once."""
         if self._thread is None and not self.ready:
-            self._thread = Thread(target=self._run, daemon=True)
+            self._thread = Thread(target=prepare, args=[self._functions], daemon=True)
             self._thread.start()
 
     def finish(self) -> None:
-        """Load or compile what is missing, and return when all of it is ready."""
-        if not self.ready:
-            prepare(self._functions)
-            self.ready = True
-
-    def _run(self) -> None:
-        try:
-            prepare(self._functions)
-        finally:  # functions that cannot be compiled run uncompiled
-            self.ready = True
+        """Load or compile missing functions, and return when all are ready."""
+        prepare(self._functions)

@@ -64,6 +64,8 @@ _DIGEST_SIZE = 32
 def _hint() -> str:
     if os.environ.get('NUMBA_DISABLE_JIT', '0') not in ('', '0'):
         return f'NUMBA_DISABLE_JIT is set: {_UNCOMPILED}'
+    if os.name != 'posix':
+        return f'the compiler needs a POSIX system: {_UNCOMPILED}'
     if find_spec('numba') is None:
         return f'numba is not installed: {_UNCOMPILED}; pip install numba'
     return ''
@@ -90,8 +92,9 @@ def _after_fork() -> None:
     _llvm.release()
 
 
-os.register_at_fork(
-    before=_llvm.acquire, after_in_parent=_llvm.release, after_in_child=_after_fork)
+if os.name == 'posix':
+    os.register_at_fork(
+        before=_llvm.acquire, after_in_parent=_llvm.release, after_in_child=_after_fork)
 
 
 def address(module: str, name: str) -> int:
@@ -100,9 +103,14 @@ def address(module: str, name: str) -> int:
     return engine.get_function_address(f'{module}.{name}') if engine else 0
 
 
+def prepared(module: str) -> bool:
+    """Return whether a module's functions can be called without a wait."""
+    return not COMPILED or module in _engines
+
+
 def load(module: str) -> bool:
     """Load a module's machine code from the disk; return False if it must be compiled first."""
-    return not COMPILED or module in _engines or any(
+    return prepared(module) or any(
         _load(module, code) for folder in _folders() if (code := _kept(folder, module)))
 
 
@@ -115,9 +123,9 @@ def prepare(module: str) -> None:
         try:
             code = _compile(module)
         except (OSError, TypeError) as exc:  # TypeError: Python does not know where it is
+            _engines[module] = None
             warnings.warn(f'{module} cannot be compiled: {exc}: {_UNCOMPILED}', RuntimeWarning,
                           stacklevel=2)
-            _engines[module] = None
             return
         _load(module, code)
         _keep(module, code)
@@ -147,12 +155,13 @@ def _load(module: str, code: bytes) -> bool:
 
     # In a thread: signal handlers raise in the main thread, and would leave llvmlite's objects
     # half made.
-    _engines[module] = ThreadPoolExecutor(1).submit(engine).result()
+    # The first stays: threads that loaded it at the same time may call it already.
+    _engines.setdefault(module, ThreadPoolExecutor(1).submit(engine).result())
     return True
 
 
 def _compile(module: str) -> bytes:
-    """Return the compiler's answer: the names of the modules that it has read; an object file."""
+    """Return the compiler's answer: a line with the sources that it has read, an object file."""
     # The compiler reads this copy of the package, whatever the present folder is.
     paths = [str(PACKAGE.parent), *(os.path.abspath(path) for path in sys.path if path)]
     with TemporaryDirectory() as folder:

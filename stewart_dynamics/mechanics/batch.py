@@ -46,13 +46,13 @@ def solve(constants: Array, motions: Array, wrenches: Array | None = None,
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     motions : (N, MOTION)
-        Rows of motion, laid out as ``rows`` says.
+        Rows of motion, see ``rows`` for the layout.
     wrenches : (N, WRENCH) or (1, WRENCH), optional
         External wrenches at the platform's origin, base axes [N, N m]; one row for all.
     bases : (N, BASE) or (1, BASE), optional
-        Rows of the base's motion, one row for all; none: it is still.
+        Rows of the base's motion, one row for all; without them it is still.
 
     """
     motions = compact(motions)
@@ -75,8 +75,8 @@ def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[
     def call(*rows: NDArray[Any]) -> None:
         compute(constants, *rows, *([np.empty(scratch)] if scratch else []))
 
-    many = len(arrays[0])
-    threads = min(_CPUS, many // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
+    samples = len(arrays[0])
+    threads = min(_CPUS, samples // _SAMPLES_FOR_A_THREAD) if COMPILED else 1
     if threads < 2:
         call(*arrays)
         return
@@ -85,7 +85,7 @@ def in_parts(compute: Callable[..., object], constants: Array, *arrays: NDArray[
         call(*(array if len(array) == 1 else array[begin:end] for array in arrays))
 
     # More parts than threads: if one thread is slow, the others take more parts.
-    edges = np.linspace(0, many, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
+    edges = np.linspace(0, samples, _PARTS_OF_A_THREAD * threads + 1).astype(int).tolist()
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(part, edges[:-1], edges[1:]))
 

@@ -15,10 +15,9 @@
 """
 The calls of the library for one sample, as fast as a control loop or an MPC needs them.
 
-A call takes the time of the arithmetic and little more: arguments are copied to memory whose
-address the machine code knows already. A call returns None where an argument must be converted
-or is wrong, and where the result is not sound; the call for batches then does what is needed, or
-says what is wrong.
+A call takes little more time than the arithmetic: arguments are copied to memory whose address
+the machine code knows already. A call returns None if an argument must be converted or is wrong,
+or if the result is not sound; the call for batches then converts the argument or raises the error.
 """
 
 from __future__ import annotations
@@ -44,10 +43,10 @@ _NO_WRENCH = np.zeros(WRENCH)
 _NO_BASE = np.array(NO_BASE)
 _POSE = POSE.stop
 
-# The numbers of each array, the arrays, and what calls the function with them.
+# A memoryview of each array, the arrays, and the function bound to them.
 _Memory = tuple[tuple[Any, ...], tuple[NDArray[Any], ...], Callable[[], object]]
 
-# What a memoryview raises where an argument is no array of floats of its shape.
+# Errors of a memoryview if an argument is not an array of floats of its shape.
 _NO_FLOATS = (TypeError, ValueError)
 
 
@@ -58,7 +57,7 @@ class SingleSample:
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
 
     """
 
@@ -175,7 +174,7 @@ class _Memories:
     function : EntryPoint
         Called with the constants and with arrays.
     constants : (CONSTANTS,)
-        Of the hexapod.
+        Constants of the hexapod.
     arrays
         Like those of each call.
 

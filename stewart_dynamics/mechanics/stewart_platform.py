@@ -64,7 +64,7 @@ class StewartPlatform:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class StewartPlatform:
     @classmethod
     def from_yaml(cls, path: str | Path, node: str = '') -> StewartPlatform:
         """
-        Return the hexapod of a parameter file; ParameterError names what is wrong in it.
+        Return the hexapod of a parameter file; ParameterError names the mistake in it.
 
         A file with several nodes needs the node's name, with its namespace.
         """
@@ -128,7 +128,7 @@ class StewartPlatform:
         Parameters
         ----------
         motion : Motion
-            Of any leading shape (...).
+            Motions of any leading shape (...).
         wrench : (..., 6), optional
             External wrench on the platform at its origin: force [N] and moment [N m], base
             axes; zero by default.
@@ -265,7 +265,7 @@ class StewartPlatform:
         motion : Motion
             Its own accelerations are ignored.
         forces : (..., 6)
-            Of the actuators [N], + pushes. Their friction is subtracted.
+            Forces of the actuators [N], + pushes. Their friction is subtracted.
         wrench : (..., 6), optional
             External wrench on the platform, as in ``inverse_dynamics``.
         base : BaseMotion, optional
@@ -451,9 +451,9 @@ class StewartPlatform:
         Parameters
         ----------
         pose : Pose or Motion
-            Of any leading shape (...).
+            Poses of any leading shape (...).
         leg_stiffness : float or (..., 6)
-            Of each leg along its axis [N/m], one number for all legs or one for each.
+            Stiffness of each leg along its axis [N/m]; one number is for all legs.
 
         Returns
         -------
