@@ -20,12 +20,15 @@ import numpy as np
 import pytest
 from referees import rng
 
+from stewart_dynamics import StewartPlatform
+from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.lack_of_fit import deviations
 from stewart_dynamics.identification.results import document
 from stewart_dynamics.identification.text import result_text
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
+import wrong_models
 from wrong_models import Case, CAUSES, GIVEN, identify, simulated, true_hexapod
 
 
@@ -65,6 +68,45 @@ def test_what_is_asked_for_is_no_lack_of_fit() -> None:
     case = CAUSES['offsets of 20 N RMS'][0](true_hexapod(1), rng(1001))
     kinds = ('platform', 'friction', 'offset')
     assert identify(simulated(case, 1), GIVEN, kinds).lack_of_fit is None
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.015, 0.04, 0.09])
+def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
+        delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'NOISE', wrong_models.NOISE._replace(delay=delay))
+    case = Case(true_hexapod(2))
+    found = identify(simulated(case, 2))
+    assert (found.likely, found.lack_of_fit) == ((), None)
+    (bag,) = document(found, Options())['bags']
+    assert bag['delay_s'] == pytest.approx(delay, abs=2e-4)
+    off = np.abs(found.fit.values - Unknowns(case.true).start)
+    assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
+
+
+def test_longer_delays_are_a_likely_mistake(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wrong_models, 'NOISE', wrong_models.NOISE._replace(delay=0.13))
+    likely = identify(simulated(Case(true_hexapod(2)), 2)).likely
+    assert likely[0].what == 'delay'
+    assert 'later than the positions by 0.1 s or more' in likely[0].text
+
+
+@pytest.mark.parametrize(('velocity', 'said'), [(1e-3, False), (2.0, True)])
+def test_rates_inside_the_band_of_coulomb_friction_are_said(velocity: float, said: bool) -> None:
+    band = {'actuator.coulomb_velocity': velocity}
+    case = Case(true_hexapod(2).replaced(band))
+    (bag,) = identify(simulated(case, 2), GIVEN.replaced(band)).bags
+    assert any('% of the rates are below actuator.coulomb_velocity' in each
+               for each in bag.notices) == said
+
+
+def test_lengths_of_a_platform_below_its_base_have_their_pose() -> None:
+    below = GIVEN.replaced({'geometry.platform_side': 'negative'})
+    for p, sign in ((GIVEN, 1.0), (below, -1.0)):
+        platform = StewartPlatform(p)
+        home = platform.home_pose()
+        assert np.sign(home.position[2]) == sign
+        lengths = platform.inverse_kinematics(home) + 0.01
+        assert np.sign(pose_near(platform, lengths).position[2]) == sign
 
 
 def test_deviations_have_the_probability_of_chi_squared() -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator
 from pathlib import Path
+import time
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
@@ -85,9 +86,21 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
         given.identify, given.duration, given.highest_frequency, given.harmonics, given.amplitude,
         given.center and tuple(given.center), given.noise, given.rate, given.generations,
         given.seed)
+    print(f'designing a motion of {asked.duration:g} s in {asked.generations} generations: takes '
+          'about half a minute on an idle computer, minutes on a loaded one', flush=True)
+    tenth = max(1, asked.generations // 10)
+    begun = time.monotonic()
+
+    def progress(done: int) -> None:
+        bar.update(done - bar.n)
+        if bar.disable and done % tenth == 0:  # no terminal
+            elapsed = time.monotonic() - begun
+            print(f'designed {100 * done // asked.generations} %, about '
+                  f'{elapsed * (asked.generations / done - 1.0):.0f} s left', flush=True)
+
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
-        designed = design(parameters, asked, lambda done: bar.update(done - bar.n))
+        designed = design(parameters, asked, progress)
     with whole_folder(folder, options, TRAJECTORY) as partial:
         path = partial / TRAJECTORY
         given_values = designed.trajectory.given

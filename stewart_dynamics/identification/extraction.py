@@ -48,6 +48,9 @@ ORDERS = 4
 """Efforts and so many of their derivatives less one."""
 # Of the limits [m]: nearer to them an end stop may be touched. Of force_max, as a part.
 _STOP, _SATURATED = 5e-5, 0.999
+# Lags are tried in steps of this part of a period of the cut-off; the residual squares must become
+# smaller by this.
+_LAG_STEP, _LESS = 0.05, 0.8
 # Samples of which the regressor is computed at once.
 _TOGETHER = 4096
 # Rates at which Stribeck friction may have fallen to 1/e, in RMS rates of the first window; and
@@ -152,6 +155,33 @@ class Extraction:
         return Extract(times, regressor, known, efforts, ~wrong[:many], legs,
                        decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE],
                        deviations, stops, Pose.of_rows(found.rows[-1]))
+
+    def lag(self, window: Window, guess: Pose, longest: float) -> int:
+        """
+        Return by how many samples the efforts are later than the positions, roughly.
+
+        The lag of which the forces that fit leave least, in steps of a period of the high band;
+        0 unless it is much less than without a lag.
+        """
+        extract = self(window, guess)
+        efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
+        steps = max(1, round(_LAG_STEP / (self.cutoff * self._period)))
+        lags = np.arange(0, round(longest / self._period) + steps, steps)
+        at = self.step * np.arange(len(extract.known))
+        used = at + lags[-1] < len(efforts)
+        at = at[used]
+        if len(at) < extract.regressor.shape[-1]:
+            return 0
+        sound = extract.sound[used].reshape(-1)
+        columns = extract.regressor[used].reshape(len(sound), -1)[sound]
+        sizes = np.linalg.norm(columns, axis=0)
+        basis = np.linalg.qr(columns[:, sizes > 0.0] / sizes[sizes > 0.0])[0]
+        left = []
+        for lag in lags:
+            forces = (efforts[at + lag] - extract.known[used]).reshape(-1)[sound]
+            left.append(float(forces @ forces - np.sum((basis.T @ forces) ** 2)))
+        best = int(np.argmin(left))
+        return int(lags[best]) if left[best] < _LESS * left[0] else 0
 
     def _slip(self, rates: Array) -> Array:
         assert self.speeds is not None

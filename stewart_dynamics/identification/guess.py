@@ -19,8 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Turns about z that are tried, the platform's axes parallel to the base's first [rad].
@@ -29,7 +30,7 @@ _TURNS = (0.0, 0.3, -0.3, 0.6, -0.6)
 
 def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
     """
-    Return the pose of lengths (6,), begun at the home pose, or where legs are as long on average.
+    Return the pose of lengths (6,), sought from home and from level poses on both sides.
 
     Raises
     ------
@@ -37,18 +38,15 @@ def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
         No beginning leads to a pose with these lengths.
 
     """
-    guesses = []
-    try:
-        guesses.append(platform.home_pose())
-    except ParameterError:  # without limits there may be none
-        pass
     p = platform.parameters
+    positions, rotations = homes(p)  # both sides of the base, the more likely one first
+    guesses = [Pose(*each) for each in zip(positions, rotations, strict=True)]
     across = p['geometry.platform_joints'] - p['geometry.base_joints']
     level = float(np.mean(lengths ** 2 - np.sum(across[:, :2] ** 2, axis=1)))
     height = np.sqrt(max(level, 1e-4))
-    up = -1.0 if p['gravity'][2] > 0.0 else 1.0
+    side = 1.0 if positions[0, 2] >= 0.0 else -1.0
     guesses += [Pose.from_euler([0.0, 0.0, up * height - across[:, 2].mean()], [0.0, 0.0, turn])
-                for turn in _TURNS]
+                for up in (side, -side) for turn in _TURNS]
     for guess in guesses[:-1]:
         try:
             return platform.forward_kinematics(lengths, guess)

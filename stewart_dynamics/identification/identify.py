@@ -41,7 +41,7 @@ from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
-    Likely, of_efforts, of_fit, of_no_pose)
+    Likely, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
@@ -59,6 +59,10 @@ _MOST_OUTLIERS = 0.2
 _FEWEST = 20
 # Of fewer seconds the correlations of the residuals are not known well.
 _SHORT = 10.0
+# Delays of the efforts up to this are found [s].
+LONGEST_LAG = 0.1
+# A larger share of the rates inside the band of Coulomb friction is said.
+_MOST_INSIDE = 0.5
 # A seed: of the noise that is added to see what noise alone seems to tell.
 _SEED = 20221
 
@@ -73,6 +77,8 @@ class BagRead(NamedTuple):
     period: float
     cutoff: float
     rates: bool
+    lag: float
+    """Time by which the efforts were shifted beforehand [s]; delays of the fit are added."""
     rejected: dict[str, int]
     windows_left_out: int
     """Too short for the filters, between gaps."""
@@ -167,7 +173,7 @@ class Identification:
         with closing(Recording(path)) as recording:
             topics = find_topics(recording, options.node, options.measured, options.efforts)
             legs = RecordedLegs(recording, topics, self.parameters['joints'],
-                                2.0 * _margin(options.cutoff))
+                                2.0 * _margin(options.cutoff) + LONGEST_LAG)
             bag = self.add(path, legs.windows(progress))
             if bag is None:
                 raise BagError(
@@ -184,7 +190,8 @@ class Identification:
     def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
         """Add the windows of a bag; return None if nothing of them can be used."""
         options, p = self._options, self.parameters
-        number, left_out, stops, outliers, samples = len(self.bags), 0, 0, 0, 0
+        number, left_out, stops, outliers, samples, lag = len(self.bags), 0, 0, 0, 0, 0
+        inside = rows = 0.0
         extraction: Extraction | None = None
         last: Extract | None = None
         begin = end = 0
@@ -198,15 +205,24 @@ class Identification:
             if options.motor_torque:
                 window = window._replace(
                     efforts=window.efforts * 2.0 * np.pi / p['actuator.screw_lead'])
-            if len(window.positions) < 2 * extraction.margin + 2 * extraction.step:
+            fewest = 2 * extraction.margin + 2 * extraction.step
+            if len(window.positions) < fewest + lag:
                 left_out += 1
                 continue
+            if last is None and options.delay:
+                lag = self._lag(extraction, window)
+                if len(window.positions) < fewest + lag:
+                    lag = 0
+            window = window.with_lag(lag)
             last = self._extract(path, number, extraction, window, (
                 window.begin - begin) * 1e-9, last)
             self._speeds = extraction.speeds
             stops, outliers = stops + last.stops, outliers + int(
                 np.count_nonzero(window.outliers))
             samples += len(window.positions)
+            inside += float(np.count_nonzero(
+                np.abs(last.legs[..., 1]) < p['actuator.coulomb_velocity']))
+            rows += last.known.size
             end = window.begin + round(len(window.positions) * window.period * 1e9)
             rates, period = window.rates is not None, window.period
         if extraction is None or last is None or self.extracts.samples == before:
@@ -218,10 +234,23 @@ class Identification:
         if (self.extracts.samples - before) * extraction.step * period < _SHORT:
             notices.append(f'less than {_SHORT:g} s are left by the filters: intervals are too '
                            'narrow for so short a recording')
+        if inside > _MOST_INSIDE * rows and any(
+                'coulomb_friction' in name for name in self.unknowns.names):
+            notices.append(
+                f'{100.0 * inside / rows:.0f} % of the rates are below actuator.coulomb_velocity: '
+                'Coulomb friction is linear there, and its value depends on that parameter')
         self.bags.append(BagRead(
             path, Topics('', ''), samples, (end - begin) * 1e-9, period, extraction.cutoff,
-            rates, {}, left_out, stops, outliers, last.deviations, [], notices))
+            rates, lag * period, {}, left_out, stops, outliers, last.deviations, [], notices))
         return self.bags[-1]
+
+    def _lag(self, extraction: Extraction, window: Window) -> int:
+        piece = most_motion(window, extraction)
+        lengths = piece.positions[0] + self.parameters['geometry.zero_length']
+        try:
+            return extraction.lag(piece, pose_near(self.platform, lengths), LONGEST_LAG)
+        except (PoseError, SingularityError):
+            return 0
 
     def _extract(self, path: Path, number: int, extraction: Extraction, window: Window,
                  begin: float, last: Extract | None) -> Extract:
@@ -264,7 +293,8 @@ class Identification:
                            'at limits.force_max')
         unsound = sum(int(np.count_nonzero(~each)) for each in self.chosen)
         sums = self._sums()
-        likely = list(of_efforts(sums, unknowns, self.parameters, options.motor_torque))
+        likely = [*of_delay((bag.lag, LONGEST_LAG) for bag in self.bags),
+                  *of_efforts(sums, unknowns, self.parameters, options.motor_torque)]
         found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
         outliers = self._leave_out_outliers(found)
         if outliers:

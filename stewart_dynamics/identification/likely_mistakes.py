@@ -22,7 +22,7 @@ machine, which fits worse than the right one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import Information, information, nothing, solve
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import AUTO, Parameters
 
 # A scale of the efforts that is as near to a known factor as this is that factor.
 _NEAR = 1.35
@@ -82,6 +82,15 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
     return f'{text}: likely geometry.zero_length or the geometry is wrong, or legs are swapped'
 
 
+def of_delay(bags: Iterable[tuple[float, float]]) -> Iterator[Likely]:
+    """Yield a likely mistake of delays; takes the delay of each bag and its upper limit [s]."""
+    for delay, limit in bags:
+        if delay >= limit:
+            yield Likely('delay', f'the efforts are later than the positions by {limit:g} s or '
+                                  'more: stamps of both must be of one clock')
+            return
+
+
 def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool,
                ) -> Iterator[Likely]:
     """
@@ -102,8 +111,11 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
     elif (scale > 0.0) == (by_file > 0.0) and 1.0 / _FAR < abs(by_file) < _FAR:
         scale = by_file  # its weight says that the unit is right, whatever the legs do
     if scale < 0.0:
+        other = '' if p['geometry.platform_side'] != AUTO else (
+            '; or the platform is on the other side of the base: geometry.platform_side')
         yield Likely('sign', 'the efforts have the opposite sign: + must push, as the forces of '
-                             f'the node do (they are {scale:.3g} times what the model computes)')
+                             f'the node do (they are {scale:.3g} times what the model computes)'
+                             f'{other}')
         return
     if 1.0 / _FAR < scale < _FAR:
         return
@@ -161,7 +173,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
         return
     if residual < _SUSPICIOUS:
         return
-    piece, joints = _piece(window, extraction), p['joints']
+    piece, joints = most_motion(window, extraction), p['joints']
     now = _tried(unknowns, extraction, piece, fit)
     found = [(now, 'misfit', (
         f'the residual is {100.0 * residual:.0f} % of the efforts whatever the parameters: '
@@ -232,7 +244,7 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
     return float(values[-1]), float(np.sqrt(variance * found.covariance[-1, -1]) / sizes[-1])
 
 
-def _piece(window: Window, extraction: Extraction) -> Window:
+def most_motion(window: Window, extraction: Extraction) -> Window:
     """Return the part of a window with the most motion, long enough for the filters."""
     many = min(len(window.positions), max(round(_PIECE / window.period), 4 * extraction.margin))
     moved = np.cumsum(np.abs(np.diff(window.positions, axis=0, prepend=window.positions[:1])

@@ -64,7 +64,7 @@ def document(found: Identified, options: Options) -> dict[str, Any]:
             'samples_at_stops': bag.stops, 'samples_outliers': bag.outliers,
             'noise_of_lengths_m': bag.deviations[0], 'noise_of_rates_m_s': _plain(
                 bag.deviations[1]),
-            'delay_s': float(delay) if error else None,
+            'delay_s': float(delay + bag.lag) if error else None,
             'delay_standard_error_s': float(error) if error else None,
             'missing': bag.missing, 'notices': bag.notices,
         } for bag, delay, error in zip(

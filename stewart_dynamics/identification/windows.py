@@ -67,6 +67,15 @@ class Window(NamedTuple):
     outliers: Flags
     """(N, 6): an effort or a position of that leg was replaced."""
 
+    def with_lag(self, lag: int) -> Window:
+        """Return the window with efforts that are recorded a number of samples later."""
+        if not lag:
+            return self
+        return self._replace(
+            positions=self.positions[:-lag], efforts=self.efforts[lag:],
+            rates=None if self.rates is None else self.rates[:-lag],
+            outliers=self.outliers[:-lag] | self.outliers[lag:])
+
 
 def period_of(stamps: Stamps) -> float:
     """Return the usual time between samples [s]."""
