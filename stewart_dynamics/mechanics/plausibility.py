@@ -36,7 +36,8 @@ from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
-from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+from stewart_dynamics.parameters.table import (
+    inertia_matrix, Parameters, STANDARD_GRAVITY)
 
 # Of the place of a joint in a message.
 _DIGITS = 5
@@ -254,7 +255,8 @@ def _others(p: Parameters, shape: Shape) -> Iterator[str]:
     if gravity > _LARGEST_GRAVITY:
         yield f'gravity: {gravity:.6g} m/s^2: four times that of Jupiter: in mm/s^2?'
     if math.isclose(gravity, 1.0, rel_tol=1e-3):
-        yield f'gravity: {gravity:.6g} m/s^2: in g? The earth has 9.80665'
+        yield (f'gravity: {gravity:.6g} m/s^2: in g? The earth has '
+               f'{-STANDARD_GRAVITY[2]:g}')
     weight, most = p['platform.mass'] * gravity, p['limits.force_max']
     if most is not None and gravity <= _LARGEST_GRAVITY and weight > most.sum():
         yield (f'limits.force_max: {_listed(np.unique(most))} N: six such legs cannot carry the '
