@@ -38,7 +38,7 @@ def rows_of(quaternions: Array, random: np.random.Generator) -> Array:
 
 
 def some(turn: float) -> tuple[Interpolation, Array, Array]:
-    """Return the motion between points that are turned by about so much, durations, points."""
+    """Return the motion between points turned by about this angle, durations and points."""
     random = rng()
     quaternions = np.array([0.0, 0.0, 0.0, 1.0]) + turn * random.normal(size=(MANY + 1, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)

@@ -50,7 +50,7 @@ from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, FORCES, LINE
 
 Array = NDArray[np.float64]
 
-# What the result has of each sample.
+# The numbers of a result for each sample.
 SIX = 'lengths', 'rates', 'forces', 'unit_load_forces'
 NUMBERS = 'determinant', 'determinant_rate', 'condition_number', 'time_to_crossing'
 
@@ -97,7 +97,7 @@ def samples_of_all_kinds(many: int) -> tuple[StewartPlatform, Array]:
 
 
 def run(code: str, path: Path = PACKAGE.parent, **environment: str) -> str:
-    """Run Python code against the package under a path, and return what it prints."""
+    """Run Python code against the package under a path, and return its output."""
     done = subprocess.run(
         [sys.executable, '-c', code], cwd=path, capture_output=True, text=True, check=False,
         env={**os.environ, **environment, 'PYTHONPATH': str(path)})

@@ -149,7 +149,7 @@ def test_lengths_in_mm_throughout_have_no_other_cause() -> None:
     assert not any('in g?' in mistake for mistake in found), found
 
 
-# Mistakes: what is changed in the package's hexapod, and the warnings, word for word
+# Mistakes: changes of the package's hexapod, and the warnings, word for word
 
 BASE, TOP = PLATFORM['geometry.base_joints'], PLATFORM['geometry.platform_joints']
 INERTIA = PLATFORM['platform.inertia']

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Poses: their constructors, and what poses and motions share as sequences of samples."""
+"""Poses: their constructors, and poses and motions as sequences of samples."""
 
 from __future__ import annotations
 
