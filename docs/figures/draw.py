@@ -67,7 +67,8 @@ class Recorded(NamedTuple):
         with closing(Recording(bag)) as recording:
             parts = [setpoints.take_many(messages) for messages, _ in recording.messages(
                 {f'{NODE}/{topic}': topic for topic in setpoints.topics})]
-        batch = Batch._make(np.concatenate(part) for part in zip(*parts, strict=True))
+        batch = Batch._make(None if part[0] is None else np.concatenate(part)
+                            for part in zip(*parts, strict=True))
         outputs = Step(parameters).many(batch, None)
         return cls(parameters, (batch.stamps - batch.stamps[0]) * 1e-9, batch.motions, outputs)
 
