@@ -32,3 +32,6 @@ Six = tuple[float, float, float, float, float, float]
 """One number for each leg, or a wrench or twist."""
 
 NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+SECOND = 1_000_000_000
+"""A second in the unit of stamps [ns]."""

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
@@ -35,7 +35,6 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 _WINDOW = 1 << 16
 # Larger than any position [m] or force [N]: squares would overflow.
 _END = 1e100
-_SECOND = 1_000_000_000
 _LEGS, _EFFORTS = 'legs', 'efforts'
 
 
@@ -186,11 +185,11 @@ class RecordedLegs:
             if len(inner.stamps) < 8:
                 continue
             pushes = efforts.between(
-                int(inner.stamps[0]) - _SECOND, int(inner.stamps[-1]) + _SECOND)
+                int(inner.stamps[0]) - SECOND, int(inner.stamps[-1]) + SECOND)
             window = uniform(inner, pushes, self.period, bool(self.rates))
             if window is not None:
                 yield window
-        keep = end if last else end - round(self._overlap * _SECOND)
+        keep = end if last else end - round(self._overlap * SECOND)
         self._legs.keep_from(keep)
         self._efforts.keep_from(keep)
 

@@ -29,9 +29,11 @@ from struct import error as StructError
 from struct import Struct
 from typing import NamedTuple
 
+from stewart_dynamics.arrays import SECOND
+
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 # A builtin_interfaces/Time holds stamps below it [ns].
-STAMPS_END = 2 ** 31 * 1_000_000_000
+STAMPS_END = 2 ** 31 * SECOND
 
 # By the second byte of a message: 0 is big-endian, 1 little-endian.
 ORDERS = {0: '>', 1: '<'}
@@ -80,9 +82,9 @@ def check_encapsulation(data: bytes) -> None:
 def nanoseconds(data: bytes, sec: int, nanosec: int) -> int:
     """Return the stamp [ns] of a message whose header has these numbers."""
     check_encapsulation(data)
-    if nanosec >= 1_000_000_000:
+    if nanosec >= SECOND:
         raise MalformedError(f'stamp of {nanosec} ns: must be under 1000000000')
-    return int(sec) * 1_000_000_000 + int(nanosec)
+    return int(sec) * SECOND + int(nanosec)
 
 
 def text(data: bytes, start: int, size: int) -> bytes:
@@ -140,7 +142,7 @@ def stamped(data: bytes, numbers: dict[int, Struct]) -> Stamped:
 
 def header(stamp: int) -> bytearray:
     """Return a header with an empty frame_id, without the four bytes before it."""
-    return bytearray(TIME_AND_LENGTH[1].pack(*divmod(stamp, 1_000_000_000), 1) + b'\x00')
+    return bytearray(TIME_AND_LENGTH[1].pack(*divmod(stamp, SECOND), 1) + b'\x00')
 
 
 def put_count(body: bytearray, number: int) -> None:

@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stewart_dynamics.arrays import Array, Bytes, Stamps
+from stewart_dynamics.arrays import Array, Bytes, SECOND, Stamps
 from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, finite, LITTLE_ENDIAN, MALFORMED, MalformedError, nanoseconds, NOT_FINITE,
     READ_ERRORS, sequence, short_sequence, text, TIME_AND_LENGTH)
@@ -300,7 +300,7 @@ class JointStateWriter:
     def write(self, stamp: int, position: Iterable[float], velocity: Sequence[float],
               effort: Sequence[float] | None) -> bytes:
         """Return the message, without effort if not given."""
-        sec, nanosec = divmod(stamp, 1_000_000_000)
+        sec, nanosec = divmod(stamp, SECOND)
         if effort is None:
             return self._without_effort.pack(
                 LITTLE_ENDIAN, sec, nanosec, *self._constant, 6, *position, 6, *velocity, 0)

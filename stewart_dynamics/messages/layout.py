@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, SECOND, Stamps
 from stewart_dynamics.messages.cdr import ORDERS
 
 
@@ -106,9 +106,9 @@ class Layout:
         if len(data) != self.size:
             return None
         fields = self._struct.unpack(data)
-        if fields[2] >= 1_000_000_000 or self._constant(fields) != self._expected:
+        if fields[2] >= SECOND or self._constant(fields) != self._expected:
             return None
-        return fields[1] * 1_000_000_000 + fields[2], self._values(fields)
+        return fields[1] * SECOND + fields[2], self._values(fields)
 
     def read(self, data: Bytes, starts: Integers) -> tuple[Flags, Stamps, Array]:
         """
@@ -125,8 +125,8 @@ class Layout:
 
         """
         rows = at_any_byte(data, self.size)[starts].view(self._dtype)
-        stamps: Stamps = rows['sec'] * np.int64(1_000_000_000) + rows['nanosec']
-        alike: Flags = rows['nanosec'] < 1_000_000_000
+        stamps: Stamps = rows['sec'] * np.int64(SECOND) + rows['nanosec']
+        alike: Flags = rows['nanosec'] < SECOND
         for name, fixed in self._fixed.items():
             alike &= rows[name] == fixed
         if not self._parts:
@@ -139,7 +139,7 @@ class Layout:
         rows = np.empty(len(numbers[0]), dtype=self._dtype)
         rows.view(np.uint8).reshape(-1, self.size)[:] = np.frombuffer(self._message, np.uint8)
         if stamps is not None:
-            rows['sec'], rows['nanosec'] = np.divmod(stamps, 1_000_000_000)
+            rows['sec'], rows['nanosec'] = np.divmod(stamps, SECOND)
         for name, values in zip(self._parts, numbers, strict=True):
             rows[name] = values
         return rows.view(f'V{self.size}')

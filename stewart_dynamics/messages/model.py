@@ -28,11 +28,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.messages.cdr import aligned8, header, LITTLE_ENDIAN, put_count, put_text
 from stewart_dynamics.messages.layout import Layout
-
-_SECOND = 1_000_000_000
 
 
 class _Writer:
@@ -62,7 +60,7 @@ class _Writer:
     def write(self, stamp: int, numbers: Sequence[float]) -> bytes:
         """Return the message of a stamp [ns]."""
         return self._whole.pack(
-            self._before, *divmod(stamp, _SECOND), self._between, *numbers, self._tail)
+            self._before, *divmod(stamp, SECOND), self._between, *numbers, self._tail)
 
 
 class PositionsWriter(_Writer):
@@ -129,7 +127,7 @@ class TransformsWriter:
         """
         rows = np.empty(len(stamps), dtype=self._dtype)
         rows.view(np.uint8).reshape(len(stamps), -1)[:] = self._message
-        seconds, nanoseconds = np.divmod(stamps, _SECOND)
+        seconds, nanoseconds = np.divmod(stamps, SECOND)
         for n in range(self._count):
             rows[f'sec {n}'], rows[f'nanosec {n}'] = seconds, nanoseconds
             rows[f'numbers {n}'] = transforms[:, n]

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from struct import Struct
 
+from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import (
     aligned8, COUNT, LITTLE_ENDIAN, MalformedError, nanoseconds, READ_ERRORS, sequence, SEVEN, SIX,
     Stamped, stamped, text, TIME_AND_LENGTH)
@@ -118,6 +119,6 @@ class StampedWriter:
 
     def write(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message."""
-        sec, nanosec = divmod(stamp, 1_000_000_000)
+        sec, nanosec = divmod(stamp, SECOND)
         return self._whole.pack(
             LITTLE_ENDIAN, sec, nanosec, len(self._frame), self._frame, *values)

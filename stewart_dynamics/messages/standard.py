@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from struct import Struct
 
+from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.messages.cdr import (
     aligned8, check_encapsulation, COUNT, LITTLE_ENDIAN, MalformedError, ORDERS, put_text,
     READ_ERRORS, sequence, short_sequence)
@@ -50,7 +51,7 @@ def string(written: str) -> bytes:
 
 def clock(stamp: int) -> bytes:
     """Write a rosgraph_msgs/Clock of a time [ns]."""
-    return _CLOCK.pack(LITTLE_ENDIAN, *divmod(stamp, 1_000_000_000))
+    return _CLOCK.pack(LITTLE_ENDIAN, *divmod(stamp, SECOND))
 
 
 def float64_array(values: Sequence[float]) -> bytes:

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, Stamps
+from stewart_dynamics.arrays import Array, SECOND, Stamps
 from stewart_dynamics.messages.cdr import (
     COUNT, header, LITTLE_ENDIAN, MalformedError, nanoseconds, ORDERS, put_count, put_text,
     READ_ERRORS, sequence, text, TIME_AND_LENGTH)
@@ -176,7 +176,7 @@ class LegTrajectory:
         records['position'], records['velocity'] = positions, velocities
         if self._effort:
             records['effort'] = efforts
-        records['sec'], records['nanosec'] = np.divmod(times, 1_000_000_000)
+        records['sec'], records['nanosec'] = np.divmod(times, SECOND)
 
     def message(self) -> bytes:
         """Return the message."""

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from struct import pack, Struct
 
 import numpy as np
-from stewart_dynamics.arrays import Array, Six
+from stewart_dynamics.arrays import Array, SECOND, Six
 from stewart_dynamics.mechanics.frames.rotation import quaternion_of
 from stewart_dynamics.mechanics.kinematics.home_pose import level_axes
 from stewart_dynamics.messages.cdr import LITTLE_ENDIAN
@@ -153,7 +153,7 @@ class Markers:
 
         """
         body = self._body
-        stamp = divmod(output.stamp, 1_000_000_000)
+        stamp = divmod(output.stamp, SECOND)
         for at in self._stamps:
             _STAMP.pack_into(body, at, *stamp)
         rotation = np.reshape(motion[3:12], (3, 3))

@@ -28,7 +28,7 @@ import numpy as np
 
 from numpy.typing import NDArray
 
-from stewart_dynamics.arrays import Array, Six, Stamps
+from stewart_dynamics.arrays import Array, SECOND, Six, Stamps
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.frames.base_motion import row_of_motion
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
@@ -171,12 +171,12 @@ def _read(message: PlatformTrajectory, parameters: Parameters,
     for first in range(0, message.size, _READ):
         end = min(first + _READ, message.size)
         points = message.points(first, end)
-        if (late := points['nanosec'] >= 1_000_000_000).any():
+        if (late := points['nanosec'] >= SECOND).any():
             n = int(np.argmax(late))
             raise MalformedError(
                 f'points[{first + n}]: time_from_start of {points["nanosec"][n]} ns: must be '
                 'under 1000000000')
-        times[first:end] = points['sec'] * np.int64(1_000_000_000) + points['nanosec']
+        times[first:end] = points['sec'] * np.int64(SECOND) + points['nanosec']
         stuck = first_not_increasing(times[first:end], times[first - 1] if first else -1)
         if stuck is not None:
             n = first + stuck

@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Flags, Stamps
+from stewart_dynamics.arrays import Array, Flags, SECOND, Stamps
 from stewart_dynamics.bags import blocks, mcap_scan
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
@@ -61,7 +61,6 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.setpoints.step import Batch, Outputs, State, Step
 from stewart_dynamics.whole_file import write_json
 
-_SECOND = 1_000_000_000
 _STAMP = re.compile(r'stamp (\d+) ns')
 
 Progress = Callable[[int, int], None]
@@ -324,11 +323,11 @@ class _Run:
         """Return the time since the first setpoint, never decreasing [s]."""
         steps = np.diff(stamps, prepend=stamps[0] if self._stamp is None else self._stamp)
         # Seconds and nanoseconds separately: clocks that differ by years exceed 2^63 ns in sum.
-        whole, rest = np.divmod(np.maximum(steps, 0), _SECOND)
+        whole, rest = np.divmod(np.maximum(steps, 0), SECOND)
         whole, rest = self._elapsed[0] + np.cumsum(whole), self._elapsed[1] + np.cumsum(rest)
         self._stamp = int(stamps[-1])
-        self._elapsed = int(whole[-1] + rest[-1] // _SECOND), int(rest[-1] % _SECOND)
-        seconds: Array = (whole + rest // _SECOND) + (rest % _SECOND) * 1e-9
+        self._elapsed = int(whole[-1] + rest[-1] // SECOND), int(rest[-1] % SECOND)
+        seconds: Array = (whole + rest // SECOND) + (rest % SECOND) * 1e-9
         return seconds
 
     def _take_measured(self, messages: Messages, which: Flags) -> None:

@@ -22,6 +22,7 @@ from datetime import datetime, timezone
 import re
 from typing import Any, NamedTuple
 
+from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.limits import LIMITS, OF_JOINTS, QUANTITIES
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
@@ -141,10 +142,10 @@ def exceeded_limits(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
 
 def date(stamp: int | None) -> str:
     """Return the date of a stamp, empty if it is not a plausible time."""
-    if stamp is None or stamp < 1_000_000_000 * 10 ** 9:
+    if stamp is None or stamp < SECOND * 10 ** 9:
         return ''
     try:
-        when = datetime.fromtimestamp(stamp // 10 ** 9, timezone.utc)
+        when = datetime.fromtimestamp(stamp // SECOND, timezone.utc)
     except (OverflowError, OSError, ValueError):
         return ''
     return f' ({when:%Y-%m-%d %H:%M:%S} UTC)'

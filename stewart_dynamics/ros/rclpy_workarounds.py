@@ -39,10 +39,10 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.time_source import TimeSource
 
+from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.errors import StewartError
 
 _PIECE, _LOOK = 10.0, 0.1  # [s]
-_NANOSECONDS = 1_000_000_000
 
 
 def answer_impossible_transitions(node: LifecycleNode, log: Callable[[str], None]) -> None:
@@ -155,7 +155,7 @@ class OneShotTimer:
     """
 
     def __init__(self, node: Node, seconds: float, callback: Callable[[], None]) -> None:
-        self._nanoseconds = round(seconds * _NANOSECONDS)
+        self._nanoseconds = round(seconds * SECOND)
         self._callback = callback
         self._due: int | None = None
         self._clock = Clock(clock_type=ClockType.STEADY_TIME)
@@ -184,7 +184,7 @@ class _TimeSource(TimeSource):
     def clock_callback(self, msg: Any) -> None:
         """Follow a message, or log why not."""
         try:
-            if msg.clock.nanosec >= _NANOSECONDS:
+            if msg.clock.nanosec >= SECOND:
                 raise ValueError(f'nanosec is {msg.clock.nanosec}, must be less than 1e9')
             super().clock_callback(msg)
         except ValueError as exc:

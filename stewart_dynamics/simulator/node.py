@@ -32,7 +32,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
-from stewart_dynamics.arrays import Six
+from stewart_dynamics.arrays import SECOND, Six
 from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
@@ -61,7 +61,7 @@ _TYPES: dict[str, Any] = {
 
 _QUEUE = 1000
 # Simulated time begins here [ns]: zero is no stamp.
-_BEGIN = 1_000_000_000
+_BEGIN = SECOND
 _ANNOUNCE_SECONDS = 0.1
 _BACKLOG = 100_000_000  # [ns]
 _WATCH_SECONDS = 1.0

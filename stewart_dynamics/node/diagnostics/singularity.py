@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.singularity import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LogLine, OK, Part, PERIOD, WARN)
@@ -158,7 +159,7 @@ class SingularityDiagnostics(Part):
 
 def _crossing(before: Output | None, output: Output) -> str:
     """Return when det(J) crossed zero, on a straight line between two outputs."""
-    seconds, nanoseconds = divmod(output.stamp, 1_000_000_000)
+    seconds, nanoseconds = divmod(output.stamp, SECOND)
     stamp = f'stamp {seconds}.{nanoseconds:09d} s'
     passed = 0 if before is None else output.stamp - before.stamp
     if before is None or passed <= 0:
