@@ -58,28 +58,36 @@ def object_file(module: str) -> bytes:
         # that keeps a loop from becoming vector code.
         register_jitable(error_model='numpy', forceinline=inline, no_cfunc_wrapper=True,
                          _nrt=False)(function)
+    machine = target_machine()
+    # To catch exceptions takes half of the time again: only if some remain possible.
+    for catching in False, True:
+        whole = _optimized(machine, module, entries, catching)
+        missing = [function.name for function in whole.functions if function.is_declaration
+                   and not function.name.startswith('llvm.') and not hasattr(math, function.name)]
+        if not missing:
+            return cast('bytes', machine.emit_object(whole))
+    raise SystemExit(f'needs {missing[0]}, which machine code cannot call')
+
+
+def _optimized(machine: Any, module: str, entries: list[EntryPoint], catching: bool) -> Any:
+    """Return all entry points and what they call as one LLVM module."""
     whole = llvm.parse_assembly('')
     for entry in entries:
-        callback = _numba.cfunc(_SIGNATURE, error_model='numpy')(_from_block(entry))
+        callback = _numba.cfunc(_SIGNATURE, error_model='numpy')(_from_block(entry, catching))
         part = llvm.parse_assembly(callback.inspect_llvm())
         part.get_function(callback.native_name).name = f'{module}.{entry.function.__name__}'
         whole.link_in(part)
     for function in whole.functions:
         if not function.is_declaration and not function.name.startswith(f'{module}.'):
             function.linkage = 'internal'
-    machine = target_machine()
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization = True
     passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(whole, passes)
-    for function in whole.functions:
-        if function.is_declaration and not function.name.startswith('llvm.'):
-            if not hasattr(math, function.name):
-                raise SystemExit(f'needs {function.name}, which machine code cannot call')
-    return cast('bytes', machine.emit_object(whole))
+    return whole
 
 
-def _from_block(entry: EntryPoint) -> Callable[[Any], None]:
+def _from_block(entry: EntryPoint, catching: bool) -> Callable[[Any], None]:
     """Return the function that takes an entry point's arguments from a block, see its class."""
     place, arguments = 1, []
     for dtype, dimensions in entry.arguments:
@@ -91,14 +99,14 @@ def _from_block(entry: EntryPoint) -> Callable[[Any], None]:
                               'b': f'integers[{place}] != 0'}[dtype.kind])
         place += 1 + dimensions
     names = {'carray': _numba.carray, 'np': np, 'function': entry.function}
+    call = f'function({", ".join(arguments)})'
+    if catching:
+        call = f'try: {call}\n    except Exception: integers[0] = 0'
     exec(f"""
 def from_block(block):
     integers = carray(block[0], ({place},), np.int64)
     floats = carray(block[0], ({place},), np.float64)
-    try:
-        function({', '.join(arguments)})
-    except Exception:
-        integers[0] = 0
+    {call}
 """, names)
     return cast('Callable[[Any], None]', names['from_block'])
 
