@@ -19,7 +19,10 @@ Up to forty poses have the same six lengths (Dietmaier, The Stewart-Gough platfo
 geometry can have 40 real postures, Advances in Robot Kinematics, 1998), so a guess selects
 one: the last pose, or the one commanded. Newton's method on ``L(X) = L`` with the exact J_inv
 starts there and never steps to where det(J) has the other sign: another assembly is on the other
-side of a singularity.
+side of a singularity. Where it does not converge, near singularities, the lengths are led from
+those of the guess to those given in parts, along a straight line of their squares (homotopy).
+Squares are linear in the position; along a line of the lengths themselves the pose more often
+meets a singularity.
 """
 
 from __future__ import annotations
@@ -49,6 +52,9 @@ FOUND, NO_POSE, SINGULAR = range(3)
 _FARTHER = 16.0
 _LEAST_PART = 1e-3
 MOST_STEPS = 50
+# The homotopy begins with this part of the way, halves a part that fails down to the least one,
+# and ends after this number of steps of Newton's method in all.
+_FIRST_PART, _LEAST_WAY, _MOST_STEPS_IN_ALL = 0.25, 1.0 / 256.0, 200
 
 
 @inlined
@@ -107,28 +113,10 @@ def _turned(turn: Vector3, r: Matrix3) -> Matrix3:
 
 
 @compiled
-def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, float]:
-    """
-    Find the pose of six lengths.
-
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
-    lengths : (6,)
-        [m]
-    motion : (MOTION,)
-        A row of motion; its first twelve numbers are the guess, and the pose when it is found.
-
-    Returns
-    -------
-    code, steps, residual
-        FOUND, NO_POSE or SINGULAR; the steps taken; the largest difference in length [m].
-
-    """
-    position = read3(motion, POSITION.start)
-    # Twice, as a guess may be 1e-6 off; rounding errors do not add up from pose to pose.
-    rotation = _orthonormal(_orthonormal(read9(motion, ROTATION.start)))
+def _newton(constants: Array, lengths: Vector6, guess: Vector3, orientation: Matrix3,
+            ) -> tuple[int, int, float, Vector3, Matrix3]:
+    """Return code, steps and residual of Newton's method from a guess, and the pose at its end."""
+    position, rotation = guess, orientation
     per_size = 1.0 / characteristic_length_of(constants)
     side = 0.0
     # The last pose accepted, its sum of squares and residual, and the step from there.
@@ -152,7 +140,7 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
                            abs(error[4]), abs(error[5]))
             # By Frobenius norms, at most six times the condition number.
             if not condition < UNSOLVABLE_CONDITION:
-                return SINGULAR, steps, residual
+                return SINGULAR, steps, residual, position, rotation
             from_position, from_rotation, before, side = position, rotation, squares, determinant
             step = dot6(i0, error), dot6(i1, error), dot6(i2, error)
             turn = scale(per_size, (dot6(i3, error), dot6(i4, error), dot6(i5, error)))
@@ -160,17 +148,94 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
         elif residual > RESIDUAL:
             part *= 0.5
             if part < _LEAST_PART:
-                return NO_POSE, steps, residual
+                return NO_POSE, steps, residual, position, rotation
         # If the residual is small enough this is the last step, to within rounding.
         position = add(from_position, scale(part, step))
         rotation = _turned(scale(part, turn), from_rotation)
         if residual <= RESIDUAL:
-            for n in range(3):
-                motion[POSITION.start + n] = position[n]
-            for n in range(9):
-                motion[ROTATION.start + n] = rotation[n]
-            return FOUND, steps, residual
-    return NO_POSE, MOST_STEPS, residual
+            return FOUND, steps, residual, position, rotation
+    return NO_POSE, MOST_STEPS, residual, position, rotation
+
+
+@inlined
+def _squares_of_lengths(constants: Array, position: Vector3, rotation: Matrix3) -> Vector6:
+    l0 = leg_line(constants, 0, position, rotation)[1]
+    l1 = leg_line(constants, 1, position, rotation)[1]
+    l2 = leg_line(constants, 2, position, rotation)[1]
+    l3 = leg_line(constants, 3, position, rotation)[1]
+    l4 = leg_line(constants, 4, position, rotation)[1]
+    l5 = leg_line(constants, 5, position, rotation)[1]
+    return l0 * l0, l1 * l1, l2 * l2, l3 * l3, l4 * l4, l5 * l5
+
+
+@inlined
+def _between(squares: Vector6, lengths: Vector6, part: float) -> Vector6:
+    """Return the lengths whose squares are a part of the way from some squares to those given."""
+    return (math.sqrt(squares[0] + part * (lengths[0] * lengths[0] - squares[0])),
+            math.sqrt(squares[1] + part * (lengths[1] * lengths[1] - squares[1])),
+            math.sqrt(squares[2] + part * (lengths[2] * lengths[2] - squares[2])),
+            math.sqrt(squares[3] + part * (lengths[3] * lengths[3] - squares[3])),
+            math.sqrt(squares[4] + part * (lengths[4] * lengths[4] - squares[4])),
+            math.sqrt(squares[5] + part * (lengths[5] * lengths[5] - squares[5])))
+
+
+@compiled
+def _homotopy(constants: Array, lengths: Vector6, guess: Vector3, orientation: Matrix3,
+              ) -> tuple[int, int, float, Vector3, Matrix3]:
+    """Return the same as ``_newton`` along a straight line of squared lengths."""
+    position, rotation = guess, orientation
+    begin = _squares_of_lengths(constants, position, rotation)
+    done, way, steps, residual = 0.0, _FIRST_PART, 0, math.inf
+    while way >= _LEAST_WAY and steps < _MOST_STEPS_IN_ALL:
+        reached = min(done + way, 1.0)
+        wanted = lengths if reached == 1.0 else _between(begin, lengths, reached)
+        code, taken, residual, to_position, to_rotation = _newton(
+            constants, wanted, position, rotation)
+        steps += taken
+        if code != FOUND:
+            way *= 0.5
+            continue
+        position, rotation = to_position, to_rotation
+        if reached == 1.0:
+            return FOUND, steps, residual, position, rotation
+        done, way = reached, 2.0 * way
+    return NO_POSE, steps, residual, position, rotation
+
+
+@compiled
+def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, float]:
+    """
+    Find the pose of six lengths.
+
+    Parameters
+    ----------
+    constants : (CONSTANTS,)
+        Of the hexapod, see ``hexapod_constants``.
+    lengths : (6,)
+        [m]
+    motion : (MOTION,)
+        A row of motion; its first twelve numbers are the guess, and the pose when it is found.
+
+    Returns
+    -------
+    code, steps, residual
+        FOUND, NO_POSE or SINGULAR; the steps taken; the largest difference in length [m].
+
+    """
+    guess = read3(motion, POSITION.start)
+    # Twice, as a guess may be 1e-6 off; rounding errors do not add up from pose to pose.
+    orientation = _orthonormal(_orthonormal(read9(motion, ROTATION.start)))
+    wanted = lengths[0], lengths[1], lengths[2], lengths[3], lengths[4], lengths[5]
+    code, steps, residual, position, rotation = _newton(constants, wanted, guess, orientation)
+    if code == NO_POSE:
+        code, more, _, position, rotation = _homotopy(constants, wanted, guess, orientation)
+        steps += more
+    if code == FOUND:
+        for n in range(3):
+            motion[POSITION.start + n] = position[n]
+        for n in range(9):
+            motion[ROTATION.start + n] = rotation[n]
+    return code, steps, residual
 
 
 @compiled
