@@ -52,7 +52,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.security import PROFILES
-from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Setpoint, Step
 
 BEGIN, END = '<!-- node: begin -->', '<!-- node: end -->'

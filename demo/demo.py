@@ -42,7 +42,7 @@ from std_msgs.msg import Bool, Float64
 from stewart_dynamics.executables import executable
 from stewart_dynamics.mechanics.rows import (
     DETERMINANT, FORCES, JOINT_ANGLES, LENGTHS, MOTION, RATES, RESULT)
-from stewart_dynamics.mechanics.singularity import CAUSE, STATE
+from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines

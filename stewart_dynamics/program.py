@@ -17,8 +17,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import io
+import os
 from pathlib import Path
 import re
 import signal
@@ -72,6 +73,29 @@ class Program:
     def complain(self, what: object) -> None:
         """Print one line on stderr."""
         print(f'{self.name}: {_printable(one_line(what))}', file=sys.stderr)
+
+
+def run_program(name: str, program: Callable[[Sequence[str] | None], int],
+                arguments: Sequence[str] | None) -> int:
+    """
+    Run a program that imports its libraries itself, and return its exit code.
+
+    Without arguments, those of the command line, signals are ignored afterwards: the process ends.
+    """
+    def end_at_once(number: int, frame: object) -> None:
+        """End while libraries are imported: numpy turns an exception into another one."""
+        os.write(2, f'{name}: interrupted\n'.encode())
+        os._exit(INTERRUPTED)
+
+    before = {each: signal.signal(each, end_at_once) for each in _SIGNALS}
+    try:
+        return program(arguments)
+    except ModuleNotFoundError as exc:
+        print(f'{name}: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
+        return BAD_INPUT
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, signal.SIG_IGN if arguments is None else handler)
 
 
 def interrupt_on_signals() -> None:

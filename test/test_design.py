@@ -26,7 +26,7 @@ from stewart_dynamics import ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.identification.design import (
     columns_of, Design, design, predicted_half_widths)
 from stewart_dynamics.identification.design_options import DesignOptions
-from stewart_dynamics.identification.stewart_identify import main
+from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from sweeps import sweep

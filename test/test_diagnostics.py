@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 import pytest
 from referees import symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
-from stewart_dynamics.mechanics.singularity import Cause, Singularity
+from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, LogLine, OK, STALE, Status, WARN)

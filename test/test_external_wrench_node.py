@@ -33,7 +33,7 @@ from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import ExternalWrench, Measurement
 from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
-from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from test_external_wrench import BEGIN
 from test_external_wrench import HEXAPOD, LOAD, measured, MILLISECOND, resting, six, swing, times
 from test_external_wrench import HOME as AT_HOME

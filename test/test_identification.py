@@ -28,7 +28,7 @@ from recorded import about, at_rest, fourier, MotionAt, Noise, Recorded, recorde
 from referees import ROOT, rotation_about
 
 from stewart_dynamics import Parameters, StewartPlatform
-from stewart_dynamics.identification.stewart_identify import main
+from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]

@@ -32,7 +32,7 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics.errors import StewartError
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import MOTION
-from stewart_dynamics.mechanics.singularity import CAUSE, STATE
+from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE
 from stewart_dynamics.replay import legs_table
 from stewart_dynamics.replay.csv_rows import RowsProcess
 from stewart_dynamics.replay.legs_table import CsvTable, ParquetTable

@@ -40,7 +40,7 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.rows import MOTION
 from stewart_dynamics.replay.output import OutputBag
 from stewart_dynamics.replay.recorded_model import RecordedModel
-from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES, OutputMessages
+from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages
 from stewart_dynamics.setpoints.step import Batch, Outputs, Step
 import yaml  # type: ignore[import-untyped]
 

@@ -23,7 +23,7 @@ import pytest
 
 from stewart_dynamics import Motion, MotionError, ParameterError, StewartPlatform
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.singularity import Cause, Singularity
+from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.mechanics.stewart_platform import InverseDynamics
 from stewart_dynamics.reference_motion.motion import motion_at, sample_time, sample_times
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters

@@ -60,7 +60,7 @@ from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
-from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES
+from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
 from stewart_dynamics.setpoints.topics import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
 
@@ -1258,7 +1258,7 @@ def test_clocks_that_differ_by_years_do_not_overflow(tmp_path: Path) -> None:
 # A signal when the module that reads the arguments is looked for, and when the process ends.
 @pytest.mark.parametrize('when, code, text', [
     ("sys.meta_path.insert(0, type('Finder', (), {'find_spec': staticmethod(lambda name, *_: "
-     "end() if name.endswith('stewart_replay') else None)}))", 130, 'interrupted'),
+     "end() if name.endswith('replay_command_line') else None)}))", 130, 'interrupted'),
     ('atexit.register(end)', BAD_INPUT,
      'nowhere: not a bag that can be read: no such file or folder')])
 @pytest.mark.parametrize('sent', ['SIGINT', 'SIGTERM'])

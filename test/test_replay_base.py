@@ -31,11 +31,11 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
+from stewart_dynamics.replay.replay_command_line import main
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
-from stewart_dynamics.replay.stewart_replay import main
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from stewart_dynamics.setpoints.topics import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)

@@ -28,7 +28,7 @@ from referees import (
 from stewart_dynamics import InverseDynamics, Motion, Parameters, StewartPlatform
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, MOTION, RESULT)
-from stewart_dynamics.mechanics.singularity import (
+from stewart_dynamics.mechanics.singularity_warning import (
     Cause, Singularity, time_to_crossing, UNSOLVABLE_CONDITION)
 from stewart_dynamics.parameters.table import HYSTERESIS
 

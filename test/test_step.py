@@ -30,7 +30,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import Exceedance, JITTER, JUMP
-from stewart_dynamics.mechanics.singularity import Cause, Singularity, UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
 
 PARAMETERS = symmetric_parameters()

@@ -36,7 +36,7 @@ from referees import (
 from stewart_dynamics import Parameters
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
-from stewart_dynamics.mechanics.singularity import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines

@@ -28,9 +28,9 @@ import sys
 import pytest
 from referees import ROOT
 from stewart_dynamics import ParameterError, Parameters, StewartError
-from stewart_dynamics.description.stewart_describe import main as describe
+from stewart_dynamics.description.describe_command_line import main as describe
 from stewart_dynamics.replay.index import write_fleet
-from stewart_dynamics.replay.stewart_replay import main as replay
+from stewart_dynamics.replay.replay_command_line import main as replay
 from stewart_dynamics.reporting.results_folder import RESULT, whole_folder
 from stewart_dynamics.whole_file import read_text, write_files, write_json
 

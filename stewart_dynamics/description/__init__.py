@@ -22,5 +22,5 @@ from collections.abc import Sequence
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_describe."""
-    from stewart_dynamics.description.stewart_describe import main as program
+    from stewart_dynamics.description.describe_command_line import main as program
     return program(arguments)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stewart_dynamics.replay import run_program
+from stewart_dynamics.program import run_program
 
 __all__ = ['main']
 
@@ -26,7 +26,7 @@ __all__ = ['main']
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_identify; report a missing library in one line."""
     def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.identification.stewart_identify import main as run
+        from stewart_dynamics.identification.identify_command_line import main as run
 
         return run(given)
 

@@ -27,7 +27,7 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.rows import CONDITION, MOTION, NO_BASE, POSE, POSITION, WRENCH
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 
 
 def check_kind(value: object, *kinds: type[Pose] | type[Motion], name: str = '') -> None:

@@ -35,7 +35,7 @@ from stewart_dynamics.mechanics.kinematics import joint_axes
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
     inertia_matrix, Parameters, STANDARD_GRAVITY)
 

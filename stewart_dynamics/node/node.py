@@ -60,7 +60,7 @@ from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints import base_wrench
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step

@@ -30,7 +30,7 @@ from stewart_dynamics.node.planned_queue import LENGTH
 from stewart_dynamics.planned import messages as planned
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 from stewart_dynamics.setpoints.batch_joining import WAITING
-from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES
+from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.topics import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH)
 

@@ -32,7 +32,7 @@ from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned.cubics import Cubics
 from stewart_dynamics.planned.sampling import TOLERANCE

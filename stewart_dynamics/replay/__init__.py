@@ -16,42 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-import os
-import signal
-import sys
+from collections.abc import Sequence
 
-_INTERRUPTED = 130
+from stewart_dynamics.program import run_program
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program stewart_replay; report a missing library in one line."""
     def program(given: Sequence[str] | None) -> int:
-        from stewart_dynamics.replay.stewart_replay import main as run
+        from stewart_dynamics.replay.replay_command_line import main as run
 
         return run(given)
 
     return run_program('stewart_replay', program, arguments)
-
-
-def run_program(name: str, program: Callable[[Sequence[str] | None], int],
-                arguments: Sequence[str] | None) -> int:
-    """
-    Run a program that imports its libraries itself, and return its exit code.
-
-    Without arguments, those of the command line, signals are ignored afterwards: the process ends.
-    """
-    def end_at_once(number: int, frame: object) -> None:
-        """End while libraries are imported: numpy turns an exception into another one."""
-        os.write(2, f'{name}: interrupted\n'.encode())
-        os._exit(_INTERRUPTED)
-
-    before = {each: signal.signal(each, end_at_once) for each in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        return program(arguments)
-    except ModuleNotFoundError as exc:
-        print(f'{name}: needs {exc.name}: pip install {exc.name}', file=sys.stderr)
-        return 2
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, signal.SIG_IGN if arguments is None else handler)

@@ -56,7 +56,7 @@ from stewart_dynamics.reporting.results_folder import check_free, whole_folder
 from stewart_dynamics.setpoints import base_wrench, step, topics as inputs
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
-from stewart_dynamics.setpoints.outputs import OutputMessages
+from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE, Rejection
 from stewart_dynamics.setpoints.step import Batch, Outputs, State, Step
 from stewart_dynamics.whole_file import write_json

@@ -35,7 +35,7 @@ from stewart_dynamics.bags.mcap_file import MAGIC
 from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
-from stewart_dynamics.setpoints.outputs import OUTPUT_TYPES, OutputMessages, Written
+from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES, OutputMessages, Written
 from stewart_dynamics.setpoints.step import Outputs
 import yaml  # type: ignore[import-untyped]
 

@@ -31,7 +31,7 @@ from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
     ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, QUANTITIES, VELOCITY_MAX)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import (
     Crossings, Extreme, FIRST, Integral, longest_step, Warnings, with_nan)

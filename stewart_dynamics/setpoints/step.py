@@ -37,7 +37,7 @@ from stewart_dynamics.mechanics.limits import (
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
-from stewart_dynamics.mechanics.singularity import (
+from stewart_dynamics.mechanics.singularity_warning import (
     advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
     UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

@@ -32,7 +32,7 @@ from stewart_dynamics.mechanics.dynamics.friction import friction
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 
 

@@ -49,7 +49,7 @@ from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, GRAVITY, LENGTHS,
     LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSITION, RATES, RESULT, ROTATION,
     UNIT_LOAD_FORCES, WRENCH)
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.tile import LANES, matrix3, put6, vector3
 from stewart_dynamics.mechanics.vectors import add, dot6, scale, subtract
 

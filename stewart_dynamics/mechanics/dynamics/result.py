@@ -27,7 +27,7 @@ from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.frames.fields import listed
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, RESULT, UNIT_LOAD_FORCES)
-from stewart_dynamics.mechanics.singularity import time_to_crossing
+from stewart_dynamics.mechanics.singularity_warning import time_to_crossing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -35,7 +35,7 @@ from stewart_dynamics.mechanics.dynamics.bodies import leg_line
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.matrix6 import inverse_and_determinant, Rows
 from stewart_dynamics.mechanics.rows import ANGULAR_VELOCITY, LINEAR_VELOCITY, POSITION, ROTATION
-from stewart_dynamics.mechanics.singularity import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot6, Matrix3, read3, read9, scale, Vector3, Vector6)
 

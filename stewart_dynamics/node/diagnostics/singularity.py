@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from stewart_dynamics.arrays import SECOND
-from stewart_dynamics.mechanics.singularity import Cause
+from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, FINE, Held, Level, LogLine, OK, Part, PERIOD, WARN)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
