@@ -30,7 +30,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from types import FrameType
 from typing import Any, NamedTuple
 
 from mcap.reader import make_reader
@@ -49,6 +51,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 from scipy.spatial.transform import Rotation
 
+import stewart_dynamics
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.joint_states import JOINT_STATES, TF
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
@@ -1399,3 +1402,28 @@ def test_measured_forces_give_the_external_load(
               for axis in 'xyz' for unit in ('', unit)}
     for key in keys_of(summary) - names:
         assert re.search(rf'[`.]{key}\b', documented), key
+
+
+def test_the_page_names_files_that_a_bag_runs_through(tmp_path: Path) -> None:
+    page = (ROOT / 'docs' / 'development.md').read_text(encoding='utf-8')
+    section = page.partition('## Path of a bag')[2].partition('\n## ')[0]
+    on_page = re.findall(r'^\| `([\w/]+\.py)` \|', section, flags=re.MULTILINE)
+    found: set[str] = set()
+    package = str(Path(stewart_dynamics.__file__).parent)
+
+    def note(frame: FrameType, event: str, argument: Any) -> None:
+        path = frame.f_code.co_filename
+        if event == 'call' and path.startswith(package):
+            found.add(path.removeprefix(package).lstrip('/'))
+
+    threading.setprofile(note)
+    sys.setprofile(note)
+    try:
+        code = main([str(ROOT / 'bags' / 'clear'), '--params', str(PARAMS), '--output',
+                     str(tmp_path / 'replayed')])
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
+    assert code == 0
+    assert len(on_page) > 10
+    assert set(on_page) <= found
