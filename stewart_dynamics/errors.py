@@ -22,7 +22,7 @@ _LONGEST, _LONGEST_LINE = 80, 4000
 
 
 def one_line(exc: object) -> str:
-    """Return the text of an error in one line of limited length, or its type if it has none."""
+    """Return an error in one line of limited length: its text, or its type if that is empty."""
     text = f'{exc}'
     if len(text) > _LONGEST_LINE:  # texts of a file can have any length
         text = f'{text:.{_LONGEST_LINE}}...'

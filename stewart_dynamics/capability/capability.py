@@ -210,7 +210,7 @@ class Capability:
         motion : Pose or Motion
             Poses at rest, with an answer for each; or a motion, with one answer for all samples.
         center_of_mass : (3,)
-            Place of the added mass, platform frame [m].
+            Position of the added mass, platform frame [m].
 
         """
         center = as_array('center_of_mass', center_of_mass, (3,))

@@ -379,12 +379,12 @@ def travels(constants: Array, axes: Array, bounds: Array, stop: float, poses: Ar
             directions: Array, pivots: Array, values: Array, limits: Integers, legs: Integers,
             work: Array) -> None:
     """
-    Write how far each pose can move in its direction.
+    Write the largest travel from each pose in its direction.
 
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     axes : (12, 3)
         Axes of the joints, see ``joint_axes``; not read where an angle has no bound.
     bounds : (4, 6)

@@ -70,7 +70,7 @@ def object_file(module: str) -> bytes:
 
 
 def _optimized(machine: Any, module: str, entries: list[EntryPoint], catching: bool) -> Any:
-    """Return all entry points and what they call as one LLVM module."""
+    """Return one LLVM module of all entry points and the functions that they call."""
     whole = llvm.parse_assembly('')
     for entry in entries:
         callback = _numba.cfunc(_SIGNATURE, error_model='numpy')(_from_block(entry, catching))

@@ -82,7 +82,7 @@ announce: Callable[[str], object] = partial(
 # Machine code in memory by module; None for modules that run uncompiled.
 _engines: dict[str, Any] = {}
 # One thread at a time uses LLVM, and one compiles a module. A fork waits for LLVM; other threads
-# and what they hold do not exist in the child.
+# and the locks they hold do not exist in the child.
 _llvm = RLock()
 _compiling: dict[str, Lock] = defaultdict(Lock)
 
@@ -167,8 +167,8 @@ def _compile(module: str) -> bytes:
     with TemporaryDirectory() as folder:
         target = Path(folder, 'answer')
         settings = {name: text for name, text in os.environ.items() if name[:6] != 'NUMBA_'}
-        # In a session of its own, since signals of a terminal are not for it; its answer is a
-        # file, since the start of Python can be told to print.
+        # The compiler runs in a session of its own, so that signals of the terminal do not reach
+        # it. It answers in a file, since Python may be configured to print at its start.
         done = subprocess.run(
             [sys.executable, '-I', '-c', _COMPILER,
              json.dumps([paths, os.getpid(), module, str(target)])],

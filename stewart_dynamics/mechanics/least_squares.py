@@ -13,18 +13,18 @@
 # limitations under the License.
 
 """
-Weighted linear least squares that say what the data cannot tell.
+Weighted linear least squares with the identifiability of the parameters.
 
-Efforts f = Y x + noise. ``Information`` is what is left of the samples: Y^T W Y and Y^T W f, which
-sum over blocks of any length, so that memory does not grow with the data. Its unit is that of the
-noise: the weights are 1 / variance.
+The model is f = Y x + noise, f the efforts. ``Information`` holds the sums Y^T W Y and Y^T W f of
+the samples, which add over blocks of any length, so that memory does not grow with the data. The
+weights are 1 / variance, so the sums are in units of the noise.
 
 Parameters have different units, so identifiability needs a scale for each: the change that would
-matter, such as its usual size. In parameters by their scales, the singular values of W^1/2 Y say
-how many times larger than the noise the effect of such a change is, direction by direction, and
+matter, such as its usual size. With parameters divided by their scales, the singular values of
+W^1/2 Y are the ratios of the effect of such a change to the noise, one for each direction, and
 their inverses are the standard errors. Directions whose standard error is above a limit are not
-told by the data: they keep the start's value. Noise in Y seems to tell something, too; with the
-information of the noise alone given, only what exceeds it by far counts.
+identifiable: they keep the start's value. Noise in Y adds information that is not real; where the
+information of the noise alone is given, only information well above it counts.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 
-# Of a normal distribution: 95 % of it are within so many standard deviations.
+# Standard deviations on either side of the mean that include 95 % of a normal distribution.
 TWO_SIDED = 1.959964
 
 # A direction is known if its standard error is at most this, by the parameters' scales.
 LARGEST_ERROR = 0.25
-# And if its information exceeds this many times that of the noise in the regressor.
+# It must also have information that exceeds this many times that of the noise in the regressor.
 TIMES_NOISE = 10.0
 # Smaller singular values than this, by the largest, are rounding.
 ROUNDING = 1e-6
@@ -52,7 +52,7 @@ SMALLEST_COEFFICIENT = 0.02
 
 class Information(NamedTuple):
     """
-    What samples tell about n parameters.
+    Normal-equation sums of samples for n parameters.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Information(NamedTuple):
     rows: int
 
     def plus(self, other: Information) -> Information:
-        """Return what both tell together."""
+        """Return the information of both sets of samples together."""
         return Information(self.matrix + other.matrix, self.vector + other.vector,
                            self.squares + other.squares, self.rows + other.rows)
 
@@ -84,20 +84,21 @@ class Information(NamedTuple):
 
 class Identifiability(NamedTuple):
     """
-    What data can tell about n parameters.
+    Identifiability of n parameters from data.
 
     Attributes
     ----------
     scales : (n,)
-        Of the parameters, as given.
+        Scales of the parameters, as given.
     singular_values : (n,)
-        Of the scaled regressor, largest first: 1 / standard error of each direction.
+        Singular values of the scaled regressor, largest first: 1 / standard error of each
+        direction.
     directions : (n, n)
-        Each column one direction, by the scales, in the order of the singular values.
+        One direction in each column, by the scales, in the order of the singular values.
     rank : int
         Number of directions that are known; they come first.
     shares : (n,)
-        Of the unknown directions in each parameter, 0 to 1.
+        Share of the unknown directions in each parameter, 0 to 1.
 
     """
 
@@ -109,7 +110,7 @@ class Identifiability(NamedTuple):
 
     @property
     def identifiable(self) -> Flags:
-        """Return which parameters (n,) the data tell by themselves, not only in combinations."""
+        """Return which parameters (n,) are identifiable individually, not only in combinations."""
         return self.shares <= LARGEST_SHARE
 
     @property
@@ -135,7 +136,7 @@ class Solution(NamedTuple):
     covariance : (n, n)
         For white noise of the weights' variance; of the known directions.
     identifiability : Identifiability
-        Which of them the data tell.
+        Identifiability of the parameters.
 
     """
 
@@ -146,14 +147,14 @@ class Solution(NamedTuple):
 
 class Combination(NamedTuple):
     """
-    A sum of parameters that the data tell although they do not tell its terms.
+    An identifiable sum of parameters that are not identifiable individually.
 
     Attributes
     ----------
     parameters : tuple of int
-        Their indices.
+        Indices of the parameters.
     coefficients : (k,)
-        Their factors, in units of the first one's; the first is 1.
+        Factors of the parameters, relative to the first, which is 1.
 
     """
 
@@ -168,14 +169,14 @@ def nothing(many: int) -> Information:
 
 def information(regressor: Array, efforts: Array, weights: Array) -> Information:
     """
-    Return what samples tell.
+    Return the information of samples.
 
     Parameters
     ----------
     regressor : (N, 6, n)
         Y of each sample.
     efforts : (N, 6)
-        Less those of parameters that are not asked for [N].
+        Efforts less the efforts of parameters that are not to be identified [N].
     weights : (6,) or (N, 6)
         1 / variance of each effort [1/N^2]; 0 leaves it out.
 
@@ -191,18 +192,18 @@ def information(regressor: Array, efforts: Array, weights: Array) -> Information
 def identifiability(matrix: Array, scales: Array, noise: Array | None = None,
                     largest_error: float = LARGEST_ERROR) -> Identifiability:
     """
-    Return what an information matrix tells.
+    Return the identifiability of parameters from an information matrix.
 
     Parameters
     ----------
     matrix : (n, n)
         Y^T W Y.
     scales : (n,)
-        For each parameter the change that would matter.
+        Change of each parameter that would matter.
     noise : (n, n), optional
-        What the same sum is for the noise in Y alone.
+        The same sum for the noise in Y alone.
     largest_error : float
-        Standard error of a known direction at most, by the scales.
+        Largest standard error of a known direction, by the scales.
 
     """
     told = matrix if noise is None else matrix - TIMES_NOISE * noise
@@ -223,7 +224,7 @@ def solve(samples: Information, start: Array, scales: Array, noise: Array | None
     Parameters
     ----------
     samples : Information
-        Of n parameters.
+        Information about n parameters.
     start : (n,)
         Unknown directions keep these values.
     scales, noise, largest_error
@@ -232,7 +233,7 @@ def solve(samples: Information, start: Array, scales: Array, noise: Array | None
     """
     what = identifiability(samples.matrix, scales, noise, largest_error)
     known = what.known
-    # by their own sizes: the digits of small ones count as much as those of large ones
+    # scaled by the diagonal, so that small entries keep as many digits as large ones
     inner = known.T @ samples.matrix @ known
     sizes = 1.0 / np.sqrt(np.diag(inner))
     inverse = sizes[:, None] * np.linalg.inv(sizes[:, None] * inner * sizes) * sizes
@@ -242,16 +243,16 @@ def solve(samples: Information, start: Array, scales: Array, noise: Array | None
 
 def combinations(what: Identifiability) -> tuple[Combination, ...]:
     """
-    Return what the data tell about parameters that are not identifiable by themselves.
+    Return the identifiable combinations of parameters that are not identifiable individually.
 
-    The rows of the known subspace, reduced: each begins with a parameter that is in no other
-    combination (base parameters: Gautier, Khalil, "Direct calculation of minimum set of inertial
-    parameters of serial robots", IEEE T-RA 6(3), 1990, doi:10.1109/70.56655).
+    They are the rows of the known subspace, reduced: each begins with a parameter that is in no
+    other combination (base parameters: Gautier, Khalil, "Direct calculation of minimum set of
+    inertial parameters of serial robots", IEEE T-RA 6(3), 1990, doi:10.1109/70.56655).
     """
     unclear = np.flatnonzero(~what.identifiable)
     if not len(unclear) or not what.rank:
         return ()
-    # Of the known directions those within these parameters: there their length is 1, else 0.
+    # Known directions that lie within these parameters have a singular value of 1, others 0.
     rows = what.directions[unclear, :what.rank]
     left, sizes, _ = np.linalg.svd(rows, full_matrices=False)
     reduced, pivots = _reduced(left[:, sizes > 0.5].T)

@@ -37,11 +37,11 @@ LIMITS = OF_RESULTS + OF_JOINTS
 # Not a limit with a parameter of its own: a setpoint too far from the last one for VELOCITY_MAX.
 JUMP = 'jump'
 
-# A value exceeds a limit only by more than this part of it: rounding errors are below.
+# Relative tolerance of limit checks, above rounding errors.
 TOLERANCE = 1e-9
 
-# Stamps of setpoints may be off by this time [s]: a leg may move so much longer at its rate limit
-# before a setpoint counts as a jump.
+# Tolerance of the stamps of setpoints [s]: a leg may move at its rate limit for this additional
+# time before a setpoint counts as a jump.
 JITTER = 1e-3
 
 # Thresholds in a row, in the order of OF_RESULTS.
@@ -84,18 +84,18 @@ class Limits:
     Parameters
     ----------
     parameters : Parameters
-        Those that are not given are never exceeded.
+        Parameters of the hexapod; limits that are not given are never exceeded.
 
     Attributes
     ----------
     bounds : dict of str to (6,)
-        Of each limit that is given [m, m/s, N, rad].
+        Values of each limit that is given [m, m/s, N, rad].
     thresholds : (6, 6)
-        Of each of LIMITS, above (or below) which it is exceeded; infinite where it is not given.
+        Values above (or below) which each of LIMITS is exceeded; infinite if not given.
     of_joints : tuple of str
-        Those of OF_JOINTS that are given.
+        Names in OF_JOINTS that are given.
     force_max : (6,)
-        To which forces are clipped [N]; infinite where it is not given.
+        Forces to which leg forces are clipped [N]; infinite if not given.
 
     """
 

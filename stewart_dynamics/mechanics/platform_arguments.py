@@ -56,7 +56,7 @@ def loaded(motion: Motion, wrench: ArrayLike | None, base: BaseMotion | None,
 
 
 def base_rows(base: BaseMotion | None) -> Array:
-    """Return the rows (..., BASE) of the base's motion; a row of nan for none."""
+    """Return the rows (..., BASE) of the base's motion; a row of nan for None."""
     if base is None:
         return np.array(NO_BASE)
     if not isinstance(base, BaseMotion):

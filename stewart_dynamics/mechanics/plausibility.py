@@ -39,7 +39,7 @@ from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
     inertia_matrix, Parameters, STANDARD_GRAVITY)
 
-# Of the place of a joint in a message.
+# Digits of the position of a joint in a message.
 _DIGITS = 5
 
 # The largest known, the six cables of a radio telescope's cabin, hang from towers on a circle
@@ -106,12 +106,12 @@ _TILT = math.radians(15.0)
 @lru_cache(maxsize=4)  # the replay of many bags asks for each
 def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str, ...]:
     """
-    Return likely mistakes, each in one line: parameter, value, what is suspected.
+    Return likely mistakes, each in one line: parameter, value, suspected mistake.
 
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     geometry : bool
         Check legs and poses as well, which takes ten times as long as the rest.
 
@@ -180,7 +180,7 @@ def _inertia(p: Parameters, shape: Shape) -> Iterator[str]:
 
 
 def _frames(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
-    """Yield what is given in the frame of the other body, or on its other side."""
+    """Yield values that seem to be in the frame of the other body, or on the other side."""
     away = shape.axes[2] * reach.side  # from the base to the platform
     if shape.platform_radius > _LARGEST_PLATFORM_RATIO * shape.base_radius:
         yield (f'geometry.platform_joints: {shape.platform_radius:.3g} m from their center, the '

@@ -39,7 +39,7 @@ UNSOLVABLE_CONDITION = 1e12
 
 
 class Cause(IntEnum):
-    """Why the warning is on."""
+    """Cause of the warning."""
 
     NONE = 0
     CONDITION = 1
@@ -103,9 +103,9 @@ def advance(state: Array, limits: Array, determinant: float, determinant_rate: f
     state : (STATE,)
         Written.
     limits : (THRESHOLDS,)
-        The thresholds; what follows them in the array is not read.
+        The thresholds; later elements of the array are not read.
     determinant, determinant_rate, condition : float
-        Of the sample.
+        Values of the sample.
 
     """
     hysteresis = HYSTERESIS if state[CAUSE] > 0.0 else 1.0

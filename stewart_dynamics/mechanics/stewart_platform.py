@@ -229,7 +229,7 @@ class StewartPlatform:
     def base_wrench(self, motion: Motion, wrench: ArrayLike | None = None,
                     base: BaseMotion | None = None) -> Array:
         """
-        Return what the hexapod puts on its base, at the base's origin (..., 6) [N, N m].
+        Return the wrench of the hexapod on its base, at the base's origin (..., 6) [N, N m].
 
         Force and moment, base axes: for foundation, deck or truss. Arguments are those of
         ``inverse_dynamics``. Forces within the hexapod, friction among them, do not matter, and

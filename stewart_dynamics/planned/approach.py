@@ -48,7 +48,7 @@ _MOST_POINTS = 100_000
 # per second.
 _SPEED = 0.5
 _SPEED_WITHOUT_LIMIT = 0.1
-# A duration that exceeds limits of rate or force is lengthened by this factor, so many times.
+# Factor that lengthens a duration which exceeds limits of rate or force; maximum number of trials.
 _SLOWER, _MOST_TRIALS = 1.5, 12
 
 
@@ -100,9 +100,9 @@ def approach(platform: StewartPlatform, start: Pose | Motion, end: Pose | Motion
     platform : StewartPlatform
         Its parameters have the limits.
     start : Pose or Motion of one sample
-        Where the platform is, at rest.
+        Present pose of the platform, at rest.
     end : Pose or Motion of one sample
-        Where it goes, with twist and acceleration of a Motion.
+        First point of the motion, with twist and acceleration of a Motion.
     wrench, base
         As in ``check_planned_trajectory``, constant.
     rate : float
@@ -111,7 +111,7 @@ def approach(platform: StewartPlatform, start: Pose | Motion, end: Pose | Motion
     Raises
     ------
     MotionError
-        There is no such motion: it leads out of the limits or to a singularity at any speed.
+        The motion exceeds a limit or meets a singularity at any speed.
 
     """
     if not isinstance(platform, StewartPlatform):
@@ -131,7 +131,7 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
                        base: Array | None = None, rate: float = RATE,
                        ) -> Iterator[TimedMotion | None]:
     """
-    Yield None after each piece of the work, and at the end what ``approach`` returns.
+    Yield None after each piece of the work, and the result of ``approach`` at the end.
 
     Start and end are rows of motion (MOTION,), the wrench (WRENCH,), the base (BASE,).
     """

@@ -47,7 +47,7 @@ SINGULAR = 'a singularity is met'
 
 
 class Violation(NamedTuple):
-    """Why a trajectory is rejected, and when."""
+    """Reason and time of a rejection."""
 
     time: float
     """[s]"""
@@ -58,7 +58,7 @@ class Violation(NamedTuple):
 
     @property
     def order(self) -> tuple[float, bool, str]:
-        """Return the place among others: of one time singularities first, they cause others."""
+        """Return the sort key: at equal times, singularities first, since they cause others."""
         return self.time, self.reason != SINGULAR, self.words
 
 
@@ -69,11 +69,11 @@ class Checks:
     Attributes
     ----------
     violations : list of Violation
-        Those found so far, in no order.
+        Violations found so far, in no order.
     condition_number, condition_time : float
-        The largest so far, and when [s].
+        Largest condition number so far, and its time [s].
     force, force_leg : float, int
-        The largest absolute force so far [N], and of which leg.
+        Largest absolute force so far [N], and its leg.
     load : float
         The largest absolute force so far as a part of limits.force_max.
 
@@ -94,26 +94,26 @@ class Checks:
     def check(self, times: Array, durations: Array, results: Array, joined: Flags, near: Flags,
               ) -> list[int]:
         """
-        Check samples, and what lies between them.
+        Check samples and the intervals between them.
 
         Parameters
         ----------
         times : (M,)
             [s]
         durations : (M - 1,)
-            From each to the next [s].
+            Time from each sample to the next [s].
         results : (M, RESULT)
             Rows of results.
         joined : (M - 1,)
-            The next one follows it in the trajectory.
+            Whether the next sample follows this one in the trajectory.
         near : (M - 1,)
-            The next one is so near that det(J) and forces between the two follow from their
-            values there.
+            Whether the next sample is near enough for det(J) and forces between the two to follow
+            from their values there.
 
         Returns
         -------
         list of int
-            After which samples det(J) or the forces need closer samples.
+            Indices of samples after which det(J) or the forces need closer samples.
 
         """
         finite = np.isfinite(results).all(axis=1)
@@ -164,7 +164,7 @@ class Checks:
 
     def check_singularities(self, times: Array, durations: Array, results: Array, near: Flags,
                             ) -> list[int]:
-        """Do what ``check`` does, for singularities alone."""
+        """Check samples as ``check`` does, for singularities alone."""
         self._check_conditions(times, results)
         return self._check_determinants(times, durations, results, near)
 

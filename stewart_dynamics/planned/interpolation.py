@@ -138,9 +138,9 @@ class Interpolation:
         Parameters
         ----------
         which : (M,)
-            After which of the first N points.
+            Index of the point before each row, one of the first N.
         fraction : (M,)
-            Of the time to the next one, 0 to 1; at 0 and 1 the points themselves.
+            Fraction of the time to the next point, 0 to 1; 0 and 1 are the points themselves.
 
         """
         h = self._durations[which][:, None]

@@ -51,7 +51,7 @@ INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTra
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
 
 MOST_POINTS = 100_000
-# So many points are read or written between two yields: some tenths of a millisecond of work.
+# Numbers of points read and written between two yields: some tenths of a millisecond of work.
 _READ = 2 * PIECE
 _WRITTEN = 8 * PIECE
 
@@ -60,7 +60,7 @@ NOT_MEASURED = 'measured legs not known'
 STARTS_ELSEWHERE = 'does not start where the legs are'
 NO_APPROACH = 'no approach to the first point'
 
-# Of trajectory.approach, in characteristic lengths.
+# Tolerance of the start for trajectory.approach, in characteristic lengths.
 START_TOLERANCE = 0.01
 
 _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
@@ -108,8 +108,8 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
         A trajectory_msgs/MultiDOFJointTrajectory as received. Its second joint, if it has one,
         is the base, which moves in the world as its points say.
     base : (BASE,), optional
-        A row of the base's motion for a trajectory without the base, one of nan: it is not
-        known; none: it is still.
+        A row of the base's motion for a trajectory without the base. A row of nan: not known; at
+        rest by default.
     measured : (MOTION,), optional
         A row of motion of the platform as measured, for ``trajectory.approach``.
 

@@ -39,28 +39,28 @@ class PlannedTrajectory:
     duration: float
     """From the first point to the last [s]."""
     reason: str = ''
-    """Why it is rejected, a constant of ``planned_trajectory`` or of its checks."""
+    """Reason of the rejection, a constant of ``planned.trajectory`` or ``planned.checks``."""
     time: float = math.nan
-    """When it would first do what it is rejected for [s]."""
+    """Time of the first violation [s]."""
     leg: int | None = None
-    """Which leg would, 0 to 5; None where no leg is concerned."""
+    """Leg of the violation, 0 to 5; None if it is not of a leg."""
     limit: str = ''
-    """The limit that is exceeded, 'limits.velocity_max'; empty where none is."""
+    """The limit that is exceeded, 'limits.velocity_max'; empty if no limit is exceeded."""
     lengths: Array = field(default_factory=_no_legs, repr=False)
     """At the points (N, 6) [m]; (0, 6) where rejected."""
     rates: Array = field(default_factory=_no_legs, repr=False)
     """At the points (N, 6) [m/s], + extends; (0, 6) where rejected."""
     forces: Array = field(default_factory=_no_legs, repr=False)
-    """Of the actuators at the points (N, 6) [N], + pushes; (0, 6) where rejected."""
+    """Actuator forces at the points (N, 6) [N], + pushes; (0, 6) where rejected."""
     warning: bool = False
     """Accepted, but the condition number reaches singularity.warn_condition."""
     condition_number: float = math.nan
     """The largest, at points and between them; nan where rejected."""
     condition_time: float = math.nan
-    """When that is [s]."""
+    """Time of the largest condition number [s]."""
     force: float = math.nan
     """The largest absolute force, at points and between them [N]; nan where rejected."""
     force_leg: int | None = None
-    """Of which leg, 0 to 5."""
+    """Leg of the largest force, 0 to 5."""
     load: float = math.nan
     """The largest absolute force as a part of limits.force_max; 0 without that limit."""

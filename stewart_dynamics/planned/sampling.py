@@ -41,10 +41,10 @@ TOLERANCE = 0.005
 # by at most this part of that length.
 _STEP = 0.01
 # At nearly one pose, forces are polynomials of at most 8th degree of time between two points: by
-# Markov's inequality this many parts find their largest value to 1 %, whatever it is.
+# Markov's inequality this number of parts finds their largest value to 1 %.
 _ENOUGH = 64
-# An interval that needs samples has so many parts at least: cubics join lengths and rates at the
-# samples, and are then off by less than 1e-3.
+# Smallest number of parts of an interval that needs samples: cubics join lengths and rates at the
+# samples, and their error is then below 1e-3.
 _FEWEST = 16
 
 
@@ -55,7 +55,7 @@ class Sampling:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod, with its limits.
+        Parameters of the hexapod, with its limits.
 
     """
 
@@ -84,14 +84,14 @@ class Sampling:
     def parts(self, durations: Array, between: Interpolation, results: Array,
               bases: Array | None, largest: float) -> Array:
         """
-        Return in how many parts each of N intervals is sampled (N,).
+        Return the number of parts in which each of N intervals is sampled (N,).
 
         Parameters
         ----------
         durations, between, results : (N,), Interpolation, (N + 1, RESULT)
-            Of the intervals [s], the motion in them, and the results at the points.
+            Durations of the intervals [s], motion in them, and results at the points.
         bases : (N + 1, BASE) or (1, BASE), optional
-            Rows of the base's motion at the points; by default it is still.
+            Rows of the base's motion at the points; the base is at rest by default.
         largest : float
             Absolute force that is known to occur in the trajectory [N].
 
@@ -130,7 +130,7 @@ class Sampling:
 
     def _force_parts(self, durations: Array, bounds: Bounds, inverse_radius: Array,
                      results: Array, bases: Array | None, largest: float) -> Array:
-        """Return in how many parts the forces ask for (N,)."""
+        """Return the number of parts that the forces need (N,)."""
         rates, magnitudes = results[:, RATES], np.abs(results[:, FORCES])
         rate_deviation = self._rate_deviation(durations, bounds, inverse_radius)
         deviation = self._viscous * rate_deviation + self._inertia_deviation(

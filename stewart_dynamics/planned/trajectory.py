@@ -15,10 +15,10 @@
 """
 Planned trajectories: motion of the platform in, lengths, rates and forces of the legs out.
 
-A trajectory is rejected as a whole where it exceeds a limit or meets a singularity, at its points
-or between them, in what the platform is to do there (``interpolation``) and in what the legs do
-that a joint_trajectory_controller moves: it joins positions and velocities of a leg by cubics in
-time, efforts by straight lines.
+A trajectory is rejected as a whole if it exceeds a limit or meets a singularity, at its points or
+between them. Both the planned motion of the platform (``interpolation``) and the motion of the
+legs under a joint_trajectory_controller are checked: the controller joins positions and velocities
+of a leg by cubics in time, efforts by straight lines.
 """
 
 from __future__ import annotations
@@ -53,15 +53,16 @@ FUNCTIONS = (
 
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
-# At most so many intervals between points or samples are worked on between two yields: about half
-# a millisecond of work. Uncompiled, one takes a millisecond.
+# Maximum number of intervals between points or samples that are processed between two yields:
+# about half a millisecond of work. Uncompiled, one takes a millisecond.
 PIECE = 256 if COMPILED else 1
 # Where nothing waits meanwhile, larger pieces take less time in all.
 _LARGE_PIECE = 16 * PIECE
-# A time_from_start holds less [s].
+# Upper end of the range of time_from_start [s].
 _TIMES_END = 2 ** 31
 
-# Closer samples part an interval in so many, down to this part of the interval of two points.
+# Number of parts into which closer samples divide an interval, and the smallest part
+# relative to the interval between two points.
 _PARTS = 16
 _CLOSEST = 1e-6
 
@@ -69,7 +70,7 @@ NOT_INCREASING = 'time_from_start is not strictly increasing'
 TOO_FAR = 'points too far apart'
 
 _LENGTHS, _RATES, _FORCES = consecutive(6, 6, 6)
-# After which points of a block samples are (M,), and at which fraction of the interval (M,).
+# Index of the point before each sample in a block (M,), and fraction of the interval (M,).
 _Samples = tuple[Integers, Array]
 
 
@@ -77,7 +78,7 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
                              wrench: ArrayLike | None = None, base: BaseMotion | None = None,
                              ) -> PlannedTrajectory:
     """
-    Check a planned trajectory against limits and singularities, and compute what the legs do.
+    Check a planned trajectory against limits and singularities, and compute leg motion and forces.
 
     The node does the same for ``~/platform_trajectory``. At the points lengths, rates and forces
     are those of ``inverse_dynamics``, to the last bit. Between two points the platform is taken to
@@ -90,20 +91,20 @@ def check_planned_trajectory(platform: StewartPlatform, times: ArrayLike, motion
     platform : StewartPlatform
         Its parameters have the limits and the thresholds of the condition number.
     times : (N,)
-        When the points are [s], from 0 and strictly increasing; taken to the nanosecond.
+        Times of the points [s], from 0 and strictly increasing; rounded to nanoseconds.
     motion : Motion of shape (N,)
         Pose, twist and acceleration of the platform at the points.
     wrench : (6,), optional
-        Force [N] and moment [N m] that act on the platform at its origin all the time, base axes;
+        Force [N] and moment [N m] that act on the platform at its origin, constant, base axes;
         None by default.
     base : BaseMotion of shape () or (N,), optional
-        How the base moves: all the time alike, or at the points, and between two of them along
-        the straight line; by default it is still.
+        Motion of the base: constant, or at the points with linear interpolation between them;
+        at rest by default.
 
     Returns
     -------
     PlannedTrajectory
-        Lengths, rates and forces of the legs, or why the trajectory is rejected.
+        Lengths, rates and forces of the legs, or the reason of the rejection.
 
     Raises
     ------
@@ -159,9 +160,9 @@ def check_in_pieces(platform: StewartPlatform, times: Stamps, rows: Array, wrenc
     wrench : (6,)
         External wrench at the platform's origin, base axes [N, N m].
     bases : (BASE,) or (N, BASE), optional
-        Rows of the base's motion; none: it is still.
+        Rows of the base's motion; at rest by default.
     piece : int
-        At most so many intervals are worked on between two yields.
+        Maximum number of intervals that are processed between two yields.
 
     """
     work = _Work(platform, times, rows, wrench, bases, piece)
@@ -203,7 +204,7 @@ class _Work:
         self._samples = 0
 
     def check(self) -> Iterator[None]:
-        """Compute what the legs do; raise _RejectedError where they must not."""
+        """Compute motion and forces of the legs; raise _RejectedError at a violation."""
         last = len(self._times) - 1
         for first in range(0, max(last, 1), self._piece):
             yield from self._check_block(first, min(first + self._piece, last))
@@ -263,16 +264,16 @@ class _Work:
     def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
                          durations: Array, rows: Array) -> None:
         """
-        Check singularities and joint angles where the legs' cubics lead the platform.
+        Check singularities and joint angles along the platform motion due to the legs' cubics.
 
         Parameters
         ----------
         times, after : (M,), (M - 1,)
-            When samples are, and from each to the next [s].
+            Times of the samples, and durations between them [s].
         legs, fraction, durations : Cubics of (M, 6), (M,), (M,)
-            Of the interval of points that each is in, where in it, and how long it is [s].
+            Legs in the interval of points around each sample, fraction of it, its duration [s].
         rows : (M, MOTION)
-            Where the platform is to be.
+            Planned motion of the platform.
 
         """
         poses, many = rows.copy(), len(rows)
@@ -296,7 +297,7 @@ class _Work:
 
     def _parts_between(self, first: int, durations: Array, between: Interpolation,
                        results: Array) -> Array:
-        """Return in how many parts each interval of points is sampled."""
+        """Return the number of parts in which each interval of points is sampled."""
         bases = self._bases
         if bases is not None:
             bases = bases[None] if bases.ndim == 1 else bases[first:first + len(results)]
@@ -355,9 +356,9 @@ def _seconds(nanoseconds: Stamps) -> Array:
 
 def _samples(many: Array, piece: int) -> Iterator[_Samples]:
     """
-    Yield pieces of the samples that part the intervals of points (N,) in so many.
+    Yield pieces of the samples that divide each interval of points (N,) into equal parts.
 
-    Both points are among them, where there is more than one part.
+    An interval of more than one part includes both of its points; others have no samples.
     """
     which = np.flatnonzero(many > 1.0)
     ends = np.cumsum(many[which] + 1.0)

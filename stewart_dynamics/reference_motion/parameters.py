@@ -61,7 +61,7 @@ REFERENCE_MOTION_PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name:
     Parameter('motion.fourier.frequency', 'double', 'base frequency: the series repeats after '
               '1 / frequency', 'Hz', 0.1, minimum=1e-6, maximum=1e3),
     Parameter('motion.fourier.cosine', 'double', f'coefficients of cos(2 pi k frequency t): six '
-              f'for {_POSE}, for k = 1 to n one after the other; none: 0', 'm, rad', (),
+              f'for {_POSE}, for k = 1 to n one after the other; zero if not set', 'm, rad', (),
               sizes=(6,), repeated=True),
     Parameter('motion.fourier.sine', 'double', 'coefficients of sin(2 pi k frequency t), likewise',
               'm, rad', (), sizes=(6,), repeated=True),

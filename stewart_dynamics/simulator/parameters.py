@@ -39,8 +39,8 @@ _OWN = (
               'steps. With use_sim_time each command advances time by one period', 'Hz', 500.0,
               minimum=1.0, maximum=1e4),
     Parameter('command_timeout', 'double', 'time without a command after which the brakes engage, '
-              'as those of a drive; they release with the next command; none: the last command is '
-              'held', 's', minimum=0.0, maximum=1e6, above=True),
+              'as those of a drive; they release with the next command; if not set, the last '
+              'command is held', 's', minimum=0.0, maximum=1e6, above=True),
     Parameter('end_stops.frequency', 'double', 'natural frequency of the mass of a leg on its end '
               'stop: its reflected mass and a sixth of platform and pistons', 'Hz', 30.0,
               minimum=0.0, above=True),

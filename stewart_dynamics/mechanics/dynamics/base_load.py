@@ -17,17 +17,17 @@ The load of a moving base: its inertial forces on legs and platform, as a wrench
 
 In base axes a point at r that moves with r' and r'' relative to the base is accelerated by
 ``a_B + W' x r + W x (W x r) + 2 W x r' + r''``, W the base's angular velocity, a_B the
-acceleration of its origin. The inverse and the forward dynamics have ``r'' - g`` of it, g the
-parameter. What they lack does not depend on the platform's acceleration, and acts on the legs as
-a wrench on the platform does: so it is subtracted from the external wrench.
+acceleration of its origin. The inverse and the forward dynamics include ``r'' - g`` of this, g
+the parameter. The remaining terms do not depend on the platform's acceleration, and act on the
+legs as a wrench on the platform does: their load is subtracted from the external wrench.
 
-Of a leg, with q = W x s and y the velocity of its platform joint across it, and with the terms
-of ``body_dynamics``: the force at the platform joint is
+With q = W x s, y the velocity of a leg's platform joint across the leg, and the terms of
+``bodies``, the force of the leg at the platform joint is
 
     m_ge A_b + (m2 - m_ge) (s . A_b) s + (I_e + m1 S1^2 + m2 c2^2) / L (W' x s + W x q + |q|^2 s)
     - m2 c2 |q|^2 s + 2 m2 c2 / L (L' q - (y . q) s) + 2 (I_e / L^2 + m_ce) (W . s) s x y
 
-where A_b is the acceleration of its base joint, less the gravity that the parameter lacks.
+where A_b is the acceleration of the leg's base joint, less the gravity that is not in g.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ from stewart_dynamics.mechanics.vectors import (
 
 @inlined
 def carried(spin: Vector3, spin_rate: Vector3, arm: Vector3) -> Vector3:
-    """Return W' x r + W x (W x r): how a turning base accelerates what rests on it."""
+    """Return W' x r + W x (W x r): the acceleration of a point fixed to a turning base."""
     return add(cross(spin_rate, arm), cross(spin, cross(spin, arm)))
 
 
 @inlined
 def carrying_matrix(spin: Vector3, spin_rate: Vector3) -> Matrix3:
-    """Return the matrix that gives the same for every arm: skew(W') + W W^T - W.W."""
+    """Return the matrix that maps any arm to ``carried``: skew(W') + W W^T - W.W."""
     x, y, z = spin
     dx, dy, dz = spin_rate
     return (-(y * y + z * z), x * y - dz, x * z + dy,
@@ -63,7 +63,7 @@ def carrying_matrix(spin: Vector3, spin_rate: Vector3) -> Matrix3:
 def leg_load(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
              velocity: Vector3, omega: Vector3, felt: Vector3, spin: Vector3,
              carrying: Matrix3) -> tuple[Vector3, Vector3]:
-    """Return force and moment at the platform's origin that move a leg along with the base."""
+    """Return force and moment at the platform's origin that move a leg with the base."""
     own = leg_of(constants, leg)
     base_joint, _ = joints_of(constants, leg)
     a, length, inverse_length, s = leg_line(constants, leg, position, rotation)
@@ -87,7 +87,7 @@ def leg_load(constants: Array, leg: int, position: Vector3, rotation: Matrix3,
 def platform_load(constants: Array, position: Vector3, rotation: Matrix3, velocity: Vector3,
                   omega: Vector3, felt: Vector3, spin: Vector3, spin_rate: Vector3,
                   carrying: Matrix3) -> tuple[Vector3, Vector3]:
-    """Return force and moment at the platform's origin that move it along with the base."""
+    """Return force and moment at the platform's origin that move the platform with the base."""
     mass, center, inertia = platform_of(constants)
     com = rotate(rotation, center)
     force = scale(mass, add(
@@ -109,8 +109,8 @@ def base_load(constants: Array, position: Vector3, rotation: Matrix3, velocity: 
     """
     Return the load of the base: force and moment at the platform's origin that move it along.
 
-    The wrench on the platform is less by it. The motion of the platform comes first, then that
-    of the base.
+    It is subtracted from the wrench on the platform. The motion of the platform comes first, then
+    the motion of the base.
     """
     felt = felt_at_origin(constants, gravity, acceleration)
     carrying = carrying_matrix(spin, spin_rate)
@@ -130,7 +130,7 @@ def base_load(constants: Array, position: Vector3, rotation: Matrix3, velocity: 
 
 @inlined
 def felt_at_origin(constants: Array, gravity: Vector3, acceleration: Vector3) -> Vector3:
-    """Return the acceleration of the base's origin, less the gravity that the parameter lacks."""
+    """Return the acceleration of the base's origin, less the gravity that is not in g."""
     return subtract(acceleration, subtract(gravity, gravity_of(constants)))
 
 

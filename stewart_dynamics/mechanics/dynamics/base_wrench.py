@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The base wrench: what the hexapod puts on its base, at the base's origin; compiled.
+The base wrench: the load of the hexapod on its base, at the base's origin; compiled.
 
 By Newton's and Euler's laws for all its parts together: the external wrench less the rate of
 their momentum, weight included. Forces between the parts are in neither; so no leg force, no
@@ -121,7 +121,7 @@ def base_wrenches(constants: Array, motions: Array, wrenches: Array, bases: Arra
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``; its gravity is not used.
+        Constants of the hexapod, see ``hexapod_constants``; its gravity is not used.
     motions : (N, MOTION)
         Rows of motion, SI units, base axes.
     wrenches : (N, WRENCH) or (1, WRENCH)

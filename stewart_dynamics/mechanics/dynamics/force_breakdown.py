@@ -104,7 +104,7 @@ class ForceBreakdownRows:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
 
     """
 

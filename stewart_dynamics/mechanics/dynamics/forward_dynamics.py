@@ -124,11 +124,11 @@ def acceleration(constants: Array, motion: Array, forces: Array, wrench: Array, 
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     motion : (MOTION,)
         A row of motion, SI units, base axes; its acceleration is written.
     forces : (6,)
-        Of the actuators [N], + pushes; their friction is subtracted here.
+        Forces of the actuators [N], + pushes; their friction is subtracted here.
     wrench : (6,)
         Force [N] and moment [N m] on the platform at its origin, base axes.
     base : (BASE,)

@@ -15,8 +15,8 @@
 """
 The constants of a hexapod as one array, for all compiled functions.
 
-First those of the platform, then 15 for each leg. Products of masses and distances of a leg that
-do not change with its length are computed here.
+The constants of the platform come first, then 15 for each leg. Products of masses and distances
+of a leg that do not change with its length are computed here.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from stewart_dynamics.parameters.table import Parameters
 _GRAVITY, _CHARACTERISTIC_LENGTH = 0, 3
 _PLATFORM_MASS, _PLATFORM_CENTER, _PLATFORM_INERTIA = 4, 5, 8
 _FIRST_LEG = 14
-# Of a leg, from its first number on.
+# Offsets of the constants of a leg from its first one.
 _BASE_JOINT, _PLATFORM_JOINT = 0, 3
 _PISTON_MASS, _PISTON_CENTER, _CYLINDER_MOMENT, _JOINT_INERTIA = 6, 7, 8, 9
 _REFLECTED_MASS, _VISCOUS_FRICTION, _COULOMB_FRICTION, _COULOMB_VELOCITY = 10, 11, 12, 13

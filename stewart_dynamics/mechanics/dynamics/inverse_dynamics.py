@@ -18,9 +18,9 @@ The inverse dynamics of many samples: leg lengths, rates and forces, det(J), con
 Compiled by numba where it is installed; one implementation for one sample and for millions, and
 each sample's bits are the same in either case. Numbers in brackets are the paper's equations:
 
-1. ``body_dynamics.leg_dynamics``: the leg's length, rate and row of J_inv (1)-(3), and the force
+1. ``bodies.leg_dynamics``: the leg's length, rate and row of J_inv (1)-(3), and the force
    ``F_i = M_i x_i'' + C_i x_i' + G_i`` that moves the leg at its platform joint (section 5).
-2. ``body_dynamics.platform_dynamics``: the wrench that moves the platform (5), (6).
+2. ``bodies.platform_dynamics``: the wrench that moves the platform (5), (6).
 3. ``base_load.base_load``: the load of a moving base, subtracted from the wrench beforehand.
 4. ``_dynamics``: six forces along the legs balance the sum, ``J_inv^T f = wrench``; the inverse of
    J_inv gives det(J), its rate, and the forces under a unit load as well.
@@ -53,7 +53,7 @@ from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.tile import LANES, matrix3, put6, vector3
 from stewart_dynamics.mechanics.vectors import add, dot6, scale, subtract
 
-# The tile: motion, wrench, base motion, result, and what the condition number needs.
+# The tile: motion, wrench, base motion, result, and scratch memory of the condition number.
 _WRENCH = MOTION * LANES
 _BASE = _WRENCH + WRENCH * LANES
 _RESULT = _BASE + BASE * LANES
@@ -255,7 +255,7 @@ def solve(constants: Array, motions: Array, wrenches: Array, bases: Array, resul
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     motions : (N, MOTION)
         Rows of position, rotation, twist and acceleration, SI units, base axes.
     wrenches : (N, WRENCH) or (1, WRENCH)

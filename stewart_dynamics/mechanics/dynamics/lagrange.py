@@ -18,7 +18,7 @@ The Lagrange equations as the paper assembles them: the readable reference.
 ``M(X) X'' + C(X, X') X' + G(X) = J_inv^T f + wrench`` in twist coordinates ``X' = [v; w]``,
 base axes. Numbers in brackets are equations of Alwan and Sarhan, Dynamic Analysis of Gough
 Stewart Robot Manipulator by Using Lagrange Formulation, J. Univ. Babylon Eng. Sci. 26(10),
-2018, in their correct form: docs/misprints.md lists what is printed instead. ``inverse_dynamics``
+2018, in their correct form: docs/misprints.md lists the misprints. ``inverse_dynamics``
 computes the same forces without a matrix and is validated against these. Every function takes any
 leading shape of samples.
 """
@@ -36,7 +36,7 @@ from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 
 
 class Legs(NamedTuple):
-    """The six legs at a pose; the axis of legs is the last but those of vectors."""
+    """The six legs at a pose; the axis of the legs precedes the axes of vectors."""
 
     lengths: Array  # (..., 6) [m]
     directions: Array  # s_i (..., 6, 3), from base joint to platform joint
@@ -145,7 +145,7 @@ def leg_coriolis(
     """
     Return C_i (..., 6, 3, 3) [kg/s] under the platform joints' velocities x_i'.
 
-    That of the paper is ``-(2/L) m_co L' skew(s)^2 - (m2 S2/L^2) s x_i'^T skew(s)^2``. With
+    The matrix of the paper is ``-(2/L) m_co L' skew(s)^2 - (m2 S2/L^2) s x_i'^T skew(s)^2``. With
     ``christoffel`` it consists of the Christoffel symbols of M_i in x_i: the same force
     C_i x_i', and M_i' - 2 C_i is skew.
     """
@@ -245,7 +245,7 @@ def gravity_vector(parameters: Parameters, position: Array, rotation: Array) -> 
 def base_coriolis_matrix(
         parameters: Parameters, position: Array, rotation: Array, spin: Array) -> Array:
     """
-    Return what the angular velocity W of a base adds to C, (..., 6, 6): a skew matrix.
+    Return the part of C due to the angular velocity W of a base, (..., 6, 6): a skew matrix.
 
     Platform: ``2 m J_c^T skew(W) J_c``, and ``I skew(W) + skew(W) I - skew(I W)`` of its turning.
     Leg: ``2 m2 c2 / L (q s^T - s q^T) + 2 (I_e / L^2 + m_ce) (W . s) skew(s)`` with q = W x s.
@@ -274,8 +274,8 @@ def base_gravity_vector(
     """
     Return G on a moving base, (..., 6) [N, N m]: the wrench that holds platform and legs on it.
 
-    A point at rest on the base, at r, feels ``a_B - g + W' x r + W x (W x r)`` in place of -g.
-    Leg: ``-G_i(A_b)`` with A_b that of its base joint, and
+    At a point at rest on the base, at r, ``a_B - g + W' x r + W x (W x r)`` replaces -g.
+    Leg: ``-G_i(A_b)`` with A_b of the leg's base joint, and
     ``(I_e / L^2 + m_ce) L across - m2 c2 |q|^2 s`` with across the part of ``W' x s + W x q``
     across the leg, q = W x s.
     """
@@ -284,7 +284,7 @@ def base_gravity_vector(
     field = skew(spin_rate) + skew(spin) @ skew(spin)
 
     def felt(arm: Array) -> Array:
-        """Return what is felt at points (..., k, 3) on the base."""
+        """Return acceleration less gravity of points (..., k, 3) fixed to the base."""
         field_at: Array = np.einsum('...ij,...kj->...ki', field, arm)
         return (acceleration - gravity)[..., None, :] + field_at
 

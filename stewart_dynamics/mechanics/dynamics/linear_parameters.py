@@ -15,14 +15,15 @@
 """
 The parameters in which leg forces are linear, theta (70,): their order, their names, both ways.
 
-Of the platform ten: mass, first moment m c, inertia about the platform's origin (not about its
-center of mass). Of each part of a leg three: mass m, first moment m S, second moment I + m S^2
-about its joint (cylinder: base joint, piston: platform joint). Of each actuator reflected mass,
-viscous and Coulomb friction; of each measured effort a constant offset, which is zero in every
+The platform has ten: mass, first moment m c, inertia about the platform's origin (not about its
+center of mass). Each part of a leg has three: mass m, first moment m S, second moment I + m S^2
+about its joint (cylinder: base joint, piston: platform joint). Each actuator has reflected mass,
+viscous and Coulomb friction; each measured effort has a constant offset, which is zero in every
 parameter file.
 
-Leg by leg within a kind: ``theta[VISCOUS_FRICTION]`` are six numbers. The mass of a cylinder
-alone does nothing to the leg forces, and the second moments of both parts of a leg do the same.
+Each kind has one number per leg: ``theta[VISCOUS_FRICTION]`` are six numbers. The mass of a
+cylinder alone does not affect the leg forces, and the second moments of both parts of a leg have
+the same effect.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from stewart_dynamics.parameters.table import inertia_matrix, Parameters
 LINEAR = OFFSET.stop
 """The number of parameters."""
 
-# Within the ten of the platform.
+# Indices of the ten parameters of the platform.
 MASS, FIRST_MOMENT, INERTIA = 0, slice(1, 4), slice(4, 10)
 
 _PLATFORM_NAMES = (
@@ -64,7 +65,7 @@ _ROUNDING = 1e-9
 
 
 def names_of(p: Parameters) -> tuple[str, ...]:
-    """Return the names of the parameters: those of a leg end with the leg's."""
+    """Return the names of the parameters; names of leg parameters end with the leg's name."""
     return (*_PLATFORM_NAMES, *(f'{kind}.{leg}' for kind in _LEG_KINDS for leg in p['joints']))
 
 
@@ -93,15 +94,15 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
     Parameters
     ----------
     theta : (LINEAR,)
-        Of a hexapod, SI units.
+        Parameters of a hexapod, SI units.
     p : Parameters
-        Where a part of a leg has no mass, its center of mass is as here.
+        Source of the center of mass of each part of a leg without mass.
 
     Raises
     ------
     ParameterError
-        No body has these: a mass that is not positive, a part of a leg with moments but without
-        mass, or one with a negative inertia about its center of mass.
+        No body has these parameters: a mass is not positive, or a part of a leg has moments
+        without mass or a negative inertia about its center of mass.
 
     """
     mass = float(theta[MASS])
@@ -137,7 +138,7 @@ def parameter_values(theta: Array, p: Parameters) -> dict[str, Any]:
 
 
 def about_origin(mass: float, center: Array, inertia: Array) -> Array:
-    """Return ixx ixy ixz iyy iyz izz about the origin of those about a center of mass (6,)."""
+    """Return ixx ixy ixz iyy iyz izz about the origin, given about a center of mass (6,)."""
     whole = inertia_matrix(inertia) + mass * (
         np.dot(center, center) * np.eye(3) - np.outer(center, center))
     six: Array = whole[np.triu_indices(3)]

@@ -72,7 +72,7 @@ def is_consistent(ten: Array) -> bool:
 
 
 def smallest_eigenvalue(ten: Array) -> float:
-    """Return that of the pseudo-inertia, by length and mass of the body: its largest is 1."""
+    """Return the smallest eigenvalue of the dimensionless pseudo-inertia, by the largest."""
     pseudo = pseudo_inertia(ten)
     mass, moment = abs(pseudo[3, 3]), np.abs(np.diag(pseudo)[:3]).max()
     if not mass > 0.0 or not moment > 0.0:

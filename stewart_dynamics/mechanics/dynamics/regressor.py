@@ -63,7 +63,7 @@ class Regressor(NamedTuple):
     matrix : (..., 6, n)
         Force of each leg [N] for one unit of each parameter.
     names : tuple of str
-        Of the n parameters; ``mechanics.dynamics.linear_parameters`` gives their values.
+        Names of the n parameters; ``mechanics.dynamics.linear_parameters`` gives their values.
 
     """
 
@@ -199,7 +199,7 @@ def _put_platform(of: _Moving, u: Vector3, h: Vector3, row: Array) -> None:
 @compiled
 def _put_row(of: _Moving, size: float, leg: int, coulomb_velocity: float, work: Array,
              row: Array) -> None:
-    """Write how the force of one leg depends on all parameters."""
+    """Write the derivatives of the force of one leg by all parameters."""
     u = read3(work, leg * _LEG + _ROW)
     h = scale(1.0 / size, read3(work, leg * _LEG + _ROW + 3))
     _put_platform(of, u, h, row)
@@ -231,11 +231,13 @@ def regressors(constants: Array, motions: Array, bases: Array, results: Array, w
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``; its masses and friction forces are not used.
+        Constants of the hexapod, see ``hexapod_constants``; its masses and friction forces are
+        not used.
     motions : (N, MOTION)
         Rows of motion, SI units, base axes.
     bases : (N, BASE) or (1, BASE)
-        Rows of the base's motion; one row for all. A row of nan: still, gravity the parameter.
+        Rows of the base's motion; one row for all. A row of nan: base at rest, with the
+        parameter's gravity.
     results : (N, 6, LINEAR)
         Written [N per unit of each parameter].
     work : WORK

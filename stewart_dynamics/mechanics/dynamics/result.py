@@ -44,7 +44,7 @@ class InverseDynamics:
     rates : (..., 6)
         Time derivatives of the lengths [m/s], + extends.
     forces : (..., 6)
-        Of the actuators [N], + pushes.
+        Forces of the actuators [N], + pushes.
     unit_load_forces : (..., 6)
         Largest force of each leg under a unit load on the platform: any force F and moment M
         with F^2 + (M / l)^2 = 1, l the characteristic length.
@@ -138,7 +138,7 @@ class InverseDynamics:
         Parameters
         ----------
         times : (N,), optional
-            Of the samples [s]; by default their numbers are the axis.
+            Times of the samples [s]; by default the axis shows sample numbers.
 
         Raises
         ------

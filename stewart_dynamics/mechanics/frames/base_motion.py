@@ -39,18 +39,18 @@ class BaseMotion(Samples):
     """
     How the base moves, in one sample or any leading shape of samples; all in base axes.
 
-    A constant velocity changes no force, so there is none. Leading shapes broadcast against each
-    other. The arrays are copied; ``base[3]``, ``base[::10]`` and ``len(base)`` work as for an
-    array of samples.
+    Linear velocity is left out: a constant velocity changes no force. Leading shapes broadcast
+    against each other. The arrays are copied; ``base[3]``, ``base[::10]`` and ``len(base)`` work
+    as for an array of samples.
 
     Parameters
     ----------
     gravity : (..., 3)
         Acceleration of free fall [m/s^2]; it turns in base axes as the base turns.
     linear_acceleration : (..., 3), optional
-        Of the base's origin [m/s^2]; zero by default.
+        Acceleration of the base's origin [m/s^2]; zero by default.
     angular_velocity, angular_acceleration : (..., 3), optional
-        Of the base [rad/s, rad/s^2]; zero by default.
+        Angular motion of the base [rad/s, rad/s^2]; zero by default.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class BaseMotion(Samples):
         Parameters
         ----------
         pose : Pose or Motion
-            Of the base frame in the world; only its rotation is used.
+            Pose of the base frame in the world; only its rotation is used.
         gravity : (..., 3)
             World axes [m/s^2].
 
@@ -111,7 +111,7 @@ class BaseMotion(Samples):
         Parameters
         ----------
         motion : Motion
-            Of the base frame, as a Motion has that of a platform: all in world axes.
+            Motion of the base frame, given like the motion of a platform: all in world axes.
         gravity : (..., 3)
             World axes [m/s^2].
 
@@ -135,9 +135,10 @@ class BaseMotion(Samples):
         """
         Return the base motion that an IMU fixed to the base measures.
 
-        No orientation is needed: gravity is in the specific force. It cannot be told from
-        acceleration, so ``gravity`` of the result is gravity less the acceleration of the base's
-        origin, and ``linear_acceleration`` is zero: the forces are the same.
+        No orientation is needed: the specific force includes gravity. An accelerometer does not
+        distinguish gravity from acceleration, so ``gravity`` of the result is gravity less the
+        acceleration of the base's origin, and ``linear_acceleration`` is zero: the forces are the
+        same.
 
         Parameters
         ----------
@@ -148,7 +149,7 @@ class BaseMotion(Samples):
         angular_acceleration : (..., 3), optional
             Its time derivative, IMU axes [rad/s^2]; zero by default.
         position : (..., 3)
-            Of the IMU in the base frame [m].
+            Position of the IMU in the base frame [m].
         rotation : (..., 3, 3), optional
             IMU axes to base axes; the same axes by default.
 
@@ -199,7 +200,7 @@ _STILL = (0.0, 0.0, 0.0)
 
 
 def row_of_pose(rotation: Matrix3, gravity: Vector3) -> tuple[Any, ...]:
-    """Return the row (BASE,) of a base at rest with base axes turned so in the world."""
+    """Return the row (BASE,) of a base at rest with this orientation in the world."""
     return (*rotate_back(rotation, gravity), *_STILL, *_STILL, *_STILL)
 
 
@@ -212,7 +213,7 @@ def row_of_motion(rotation: Matrix3, acceleration: Vector3, spin: Vector3, spin_
 
 def row_of_imu(specific_force: Vector3, spin: Vector3, spin_rate: Vector3, position: Vector3,
                rotation: Matrix3) -> tuple[Any, ...]:
-    """Return the row (BASE,) of what an IMU reads, IMU axes; its mounting in the base frame."""
+    """Return the row (BASE,) of an IMU's readings, IMU axes; its mounting in the base frame."""
     spin, spin_rate = rotate(rotation, spin), rotate(rotation, spin_rate)
     gravity = subtract(carried(spin, spin_rate, position), rotate(rotation, specific_force))
     return (*gravity, *_STILL, *spin, *spin_rate)

@@ -95,9 +95,9 @@ def rows_of(size: int, parts: Mapping[str, tuple[slice, Array]]) -> Array:
     Parameters
     ----------
     size : int
-        How many numbers a row has; those of no part are zero.
+        Length of a row; numbers outside of all parts are zero.
     parts : mapping of argument to (slice, (..., n))
-        Where in a row its numbers are, and these.
+        Slice of the argument's numbers in a row, and the numbers.
 
     """
     shape = common_shape(**{name: part.shape[:-1] for name, (_, part) in parts.items()})

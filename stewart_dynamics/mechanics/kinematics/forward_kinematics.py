@@ -210,7 +210,7 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     lengths : (6,)
         [m]
     motion : (MOTION,)

@@ -54,7 +54,7 @@ def joint_angles(constants: Array, axes: Array, motions: Array, angles: Array) -
     Parameters
     ----------
     constants : (CONSTANTS,)
-        Of the hexapod, see ``hexapod_constants``.
+        Constants of the hexapod, see ``hexapod_constants``.
     axes : (12, 3)
         Unit vectors: of the base joints in base axes, of the platform joints in platform axes.
     motions : (N, MOTION)

@@ -41,7 +41,7 @@ BASE_AXES, PLATFORM_AXES = AXES = 'geometry.base_joint_axes', 'geometry.platform
 
 # No ball joint or universal joint reaches this angle, 92 degrees [rad].
 _WIDEST = 1.6
-# A leg so far from its axis at home has another one [rad].
+# A larger angle between a leg and its axis at home is a likely mistake [rad].
 _AWAY = 0.5 * math.pi
 
 
@@ -52,15 +52,15 @@ class JointAngles:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     needed : sequence of str
-        Of AXES; the angles of others are nan.
+        Names in AXES; the other angles are nan.
 
     Attributes
     ----------
     axes : (12, 3)
         Unit vectors from which the angles are measured: of the base joints in base axes, of the
-        platform joints in platform axes; nan those that are not needed.
+        platform joints in platform axes; nan for axes that are not needed.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class JointAngles:
         return angles
 
     def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
-        """Return a function that gives the angles (JOINT_ANGLES,) in what is now in a row."""
+        """Return a function that gives the angles (JOINT_ANGLES,) of a row's current values."""
         angles = np.empty((1, JOINT_ANGLES))
         compute = joint_angles.bound(
             self._constants, self.axes, motion.reshape(1, len(motion)), angles)
@@ -104,7 +104,7 @@ class JointAngles:
 
 
 def angles_to_check(parameters: Parameters, limits: Sequence[str]) -> JointAngles | None:
-    """Return the angles for those of the joints' limits that are given; none for none."""
+    """Return the angles that the given joint limits need; None without joint limits."""
     needed = [axes for axes, limit in zip(AXES, OF_JOINTS, strict=True) if limit in limits]
     return JointAngles(parameters, needed) if needed else None
 

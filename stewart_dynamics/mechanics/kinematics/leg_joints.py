@@ -81,10 +81,10 @@ class TreeJoints:
     Attributes
     ----------
     names : tuple of str
-        Of all joints (24,): those of the platform from base to platform, then of each leg the
-        universal joint's two and the prismatic one.
+        Names of all joints (24,): first the platform's joints, from base to platform, then for
+        each leg two of the universal joint and one of the prismatic joint.
     mounts : (6, 3, 3)
-        Of each leg the rotation from the axes of its mount to base axes.
+        Rotation from the axes of each leg's mount to base axes.
 
     Raises
     ------

@@ -29,12 +29,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 
-# Parts of the mean distance from the center: how well symmetric joints fit, as tables of two or
-# three digits do; what is no mistake in any case; and how far a wrong sign moves a joint at least.
+# By the mean distance from the center: the largest misfit of symmetric joints, as in tables of two
+# or three digits; the largest deviation that is always accepted; and the smallest displacement of
+# a joint by a wrong sign.
 _FITS, _LEAST, _SIGN = 0.004, 0.0005, 0.03
-# Where joints repeat, one is odd that is off by so many times the misfit of the other five, and by
-# so many units of the table's last digit. Errors of measurement in all six joints make up to 9
-# times, rounding up to 2 units.
+# Where joints repeat, a joint breaks the symmetry if its deviation exceeds the misfit of the other
+# five by the first factor, and the table's last digit by the second. Errors of measurement in all
+# six joints reach a factor of 9, rounding reaches 2 units.
 _TIMES, _UNITS = 15.0, 3.0
 _MOST_DIGITS = 9
 
@@ -69,7 +70,7 @@ def odd_joint(points: Array) -> OddJoint | None:
         for expected in _mirrored(points, others, size):
             off = float(np.linalg.norm(points[odd] - expected)) / size
             symmetric |= off <= _FITS
-            # Two pairs of mirror images are on any circle: they tell no more than a sign.
+            # Two pairs of mirror images are on any circle: only a wrong sign is identifiable.
             sign = np.abs(np.abs(points[odd]) - np.abs(expected)).max() <= _FITS * size
             if sign and off >= _SIGN:
                 wrong_signs.append((off, OddJoint(odd, expected, _MIRRORED)))
