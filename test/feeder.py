@@ -75,7 +75,7 @@ def feed(rate: float, first: int, step: int, many: int, messages: dict[str, byte
 
 
 def hear() -> None:
-    """Subscribe to what the node publishes, as controller and RViz do, until told to end."""
+    """Subscribe to the outputs of the node, as controller and RViz do, until interrupted."""
     node = rclpy.create_node('controller')
     for topic, kind in (('leg_states', JointState), ('leg_forces', Float64MultiArray),
                         ('markers', MarkerArray)):
@@ -87,7 +87,7 @@ def hear() -> None:
 if __name__ == '__main__':
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
     rclpy.init()
-    with suppress(RCLError):  # told to end while it publishes
+    with suppress(RCLError):  # interrupted while it publishes
         if sys.argv[1:]:
             feed(float(sys.argv[1]), *map(int, sys.argv[2:5]), {
                 topic: bytes.fromhex(message) for topic, message in zip(

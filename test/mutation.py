@@ -18,7 +18,7 @@ Mutation testing: how many wrong lines of the package the tests notice.
 ``python test/mutation.py`` draws a random sample of small changes (an operator, a comparison, a
 constant, a condition, a call) in the modules named, makes each in a copy of the package, and runs
 the test modules that name the module, quick tests first, until one fails. It prints the share
-killed, every survivor, and what was killed by the time limit alone. Mutants of ``mechanics`` run
+killed, every survivor, and the mutants killed only by the time limit. Mutants of ``mechanics`` run
 uncompiled, so that they need no compilation. Tests that need ROS, that fail uncompiled or that
 take long are left out, and of each property few examples are tried (``mutation_plugin``): the
 share killed is a lower bound.
@@ -73,7 +73,7 @@ class Mutant(NamedTuple):
         return (source[:self.begin] + self.new.encode() + source[self.end:]).decode()
 
     def __str__(self) -> str:
-        """Return where it is and what it changes."""
+        """Return the location and the change of the mutant."""
         source = self.path.read_bytes()
         line = source.decode().splitlines()[self.line - 1].strip()
         old = source[self.begin:self.end].decode()

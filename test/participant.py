@@ -13,14 +13,14 @@
 # limitations under the License.
 
 """
-A program of the tests of security: source, receiver or intruder, as its environment makes it.
+A program for the security tests: source, receiver or intruder, depending on its environment.
 
 ``python participant.py MARK`` sends setpoints, unless MARK is 0, and listens to what the node
-sends and hears. The last three digits of its stamps are MARK. Five times in a second it says in a
-line of JSON how many it has sent, what it has heard from others, by topic and mark, the nodes
-that it sees, and the last diagnostics of the setpoints.
+sends and hears. The last three digits of its stamps are MARK. Five times per second it prints a
+line of JSON: the number of setpoints sent, the messages received from others by topic and mark,
+the nodes discovered, and the last diagnostics of the setpoints.
 
-It imports as little as it can: the tests start many.
+It imports few modules, because the tests start many of these programs.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _SETPOINTS_A_LINE = 4
 
 
 class Participant:
-    """What the program does and has heard."""
+    """Publishes and receives messages, and counts the received ones."""
 
     def __init__(self, mark: int) -> None:
         self.mark = mark
@@ -86,7 +86,7 @@ class Participant:
                 header=Header(stamp=stamp, frame_id='base'), **HOME.get(topic, {})))
 
     def run(self) -> None:
-        """Go on until the program is ended."""
+        """Run until the program is terminated."""
         sent = 0
         while True:
             due = time.monotonic() + _SECONDS

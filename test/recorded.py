@@ -45,7 +45,7 @@ MotionAt = Callable[[Array], Motion]
 
 
 class Recorded(NamedTuple):
-    """What was recorded of the legs, N samples."""
+    """Recorded states of the legs, N samples."""
 
     times: Array
     positions: Array
@@ -121,15 +121,15 @@ def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed:
     Parameters
     ----------
     p : Parameters
-        Of the true hexapod.
+        Parameters of the true hexapod.
     motion : callable
-        Of times [s].
+        The motion as a function of times [s].
     seconds, rate : float
         Length [s] and samples per second.
     seed : int
-        Of the noise.
+        Seed of the noise.
     noise : Noise
-        What is added.
+        Noise to add.
     forces : (N, 6), optional
         True forces of the motion, begun ``noise.delay`` earlier; by default Pinocchio's.
     with_rates : bool
@@ -150,7 +150,7 @@ def recorded(p: Parameters, motion: MotionAt, seconds: float, rate: float, seed:
 
 
 def coloured(random: np.random.Generator, many: int, correlation: float) -> Array:
-    """Return noise (many, 6) of deviation 1, correlated over so many samples."""
+    """Return noise (many, 6) of deviation 1, with the correlation length in samples."""
     size = 1 << (2 * many - 1).bit_length()
     w = 2.0 * np.pi * np.fft.rfftfreq(size)
     shape = 1.0 / np.sqrt(1.0 + (w * correlation) ** 2)

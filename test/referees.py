@@ -333,7 +333,7 @@ def friction(p: Parameters, rates: Array) -> Array:
     return f
 
 
-# Runs code that comes in lines of JSON, and answers what it prints on stdout and on stderr.
+# Runs code read as lines of JSON, and returns its output on stdout and on stderr.
 _UNCOMPILED = """
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -447,7 +447,7 @@ class PinocchioReferee:
 
     def forces_and_base_wrench(self, motion: Motion, wrench: Array,
                                base: BaseMotion | None = None) -> tuple[Array, Array]:
-        """Return the forces of the six actuators, and what the base's joint must hold."""
+        """Return the forces of the six actuators, and the wrench in the joint of the base."""
         pin, p, model, data = self._pin, self._p, self._model, self._data
         base = BaseMotion(p['gravity']) if base is None else base
         model.gravity.linear = np.array(base.gravity)

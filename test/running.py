@@ -232,7 +232,7 @@ class Program:
         return self.wait()
 
     def kill(self) -> None:
-        """End it, if it still runs, without a chance to end by itself."""
+        """Kill it if it still runs."""
         if not self.ended:
             self.process.kill()
             self.process.wait()
@@ -530,7 +530,7 @@ class NodeProcess:
         assert self.program.stdout == ''
 
     def kill(self) -> None:
-        """End it, if it runs, without a chance to end by itself."""
+        """Kill it if it runs."""
         if self._program is not None:
             self._program.kill()
 
@@ -972,7 +972,7 @@ class Feeder(Program):
         self.process.send_signal(signal.SIGUSR1)
 
     def end(self) -> None:
-        """Tell it to end, if it has not yet, and wait until the node has removed it."""
+        """Stop it if it still runs, and wait until the node has removed it."""
         if not self.ended:
             self.process.terminate()
         assert self.wait() == 0, self.stderr
@@ -1045,7 +1045,7 @@ class Planner:
         return deserialize_message(self.raw[-1], JointTrajectory)
 
     def until_rejected(self, text: str, number: int) -> None:
-        """Wait until the last trajectory is rejected for a reason, so many in all."""
+        """Wait until the last trajectory is rejected for a reason, and ``number`` in total."""
         self._node.until_status('planned trajectory', b'\2', text)
         self._node.until(
             lambda: self._node.values('planned trajectory')['rejected'] == str(number),

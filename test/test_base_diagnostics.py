@@ -71,7 +71,7 @@ def test_a_fixed_base_has_no_status() -> None:
     assert of.base.log_lines(BEGIN + 100.0) == []
 
 
-def test_what_lacks_is_named() -> None:
+def test_missing_topics_are_named() -> None:
     of = diagnostics(BASE_POSE, BASE_TWIST, BASE_ACCEL)
     assert state(of, BEGIN) == (ERROR, 'no forces: base/pose never came, base/twist never came, '
                                 'base/accel never came')

@@ -255,7 +255,7 @@ BAD: Sequence[tuple[str, Callable[[int], bytes], str]] = (
 
 
 @pytest.mark.parametrize(('topic', 'bad', 'reason'), BAD)
-def test_what_is_wrong_is_rejected_and_the_last_sample_holds(
+def test_invalid_samples_are_rejected_and_the_last_one_holds(
         topic: str, bad: Callable[[int], bytes], reason: str) -> None:
     feed = Feed('imu' if topic == BASE_IMU else 'motion')
     feed.sample(SECOND)
@@ -541,7 +541,7 @@ def test_forces_by_an_imu_are_within_what_its_filter_misses() -> None:
         motion = Motion.from_pose(pose)
         truth = platform.inverse_dynamics(motion, base=base).forces
         found = platform.inverse_dynamics(motion, base=BaseMotion.of_rows(np.array(row))).forces
-        # What the delay of the angular acceleration makes of it, to first order.
+        # Effect of the delay of the angular acceleration, to first order.
         jerk = delay * angle * omega ** 3
         late = platform.inverse_dynamics(motion, base=BaseMotion(
             base.gravity, base.linear_acceleration, w, dw + [jerk, 0.0, 0.0])).forces

@@ -178,7 +178,7 @@ def test_the_sources_sum_to_the_force() -> None:
     assert relative(by.total, platform.inverse_dynamics(motion, wrench, base).forces) < 1e-12
     assert np.abs(by.base_motion).max() > 1.0
     assert SOURCES[-1] == 'base motion'
-    # Gravity of the base is no part of its motion, and what does not depend on it is the same.
+    # Gravity is not part of the motion of the base; independent sources are unchanged.
     tilted = platform.force_breakdown(motion, wrench, BaseMotion(base.gravity))
     assert np.array_equal(tilted.gravity, by.gravity)
     assert np.abs(tilted.base_motion).max() < 1e-12 * np.abs(by.gravity).max()
@@ -218,7 +218,7 @@ def test_power_of_legs_and_base_is_the_rate_of_energy(seed: int) -> None:
     result = platform.inverse_dynamics(motion, base=moving)
     on_base = platform.base_wrench(motion, base=moving)
     r = base.rotation
-    # What the base does to the hexapod, with its velocity in the world.
+    # Power of the base on the hexapod, from the velocity of the base in the world.
     by_base = -(on_base[:3] @ (r.T @ base.linear_velocity)
                 + on_base[3:] @ (r.T @ base.angular_velocity))
     power = result.forces @ result.rates + by_base

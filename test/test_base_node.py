@@ -162,9 +162,9 @@ def test_without_the_base_there_are_lengths_and_no_forces(fresh: Start) -> None:
     on.node.until_said('base: no forces: base/imu')
 
 
-def test_what_is_wrong_is_rejected_and_counted(fresh: Start) -> None:
+def test_invalid_base_samples_are_rejected_and_counted(fresh: Start) -> None:
     for source, topics in BASE_SOURCES.items():
-        # The middleware fills up what is cut.
+        # The middleware pads truncated messages.
         bad = [each for each in BAD
                if each[0] in topics and source != 'pose' and each[2] != MALFORMED]
         if not bad:

@@ -64,7 +64,7 @@ def test_it_is_the_librarys_bit_for_bit(moving: bool) -> None:
         assert_alike(found, BaseWrench(parameters), batch)
 
 
-def test_a_base_that_is_not_known_has_none() -> None:
+def test_an_unknown_base_has_no_base_wrench() -> None:
     random = rng()
     motion = random_motion(PARAMETERS, random, MANY)
     bases = random_base_motion(PARAMETERS, random, MANY).rows.copy()
@@ -77,7 +77,7 @@ def test_a_base_that_is_not_known_has_none() -> None:
     assert_alike(found, BaseWrench(PARAMETERS), batch)
 
 
-def test_numbers_that_overflow_have_none() -> None:
+def test_overflowing_numbers_have_no_base_wrench() -> None:
     motions = np.array([HOME.motion] * 3)
     motions[1, 18:21] = 1e308
     found = BaseWrench(PARAMETERS).many(batch_of(motions, np.zeros((3, 6)), None))

@@ -39,7 +39,7 @@ pytestmark = pytest.mark.skipif(
 
 
 class Page(HTMLParser):
-    """Links, anchors and what a browser loads for a page."""
+    """Links, anchors and loaded resources of a page."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()

@@ -65,7 +65,7 @@ NOT_JOINED = 'dropped: not all topics had its stamp'
 # Setpoints from a bag
 
 def _replayed(bag: str, folder: Path) -> list[tuple[int, str, bytes]]:
-    """Return what the replay writes for a bag: when it was recorded, topic, message."""
+    """Return the output of the replay of a bag: time of recording, topic, message."""
     subprocess.run([executable('stewart_replay'), ROOT / 'bags' / bag, '--params', PLATFORM,
                     '--output', folder, '--no-report'], check=True, stdout=subprocess.DEVNULL)
     return _recorded(folder / bag / 'bag')
@@ -157,7 +157,7 @@ def test_a_thousand_setpoints_are_answered_with_the_librarys_bits(
 
 def _latched(domain: int) -> list[bytes]:
     """
-    Return what a late subscriber hears of the warning.
+    Return the warning that a late subscriber receives.
 
     Fast DDS has once, in a run of all tests, left a subscriber without it for a minute: another
     one is made then.
@@ -835,7 +835,7 @@ BAD_CHANGES: list[tuple[dict[str, Any], str]] = [
      'legs.piston.mass, gravity: only changed while the node is unconfigured'),
     ({'platform.mas': 1.0}, 'platform.mas: unknown parameter; do you mean platform.mass?'),
     ({'platform.center_of_mass': None}, 'platform.center_of_mass: cannot be unset'),
-    # All or none: the mass alone would do.
+    # Changes are atomic: the mass alone would be accepted.
     ({'platform.mass': 99.0, 'singularity.warn_time': -1.0},
      'singularity.warn_time: -1.0 s: must be at least 0'),
 ]

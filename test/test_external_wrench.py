@@ -125,7 +125,7 @@ def test_on_a_moving_base_its_motion_is_no_external_load() -> None:
 
 
 def test_a_static_load_is_found() -> None:
-    """On random hexapods, with a known load that is not external."""
+    """Use random hexapods with a known load that is not external."""
     random = rng(1)
     for _ in range(20):
         parameters = random_parameters(random).replaced(UNFILTERED)
@@ -149,9 +149,9 @@ def test_without_a_load_there_is_none() -> None:
 
 def test_in_motion_it_is_the_residual_of_the_equation_of_motion() -> None:
     """
-    Not filtered, it is the mean over both ends of M dX'/dt + C X' + G - J_inv^T f - known.
+    Unfiltered, it is the mean over both ends of M dX'/dt + C X' + G - J_inv^T f - known.
 
-    Of forces that are not held but measured at the end this is off by an error of first order.
+    With forces measured at the end instead of held ones, the error is of first order.
     """
     random = rng(3)
     for _ in range(5):
@@ -217,7 +217,7 @@ def test_one_not_filtered_is_the_mean_of_many_at_both_ends() -> None:
 # The filter
 
 def test_it_follows_a_step_by_the_closed_form_at_irregular_times() -> None:
-    """And back: 1 - exp(-2 pi cutoff t), then the decay of the old value."""
+    """Compare with 1 - exp(-2 pi cutoff t), then with the decay after the load ends."""
     random = rng(4)
     cutoff = 3.0
     step = ExternalWrench(HEXAPOD.replaced({'external_wrench.cutoff': cutoff}))
@@ -458,7 +458,7 @@ def found_within(course: Course, rate: float, begin: float, end: float) -> float
 
 @pytest.mark.parametrize('rate', [1000.0, 500.0, 100.0])
 def test_a_wrench_on_the_moving_plant_is_found_within_5_percent(rate: float) -> None:
-    """Force and moment at every moment from 0.1 s after it came; and gone again when it goes."""
+    """Compare force and moment from 0.1 s after the load begins; they vanish when it ends."""
     course = controlled(4.0, lambda now: LOAD if 1.0 <= now < 3.0 else NO_WRENCH, rate=rate)
     assert found_within(course, rate, 1.0, 3.0) < 0.05
     assert course.poses < 1e-9
@@ -469,8 +469,8 @@ def test_a_wrench_on_the_moving_plant_is_found_within_5_percent(rate: float) -> 
         assert np.max(np.linalg.norm(rest[:, 3:], axis=1)) < 0.05 * np.linalg.norm(LOAD[3:])
 
 
-def test_and_with_noise() -> None:
-    """Of 0.01 mm, 0.1 mm/s and 5 N in each leg, at 1 kHz."""
+def test_a_wrench_on_the_moving_plant_is_found_despite_noise() -> None:
+    """Measure with noise of 0.01 mm, 0.1 mm/s and 5 N in each leg, at 1 kHz."""
     course = controlled(
         4.0, lambda now: LOAD if 1.0 <= now < 3.0 else NO_WRENCH, rate=1000.0,
         noise__length=1e-5, noise__rate=1e-4, noise__force=5.0)
@@ -478,7 +478,7 @@ def test_and_with_noise() -> None:
 
 
 def test_held_forces_leave_an_error_of_second_order() -> None:
-    """Not filtered, of a hexapod that is released under held forces and a load, no friction."""
+    """Release a frictionless hexapod under held forces and a load; the estimate is unfiltered."""
     frictionless = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
     held = six(0.8 * StewartPlatform(HEXAPOD).inverse_dynamics(HOME).forces)
     largest = []

@@ -189,7 +189,7 @@ def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: Dynam
     for _ in range(3):
         node.answer(MOVING)
     node.until_said('followed as a restart')
-    # Not so far: what comes is older than the last used, until it is not.
+    # A jump too short for a restart: setpoints are rejected until they are newer than the last.
     node.answer(MOVING, stamp=node.stamp(0) + 5 * STEP)
     for _ in range(4):
         node.send()
@@ -328,7 +328,7 @@ def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_dropped(
         node.publish('setpoint/pose', HOME.messages(stamp)['setpoint/pose'])
         if n > 1000:
             node.rejects('setpoint/pose', NOT_JOINED)
-        if n == 500:  # the middleware's queue is no longer: what it has is taken now
+        if n == 500:  # the middleware's queue is full here: wait until its messages are taken
             node.publish('setpoint/pose', HOME.messages(stamps[0])['setpoint/pose'])
             node.rejects('setpoint/pose', 'same stamp twice')
             node.until_counted()
@@ -524,10 +524,10 @@ def _until_one_writer(node: DynamicsNode) -> None:
 
 
 def _expect_what_was_cut_off(node: DynamicsNode) -> None:
-    """Expect the rejections, of whatever number, of setpoints that came when it was not ready."""
+    """Expect any number of rejections of setpoints that came while the node was not ready."""
     stamp = node.send()
     node.state_of(stamp)
-    # What the diagnostics count with this is behind all that came before.
+    # Once these are counted, all earlier rejections are counted, too.
     for topic, message in HOME.messages(stamp).items():
         node.writers[topic].publish(message)
         node.rejects(topic, 'same stamp twice')
@@ -600,7 +600,7 @@ def test_lifecycles_under_load_leave_nothing_behind(
         cycle()
     after, publishers = held()
     cycles, grown = 20, list[int]()
-    # What is left behind is left in each round; memory that is taken once, in one of them.
+    # A leak grows in each round; memory that is allocated once grows in only one of them.
     while not grown or (grown[-1] >= 800 and len(grown) < 3):
         before = after
         for _ in range(40):
@@ -613,7 +613,7 @@ def test_lifecycles_under_load_leave_nothing_behind(
         grown.append(after['memory'] - before['memory'])
     feeder.end()
     assert node.program.stderr.count('dynamics ready after') == 1 + cycles
-    # A publisher that is left behind takes 30 kB; with none the middleware takes 3 to 7 a time.
+    # A leaked publisher takes 30 kB; without leaks the middleware takes 3 to 7 kB per cycle.
     assert grown[-1] < 800, grown
     _expect_what_was_cut_off(node)
 
@@ -954,7 +954,7 @@ def test_a_trajectory_in_work_is_dropped_when_the_node_ends(renew: Start) -> Non
     planner = Planner(node)
 
     def dropped() -> bool:
-        # The request may come when all that was sent is done: it travels beside 9 MB of points.
+        # The request may come after all trajectories are done: it is sent beside 9 MB of points.
         planner.send_long(50_000)
         node.peer.spin(0.1)
         for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
@@ -966,7 +966,7 @@ def test_a_trajectory_in_work_is_dropped_when_the_node_ends(renew: Start) -> Non
     node.until_active()
 
     def answered() -> bool:
-        # What was still in the middleware may come before it, and leave no place for it.
+        # Messages still in the middleware may come first and fill the queue.
         planner.send([HOME, HOME])
         return 'accepted: 2 points' in node.status('planned trajectory').message
 

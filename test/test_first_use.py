@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is needed later is compiled when it is connected, and setpoints are answered meanwhile."""
+"""Functions for later inputs are compiled on connection, while setpoints are answered."""
 
 from __future__ import annotations
 

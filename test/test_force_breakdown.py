@@ -145,7 +145,7 @@ def test_no_force_is_split_where_there_is_none() -> None:
     assert np.isnan(forces[1]).all()
 
 
-def test_what_is_not_there_breakdown_nothing() -> None:
+def test_absent_sources_have_no_force() -> None:
     random = rng()
     p = random_parameters(random)
     still = Motion([[0.0, 0.0, size_of(p)]], np.eye(3))

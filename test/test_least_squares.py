@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Least squares: what data cannot tell is named, and keeps its value."""
+"""Least squares: unidentifiable parameters are named, and keep their values."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def told(regressor: Array, efforts: Array) -> Information:
     return information(regressor, efforts, 1.0 / SIGMAS ** 2)
 
 
-def test_all_is_told_and_the_errors_are_as_large_as_said() -> None:
+def test_all_parameters_are_identified_with_the_reported_errors() -> None:
     errors = []
     for seed in range(300):
         solution = solve(told(*samples(seed)), np.zeros(4), SCALES)
@@ -82,7 +82,7 @@ def test_weight_zero_leaves_out() -> None:
     np.testing.assert_array_equal(without.vector, with_outliers.vector)
 
 
-def test_what_is_not_told_keeps_its_value_and_the_sum_is_named() -> None:
+def test_unidentifiable_parameters_keep_their_values_and_the_sum_is_named() -> None:
     # 2 x_0 + x_1 alone, in units of the scales; x_3 not at all.
     mixing = np.array([[2.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0],
                        [0.0, 0.0, 0.0, 0.0]])
@@ -112,7 +112,7 @@ def test_coefficients_of_a_sum_are_in_the_parameters_units() -> None:
     np.testing.assert_allclose(one.coefficients, [1.0, 1.0 / 0.03], rtol=1e-6)
 
 
-def test_noise_in_the_regressor_tells_nothing() -> None:
+def test_noise_in_the_regressor_identifies_nothing() -> None:
     # The last column is noise: by itself it seems to be excited.
     regressor, efforts = samples(5)
     regressor[..., 3] = 100.0 * rng(6).normal(size=(400, 6))
@@ -133,7 +133,7 @@ def test_a_weak_direction_is_not_known() -> None:
     assert what.singular_values[3] < 0.1 < what.singular_values[2]
 
 
-def test_no_samples_tell_nothing() -> None:
+def test_without_samples_nothing_is_identifiable() -> None:
     start = np.array([1.0, 2.0, 3.0, 4.0])
     solution = solve(nothing(4), start, SCALES)
     assert solution.identifiability.rank == 0

@@ -64,7 +64,7 @@ def test_the_version_is_that_of_the_package() -> None:
 
 def test_a_parameter_file_is_checked_without_compiler_ros_and_bags() -> None:
     def ran(code: str) -> tuple[float, set[str]]:
-        """Return the CPU time of some code, and what it imports."""
+        """Return the CPU time of some code, and the modules that it imports."""
         code += '\nimport sys, time\nprint(time.process_time(), *sys.modules)'
         done = subprocess.run([sys.executable, '-c', code], cwd=ROOT, capture_output=True,
                               text=True, check=False)

@@ -145,7 +145,7 @@ def test_bytes_are_those_of_a_typed_message(joints: Any, frame: str, to: Setpoin
     message = deserialize_message(data, MarkerArray)
     again = bytes(serialize_message(message))
     assert len(again) == len(data)
-    # What only aligns is zero here and anything there.
+    # Padding bytes are zero here and arbitrary there.
     assert all(ours in (theirs, 0) for ours, theirs in zip(data, again, strict=True))
     assert deserialize_message(again, MarkerArray) == message
 

@@ -38,7 +38,7 @@ import yaml
 
 PAGE = (ROOT / 'docs' / 'moving_base.md').read_text(encoding='utf-8')
 CONFIG = ROOT / 'config'
-# Of each file: the name of the node, and where the motion of its base comes from.
+# File, name of the node, and source of the motion of its base.
 FILES = (('telescope.yaml', '', 'pose'), ('ship_hexapod.yaml', '', 'imu'),
          ('stacked.yaml', 'lower_hexapod', 'fixed'), ('stacked.yaml', 'upper_hexapod', 'motion'))
 SECOND = 1_000_000_000
@@ -62,7 +62,7 @@ def numbers(cell: str) -> list[float]:
 
 
 def base_input(parameters: Parameters, **changes: Any) -> BaseInput:
-    """Return what follows the topics of the base."""
+    """Return the input that follows the topics of the base."""
     return BaseInput(parameters.replaced({
         name.replace('__', '.'): value for name, value in changes.items()}),
         Rejections(lambda *why: pytest.fail(f'{why}')), pytest.fail)
@@ -192,7 +192,7 @@ def test_the_forces_of_the_telescope_are_those_on_the_page() -> None:
 
 @pytest.mark.parametrize('row', cells('errors of extrapolation'), ids=lambda row: row[0])
 def test_the_errors_of_extrapolation_are_those_on_the_page(row: list[str]) -> None:
-    """Of the angular acceleration of a sine, just before the next sample."""
+    """Evaluate the angular acceleration of a sine, just before the next sample."""
     (frequency,), (rate,), (held,), (extrapolated,) = (numbers(cell) for cell in (
         row[0].partition(',')[0], *row[1:]))
     period = round(SECOND / rate)
@@ -223,7 +223,7 @@ def test_the_errors_of_extrapolation_are_those_on_the_page(row: list[str]) -> No
 @pytest.mark.parametrize('row', cells('delay and noise of the filter'), ids=lambda row: row[0])
 def test_delay_and_noise_of_the_angular_acceleration_are_those_on_the_page(
         row: list[str]) -> None:
-    """Of a ramp, and of white noise, through the node's own filter."""
+    """Pass a ramp, and white noise, through the node's own filter."""
     (rate,), (cutoff,), (delay,), (noise,) = (
         numbers(cell.partition('^')[0]) for cell in row)
     parameters = Parameters.from_yaml(CONFIG / 'platform.yaml')

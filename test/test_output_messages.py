@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is published for results: the same for one and for many, and finite numbers only."""
+"""Messages published for results: the same for one and for many, and finite numbers only."""
 
 from __future__ import annotations
 

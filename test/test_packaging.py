@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What is built and installed: by colcon, by pip, and what package.xml says of it."""
+"""Files built and installed by colcon and by pip, and the metadata in package.xml."""
 
 import ast
 from collections.abc import Iterable, Iterator
@@ -113,7 +113,7 @@ def depends(*kinds: str) -> set[str]:
 
 
 def call(arguments: Iterable[str | Path], **options: object) -> str:
-    """Run a program to its end with exit code 0, and return what it printed."""
+    """Run a program to its end with exit code 0, and return its output."""
     done = subprocess.run(
         [str(argument) for argument in arguments], stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=300, **options)
@@ -123,7 +123,7 @@ def call(arguments: Iterable[str | Path], **options: object) -> str:
 
 @pytest.fixture(scope='module')
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of what is packaged: a build leaves files beside setup.py."""
+    """Return a copy of the packaged files: a build leaves files beside setup.py."""
     folder = tmp_path_factory.mktemp('source') / NAME
     folder.mkdir()
     for name in PACKAGED:
@@ -312,7 +312,7 @@ def test_setup_agrees_with_package_xml(distribution: importlib.metadata.Distribu
 
 
 def test_pip_requirements(distribution: importlib.metadata.Distribution) -> None:
-    """What is imported is required, ROS only by its extra, and all of it is pinned."""
+    """Imported packages are required, ROS only by its extra, and all of them are pinned."""
     requirements = [Requirement(text) for text in distribution.requires or ()]
     always = {item.name for item in requirements if 'extra' not in str(item.marker)}
     imported = third_party(NAME) & set(KEYS)

@@ -187,7 +187,7 @@ def test_noise_in_the_rates_makes_no_inertia_smaller() -> None:
     assert np.abs(np.mean([errors(each) for each in parts], axis=0)).max() < 0.9
 
 
-def test_at_rest_mass_and_horizontal_center_are_told_and_nothing_is_invented() -> None:
+def test_only_mass_and_horizontal_center_are_identified_at_rest() -> None:
     payload = payload_of(recorded(at_rest))
     assert known(payload) == ['mass', 'center of mass x', 'center of mass y']
     body, given = payload.fitted.body, payload.given

@@ -139,7 +139,7 @@ def test_setpoints_are_answered_meanwhile_and_all_requests_are(carried: Carried)
     assert all(each.result().success for each in futures)
 
 
-def test_where_nothing_can_be_told_it_says_why(carried: Carried) -> None:
+def test_the_reason_is_reported_if_nothing_is_identifiable(carried: Carried) -> None:
     node = carried.node
     answer = carried.identify()
     assert not answer.success
@@ -160,7 +160,7 @@ def test_measured_legs_that_are_silent_are_not_used(fresh: Start) -> None:
     assert not carried.identify().success
 
 
-def test_what_a_hexapod_at_rest_does_not_tell_keeps_its_values(carried: Carried) -> None:
+def test_numbers_not_identifiable_at_rest_keep_their_values(carried: Carried) -> None:
     stamps = [BEGIN + round(time * 1e9) for time in TIMES]
     carried.move([message_of(each) for each in resting(LOADED, AT_HOME, NO_WRENCH, stamps)])
     answer = carried.identify()

@@ -40,7 +40,7 @@ from trajectories import (
 
 def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = NO_WRENCH,
                base: Array | None = None) -> Outcome:
-    """Return what becomes of a trajectory."""
+    """Return the outcome of a trajectory."""
     *pieces, outcome = planned.answer(parameters, wrench, data, base)
     assert outcome is not None
     assert not any(pieces)
@@ -251,7 +251,7 @@ def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> N
         times, rows = sampled('clear', step)
         total = 0
         for _ in planned.answer(PARAMETERS, NO_WRENCH, messages.trajectory(STAMP, times, rows)):
-            # of what the platform does between points, and of where the legs lead it
+            # for the platform between points, and for the poses to which the legs lead it
             assert sum(solved) <= 2 * (PIECE + 1)
             total += sum(solved)
             solved.clear()

@@ -108,9 +108,9 @@ def test_a_rejected_trajectory_is_not_answered_and_the_next_one_is(fresh: Start)
 
 def test_setpoints_are_answered_while_trajectories_are_in_work(fresh: Start) -> None:
     """
-    By order: many setpoints, one after the other, are answered before the next trajectory is done.
+    Many setpoints, one after the other, are answered before the next trajectory is done.
 
-    The trajectories are rejected at their ends: answers so long may come later than they are sent.
+    The trajectories are rejected at their ends, because such long answers may be delayed.
     """
     node = fresh()
     node.until_active()

@@ -24,7 +24,7 @@ from stewart_dynamics.planned.messages import Outcome
 
 
 class Timed:
-    """A queue, its timer, and what has become of the trajectories."""
+    """A queue, its timer, and the outcomes of the trajectories."""
 
     def __init__(self) -> None:
         self.running = False

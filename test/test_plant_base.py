@@ -50,7 +50,7 @@ def base_motion(parameters: Parameters, seed: int, scale: float = 1.0) -> Motion
 
 
 def rows_at(base: MotionOf, begin: Any, period: float, gravity: Any = GRAVITY) -> Array:
-    """Return what the plant takes for a period, or (..., 3, BASE) for those that begin so."""
+    """Return the input of the plant for a period, or (..., 3, BASE) for several periods."""
     times = np.asarray(begin)[..., None] + period * np.array([0.0, 0.5, 1.0])
     rows = BaseMotion.from_motion(base(times.ravel()), gravity).rows
     return rows.reshape(*times.shape, -1)
@@ -73,9 +73,10 @@ def balance(parameters: Any, base: MotionOf, blocks: int) -> tuple[float, float,
     Let a smooth motion be followed on a moving base.
 
     Return the change of energy in the world, the work done, and the sum of its amounts [J]. The
-    work of a leg is its force times the change of its length. The base does the opposite of what
-    the hexapod puts on it: force by velocity and moment by angular velocity, by Simpson's rule,
-    with accelerations from the forward dynamics at both ends of each command.
+    work of a leg is its force times the change of its length. The work of the base is the
+    negative integral of the power of the base wrench, force by velocity and moment by angular
+    velocity, by Simpson's rule, with accelerations from the forward dynamics at both ends of each
+    command.
     """
     plant, platform = Plant(parameters), StewartPlatform(parameters)
     period = 1.0 / parameters['rate']

@@ -111,24 +111,24 @@ def test_good_hexapods_give_no_warnings(name: str) -> None:
     assert likely_mistakes(Parameters(HEXAPODS[name])) == ()
 
 
-def test_the_hexapod_of_the_package_gives_none() -> None:
+def test_the_hexapod_of_the_package_gives_no_warning() -> None:
     assert likely_mistakes(PLATFORM) == ()
     assert likely_mistakes(symmetric_parameters()) == ()
 
 
 @pytest.mark.parametrize('file', ['ship_hexapod', 'telescope'])
-def test_files_of_the_package_give_none(file: str) -> None:
+def test_files_of_the_package_give_no_warning(file: str) -> None:
     assert likely_mistakes(Parameters.from_yaml(ROOT / 'config' / f'{file}.yaml')) == ()
 
 
-def test_random_hexapods_give_none() -> None:
+def test_random_hexapods_give_no_warning() -> None:
     for seed in range(100):
         assert likely_mistakes(random_parameters(np.random.default_rng(seed))) == ()
 
 
 @pytest.mark.parametrize('power', [2.0, 3.0])
 @pytest.mark.parametrize('size', [1e-3, 1e-2, 1.0, 1e3])
-def test_hexapods_of_any_size_give_none(size: float, power: float) -> None:
+def test_hexapods_of_any_size_give_no_warning(size: float, power: float) -> None:
     """Forces of actuators grow with the square of the size, or as weights with the third power."""
     limits = {'limits.length_min': 1.0, 'limits.length_max': 1.0, 'limits.force_max': power,
               'limits.velocity_max': 0.5 * power - 0.5, 'actuator.coulomb_friction': power}

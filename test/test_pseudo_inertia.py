@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pseudo-inertia and log-Cholesky parameters: every body, and nothing that is none."""
+"""Pseudo-inertia and log-Cholesky parameters: every body is accepted, and only bodies."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_platforms_are_bodies(hexapod: int) -> None:
     (1.0, (1.0, 1.0, 2.5)),  # positive definite, and yet more than the sum of the others
     (1.0, (-1.0, 1.0, 1.0)),
 ])
-def test_what_is_no_body(mass: float, inertia: tuple[float, float, float]) -> None:
+def test_invalid_bodies_are_rejected(mass: float, inertia: tuple[float, float, float]) -> None:
     ten = np.array([mass, 0.0, 0.0, 0.0, inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]])
     assert not is_consistent(ten)
     with pytest.raises(ParameterError, match='no body has these'):

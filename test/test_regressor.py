@@ -109,7 +109,7 @@ def test_tilt_columns_are_the_derivatives_by_turns_of_gravity(moving: bool) -> N
                                    atol=1e-8 * np.abs(column).max())
 
 
-def test_what_no_motion_can_tell() -> None:
+def test_parameters_that_no_motion_identifies() -> None:
     random = rng(4)
     p = random_parameters(random)
     matrix = StewartPlatform(p).regressor(random_motion(p, random, MANY)).matrix
@@ -179,7 +179,7 @@ def test_parameters_come_back_from_their_linear_form(hexapod: int) -> None:
         np.testing.assert_allclose(value, p[name], rtol=1e-9, atol=1e-12, err_msg=name)
 
 
-def test_what_is_no_body_is_rejected() -> None:
+def test_inconsistent_inertia_is_rejected() -> None:
     p = random_parameters(rng(9))
     theta = linear_parameters(p)
 

@@ -99,10 +99,10 @@ def granted(enclave: str) -> dict[str, set[str]]:
 
 def done_beside(peer: Peer) -> dict[str, set[str]]:
     """
-    Return what the one other node of a domain does, in the words of a policy.
+    Return the actions of the one other node of a domain, by the rights of a policy.
 
-    It is what the peer has discovered without its own. What a node tells of itself in the graph
-    of ROS may be lost.
+    These are all endpoints that the peer has discovered, except its own: the information that a
+    node publishes about itself in the graph of ROS may be lost.
     """
     node = peer.node
     topics = [name for name, _ in node.get_topic_names_and_types()]

@@ -380,12 +380,12 @@ def test_a_stray_old_sample_of_one_topic_resets_nothing(topic: str) -> None:
     assert feed.whole(10 * SECOND + 10 * MS)
     assert not feed.notices
     assert feed.counts == {(topic, NOT_JOINED): 1}
-    # and what came before is still too old
+    # and older samples are still rejected
     assert feed.sample(POSE, 10 * SECOND + 5 * MS) is None
     assert feed.counts[POSE, TOO_OLD] == 1
 
 
-def test_a_restart_drops_what_waits_from_before_it() -> None:
+def test_a_restart_drops_samples_waiting_from_before_it() -> None:
     feed = Feed()
     assert feed.whole(10 * SECOND)
     feed.sample(POSE, 10 * SECOND + 10 * MS)
@@ -523,7 +523,7 @@ def test_a_single_topic_needs_no_stamp(source: str) -> None:
 # Bounds
 
 @pytest.mark.parametrize('silent', TOPICS)
-def test_what_waits_is_bounded(silent: str) -> None:
+def test_the_number_of_waiting_samples_is_bounded(silent: str) -> None:
     feed = Feed()
     many = WAITING + 50
     for n in range(1, many + 1):
@@ -776,7 +776,7 @@ def test_many_of_one_topic_may_come_before_the_others() -> None:
                        if topic == of], ()) == WAITING
 
 
-def test_what_waits_may_be_out_of_order() -> None:
+def test_waiting_samples_may_be_out_of_order() -> None:
     given = [(TWIST, messages.twist(2 * MS, (2.0,) * 6)), (TWIST, messages.twist(MS, (1.0,) * 6)),
              (POSE, messages.pose(MS)), (POSE, messages.pose(2 * MS)),
              (ACCEL, messages.accel(MS)), (ACCEL, messages.accel(2 * MS))]

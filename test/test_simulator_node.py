@@ -440,7 +440,7 @@ def test_forces_above_their_limit_saturate(begin: Start) -> None:
 
 
 @pytest.mark.parametrize('mode', ['real time', 'stepped'])
-def test_what_cannot_be_computed_holds_it_at_rest(
+def test_the_hexapod_rests_if_a_step_cannot_be_computed(
         begin: Start, unlimited: Path, mode: str) -> None:
     simulator = begin(*([STEPPED] if mode == 'stepped' else []), files=(unlimited, FILE))
     if mode == 'stepped':
@@ -515,7 +515,7 @@ CANNOT = [
 ]
 
 
-def test_what_it_cannot_simulate_is_reported_in_one_line(
+def test_unsupported_parameters_are_reported_in_one_line(
         domain: int, tmp_path: Path, start: Start) -> None:
     for overrides, words in CANNOT:
         with pytest.raises(StewartError, match=re.escape(words)):

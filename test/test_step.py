@@ -339,7 +339,7 @@ def test_a_pose_that_cannot_be_solved_gives_lengths_and_a_warning(setpoint: Setp
     Setpoint(STAMP, (0.0, 0.0, 1.0, *UPRIGHT, *(0.0,) * 6, *(1e308,) * 6)),
     HOME._replace(stamp=2 ** 31 * 10 ** 9), HOME._replace(stamp=-2 ** 63)],
     ids=['far', 'farther', 'turning', 'accelerated', 'after 2038', 'before 1901'])
-def test_what_overflows_gives_nothing(setpoint: Setpoint) -> None:
+def test_a_setpoint_that_overflows_gives_nothing(setpoint: Setpoint) -> None:
     assert STEP(setpoint, None) is None
     assert STEP(HOME, None) is not None
 

@@ -36,7 +36,7 @@ def test_a_wrong_sign_is_found(table, joint, axis):
     joints = good.copy()
     joints[joint, axis] *= -1.0
     odd = odd_joint(joints)
-    # A sign may put a joint where its mirror image is: which of both is wrong cannot be told.
+    # A sign may move a joint onto its mirror image; then the wrong joint is not identifiable.
     twins = [n for n in range(6) if np.array_equal(joints[n], joints[joint])]
     assert odd.joint in twins
     if len(twins) == 1:

@@ -50,7 +50,7 @@ class Source(Protocol):
     Attributes
     ----------
     missing : list of str
-        What could not be read so far.
+        Descriptions of the parts that could not be read so far.
     unchecked : bool
         Messages without a checksum were read.
     topics : dict

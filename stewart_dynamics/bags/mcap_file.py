@@ -81,7 +81,7 @@ class McapFile:
     Attributes
     ----------
     missing : list of str
-        What could not be read.
+        Descriptions of the parts that could not be read.
     unchecked : bool
         Messages without a checksum were read.
 
@@ -196,7 +196,7 @@ class McapFile:
         return self._file.read(size)
 
     def _note(self, what: str) -> None:
-        """Note once what could not be read."""
+        """Add a part that could not be read to ``missing``, once."""
         if what not in self.missing:
             self.missing.append(what)
 

@@ -52,9 +52,9 @@ class Recording:
     topics : dict
         The type of each topic in it.
     missing : list of str
-        What could not be read so far.
+        Descriptions of the parts that could not be read so far.
     notices : list of str
-        Notices to the user on how it was read.
+        Notices to the user about the reading of the bag.
 
     """
 
@@ -117,7 +117,7 @@ class Recording:
 
     @property
     def damage(self) -> list[str]:
-        """Return what could not be read so far, of all files."""
+        """Return descriptions of the parts that could not be read so far, of all files."""
         return self.missing + [f'{file.name}: {what}' for file, source in self._sources
                                for what in source.missing]
 
@@ -163,7 +163,7 @@ class Recording:
 
 
 def _unpack(file: Path, unpacked: Path) -> str:
-    """Decompress a file by zstd; return what is wrong, or an empty text."""
+    """Decompress a file by zstd; return the error as text, empty on success."""
     room = max(_AT_LEAST, _TIMES * file.stat().st_size)
     with file.open('rb') as packed, unpacked.open('wb') as stream:
         try:

@@ -42,9 +42,9 @@ class Ros1File:
     Attributes
     ----------
     missing : list of str
-        What could not be read.
+        Descriptions of the parts that could not be read.
     unchecked : bool
-        Messages without a checksum were read: always.
+        Messages without a checksum were read; always True.
 
     """
 
@@ -53,7 +53,7 @@ class Ros1File:
         self.unchecked = True
         self._reader = Reader(path)
         self._reader.open()
-        # rosbags does not limit what it decompresses.
+        # rosbags does not limit the size of decompressed chunks.
         self._reader.chunks = {
             place: chunk._replace(decompressor=_bounded(chunk.decompressor))
             for place, chunk in self._reader.chunks.items()}
@@ -61,7 +61,7 @@ class Ros1File:
 
     @property
     def topics(self) -> dict[str, str]:
-        """Return the type of each topic, and whether its definition is another."""
+        """Return the type of each topic, and whether its definition differs."""
         kinds: dict[str, set[str]] = {}
         store = get_typestore(Stores.ROS1_NOETIC)
         for of in self._reader.connections:

@@ -41,16 +41,16 @@ class SqliteFile:
     Attributes
     ----------
     missing : list of str
-        What could not be read.
+        Descriptions of the parts that could not be read.
     unchecked : bool
-        Messages without a checksum were read: always.
+        Messages without a checksum were read; always True.
 
     """
 
     def __init__(self, path: Path) -> None:
         self.missing: list[str] = []
         self.unchecked = True
-        # As it is on disk: no journal is applied, and none is made.
+        # Read the file as it is on disk: journals are neither applied nor created.
         self._database = sqlite3.connect(f'{path.absolute().as_uri()}?immutable=1', uri=True,
                                          check_same_thread=False)
         self._steps = (_INSTRUCTIONS + _FOR_A_BYTE * path.stat().st_size) // _AT_ONCE

@@ -22,21 +22,21 @@ give the forces f_model of the same motion without it, so
     w_ext = J_inv^T (f_model - f)
 
 with the sign of ``~/wrench``: the load that the surroundings put on the platform at its origin,
-base axes. Whatever the model does not have is in it: a wrong payload or friction, a brake, an end
-stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.
+base axes. It includes all forces that the model lacks: a wrong payload or friction, a brake, an
+end stop. ``external_wrenches`` is this equation for recorded samples, as the replay uses it.
 
 Online, pose and twist come from lengths and rates (``forward_kinematics``); the acceleration is
 the difference of two twists by the time between them, its mean over that time. The forces are
-those that acted in that time, as a controller holds them, and all else is the mean of what it is
-at both ends (the trapezoidal rule, an error of second order). The difference quotient is rough,
-and passes through a low-pass filter of the first order, ``r' = 2 pi cutoff (w_ext - r)``, solved
-exactly for any time dt between two samples, over which w_ext is constant; it begins at zero. That
-is the generalized momentum observer of De Luca et al. (Collision detection and safe reaction with
-the DLR-III lightweight manipulator arm, IROS 2006, doi:10.1109/IROS.2006.282053) with the gain K =
-2 pi cutoff: of r' = K (p' - u - r), p the momentum, it takes the integral, r = K (p -
-integral(u + r)), and here the same equation is solved step by step. So noise is no worse than
-there: white noise of deviation s in a twist comes out as M K s at most, however short dt is, while
-the difference quotient alone has sqrt(2) M s / dt.
+those that acted in that time, as a controller holds them; all other terms are the mean of their
+values at both ends (the trapezoidal rule, an error of second order). The difference quotient is
+noisy and passes through a low-pass filter of the first order, ``r' = 2 pi cutoff (w_ext - r)``,
+solved exactly for any time dt between two samples, over which w_ext is constant; r begins at
+zero. This is the generalized momentum observer of De Luca et al. (Collision detection and safe
+reaction with the DLR-III lightweight manipulator arm, IROS 2006, doi:10.1109/IROS.2006.282053)
+with the gain K = 2 pi cutoff. The observer integrates r' = K (p' - u - r), p the momentum, to
+r = K (p - integral(u + r)); here the same equation is solved step by step. Noise is therefore no
+worse: white noise of deviation s in a twist gives at most M K s, however short dt is, while the
+difference quotient alone gives sqrt(2) M s / dt.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def external_wrenches(platform: StewartPlatform, motions: Array, model_forces: A
 
 @entry_point('f8[::1]')
 def _one(numbers: Array) -> None:
-    """Write what one measurement gives."""
+    """Write the results of one measurement."""
     constants, written = numbers[_PLATFORM], numbers[_WRITTEN]
     before, motion, wrench, differences = (
         numbers[_MOTION], written[_MOTION_AFTER], written[_AFTER], written[_DIFFERENCES])
@@ -252,10 +252,10 @@ class ExternalWrench:
         Parameters
         ----------
         measurement : Measurement
-            A finite one.
+            Measurement with finite numbers.
         before : Estimate, optional
-            The last one. Where it is of a later stamp, or further back than
-            ``setpoint.timeout``, only its pose is used, and the filter restarts.
+            Last estimate. If its stamp is later, or older by more than ``setpoint.timeout``,
+            only its pose is used, and the filter restarts.
         known : six numbers
             The load on ``~/wrench`` [N, N m].
         target : sequence of float, optional
@@ -266,8 +266,8 @@ class ExternalWrench:
         Raises
         ------
         PoseError, SingularityError
-            The forward kinematics did not converge from the last pose. Where there is none so
-            far, or none since ``setpoint.timeout``, from the target and from home neither.
+            The forward kinematics did not converge from the last pose. If there is no pose yet,
+            or no pose within ``setpoint.timeout``, the target and home were tried as well.
         MotionError
             Numbers overflow.
 
@@ -320,7 +320,7 @@ class ExternalWrench:
 
     @cached_property
     def _homes(self) -> list[list[float]]:
-        # It takes milliseconds and is seldom needed.
+        # Computing the home poses takes milliseconds; they are seldom needed.
         return [[*position.tolist(), *rotation.ravel().tolist(), *NO_WRENCH, *NO_WRENCH]
                 for position, rotation in zip(*homes(self._parameters), strict=True)]
 

@@ -119,7 +119,7 @@ class MeasuredLegs:
         self._rejected(Rejection(MEASURED_LEGS, reason), details)
 
     def _sound(self, data: bytes) -> Measurement | None:
-        """Return what a message has measured, or reject it."""
+        """Return the measurement in a message, or reject the message."""
         try:
             stamp, values = self._reader.read_one(data)
         except MalformedError as exc:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-sensor_msgs/JointState: how one is read, and how one is written.
+Reading and writing of sensor_msgs/JointState.
 
 A message may have other joints besides the six of the hexapod, in any order; joints are found
 by name.
@@ -178,7 +178,7 @@ class JointStateReader:
 
     def read_many(self, data: bytes | Bytes, starts: ArrayLike, sizes: ArrayLike) -> JointStates:
         """
-        Return what ``read_one`` gives of many messages, and how many it rejects.
+        Return the results of ``read_one`` for many messages, and the number of rejections.
 
         Parameters
         ----------

@@ -148,7 +148,7 @@ class LegTrajectory:
     names : sequence of str
         Names of the joints; frame_id is empty.
     size : int
-        How many points it has.
+        Number of points.
     effort : bool
         Points have effort.
 

@@ -63,7 +63,7 @@ class Report:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     measured : bool
         There are measured forces: ``add_measured`` will be called.
 
@@ -88,13 +88,13 @@ class Report:
         Parameters
         ----------
         seconds : (N,)
-            Since the first setpoint of the bag, never decreasing [s].
+            Time since the first setpoint of the bag, never decreasing [s].
         setpoints : Batch
             At least one.
         outputs : Outputs
-            Of these setpoints.
+            Outputs for these setpoints.
         base_wrenches : (N, 6)
-            What the hexapod puts on its base [N, N m]; nan: not known.
+            Wrench of the hexapod on its base [N, N m]; nan: not known.
         breakdown : (N, 7, 6)
             The demanded forces by source: sample, source, leg [N].
 
@@ -131,7 +131,7 @@ class Report:
         Parameters
         ----------
         seconds : (M,)
-            Since the first setpoint of the bag, never decreasing [s].
+            Time since the first setpoint of the bag, never decreasing [s].
         measured, computed : (M, 6)
             Leg forces [N].
         wrench : (M, 6)

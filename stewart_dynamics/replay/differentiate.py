@@ -54,7 +54,7 @@ class Deviation(NamedTuple):
     """
     Deviation of the smoothed poses from the recorded ones: noise, and motion above the cut-off.
 
-    Of poses farther than 1 / cutoff from the ends of their segment.
+    Poses within 1 / cutoff of the ends of their segment are left out.
     """
 
     position_rms: float

@@ -91,7 +91,7 @@ def replay_fleet(
         Address of a Dask scheduler whose workers replay the bags. They must have this package
         and see the bags and ``output`` at the same paths as this process.
     show_progress : bool, optional
-        On stderr; by default if that is a terminal.
+        Show the progress on stderr; by default if stderr is a terminal.
 
     Results of an earlier run are kept if bag, parameters, options and program have not changed,
     unless ``options.force``.

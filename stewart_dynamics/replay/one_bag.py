@@ -96,11 +96,12 @@ def replay(
     bag : Path
         A bag: a folder or a file.
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     folder : Path
-        It gets its name when it is complete; it must not exist, unless ``options.force``.
+        Folder of the results; it gets this name when complete, and must not exist, unless
+        ``options.force``.
     options : Options, optional
-        Topics, and what is written.
+        Topics to read, and files to write.
     progress : callable, optional
         Called with the bytes read and the setpoints answered since the last call.
 

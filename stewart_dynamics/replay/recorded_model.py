@@ -57,9 +57,9 @@ class RecordedModel:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
     name : str
-        Of the robot in the URDF.
+        Name of the robot in the URDF.
 
     Raises
     ------
@@ -77,7 +77,7 @@ class RecordedModel:
         self._fixed = TransformsWriter(self._links.fixed)
 
     def of_beginning(self, stamp: int) -> Iterator[Written]:
-        """Yield topics and messages (1,) of what does not change, at a stamp [ns]."""
+        """Yield topics and messages (1,) of the constant parts, at a stamp [ns]."""
         yield TF_STATIC, self._fixed.write(np.array([stamp]), self._links.at_fixed[None])
         text = string(self._urdf)
         yield ROBOT_DESCRIPTION, np.frombuffer(text, dtype=f'V{len(text)}')

@@ -79,7 +79,7 @@ class Comparison:
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
 
     """
 
@@ -104,11 +104,11 @@ class Comparison:
         Parameters
         ----------
         seconds : (N,)
-            Since the first setpoint, never decreasing [s].
+            Time since the first setpoint, never decreasing [s].
         setpoints : Batch
             N setpoints.
         outputs : Outputs
-            Of these setpoints.
+            Outputs for these setpoints.
 
         """
         self._setpoints.add(setpoints.stamps, np.column_stack([
@@ -124,7 +124,7 @@ class Comparison:
         stamps : (M,)
             [ns]
         efforts : (M, 6)
-            In the order of the parameter ``joints``, finite [N].
+            Forces in the order of the parameter ``joints``, finite [N].
 
         """
         self._samples.add(stamps, efforts)

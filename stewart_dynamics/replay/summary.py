@@ -134,7 +134,7 @@ class Summary:
         outputs : Outputs
             Their outputs.
         base_wrenches : (N, 6)
-            What the hexapod puts on its base [N, N m]; nan: not known.
+            Wrench of the hexapod on its base [N, N m]; nan: not known.
         breakdown : (N, 7, 6), optional
             The demanded forces by source: sample, source, leg [N].
 
@@ -350,7 +350,7 @@ class _BaseWrench:
         seconds : (N,)
             Time since the first setpoint of the bag [s].
         steps : (N,)
-            From each one's predecessor to it [s].
+            Time since the previous sample [s].
         wrenches : (N, 6)
             Force [N] and moment [N m]; nan: not known.
 

@@ -40,7 +40,7 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     summary : mapping
         The content of summary.json.
     parameters : Parameters
-        Of the hexapod.
+        Parameters of the hexapod.
 
     """
     lines = [f'{summary["bag"]}:']

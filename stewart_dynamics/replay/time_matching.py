@@ -94,7 +94,7 @@ class Waiting:
             self._line_up(stamps, rows)
 
     def _line_up(self, stamps: Stamps, rows: Array) -> None:
-        """Give all rows but the last a pass; leave out what is out of order."""
+        """Assign a pass to each row except the last; drop rows out of order."""
         if self.pass_number < 0 and len(rows):
             self.pass_number, self.newest = 0, int(stamps[0]) - 1
         steps = np.diff(stamps)
@@ -115,7 +115,7 @@ class Waiting:
             self._waiting = self._most
 
     def _passes(self, stamps: list[int]) -> list[int]:
-        """Return the passes of all but the last stamp, -1 of those out of order."""
+        """Return the pass of each stamp except the last, -1 if out of order."""
         passes = []
         for stamp, after in zip(stamps[:-1], stamps[1:], strict=True):
             ahead = stamp > self.newest

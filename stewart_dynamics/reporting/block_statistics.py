@@ -99,7 +99,7 @@ class Integral:
 
     @property
     def mean(self) -> Array:
-        """Over time, or over the samples if no time has passed; nan without samples."""
+        """Mean over time, or over the samples if no time has passed; nan without samples."""
         if self._time > 0.0:
             return self.values / self._time
         return self._sum / self._samples if self._samples else np.full_like(self._sum, np.nan)

@@ -82,7 +82,7 @@ class Curves:
         seconds : (N,)
             Times, never decreasing [s].
         values : (C, N)
-            Of every channel; values that are not finite are missing and break the line.
+            Values of every channel; values that are not finite break the line.
 
         """
         if not len(seconds):

@@ -63,7 +63,7 @@ def channels_of(parameters: Parameters) -> int:
 
 
 def joint_angles_of(parameters: Parameters) -> slice:
-    """Return the channels of the joints' angles; there are none without limits."""
+    """Return the channels of the joints' angles; empty without limits."""
     first = BREAKDOWN.start + 6 * len(sources_of(parameters))
     limited = any(parameters[name] is not None for name in OF_JOINTS)
     return slice(first, first + JOINT_ANGLES * limited)

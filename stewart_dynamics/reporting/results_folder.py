@@ -47,7 +47,7 @@ _PARTIAL = re.compile(
 
 
 class Writing(Protocol):
-    """Options of what writes the folder."""
+    """Options of the program that writes the folder."""
 
     @property
     def force(self) -> bool:
@@ -111,12 +111,12 @@ def _try_to_lock(descriptor: int) -> bool | None:
 
 
 def remove_abandoned(folders: Iterable[Path]) -> None:
-    """Remove what killed runs have left of the results of these folders, beside them."""
+    """Remove partial results of killed runs beside these folders."""
     finals: dict[Path, dict[str, Path]] = {}
     for final in folders:
         finals.setdefault(final.parent, {})[_beginning(final)] = final
     for parent, of_names in finals.items():
-        # A folder comes before what it was to replace.
+        # A folder is sorted before the results that it was to replace.
         for path in sorted(parent.iterdir()) if parent.is_dir() else ():
             found = _PARTIAL.fullmatch(path.name)
             if found and found[1] in of_names:
@@ -124,7 +124,7 @@ def remove_abandoned(folders: Iterable[Path]) -> None:
 
 
 def _remove_if_abandoned(path: Path, final: Path) -> None:
-    """Remove partial results, or put back what they were to replace, unless in use."""
+    """Remove partial results or restore the results they were to replace, unless in use."""
     partial = path.with_name(path.name.removesuffix(_REPLACED))
     locked = partial if partial.exists() else final
     try:

@@ -108,7 +108,7 @@ class Spectrum:
         seconds : (N,)
             Times, never decreasing; the same time again where time has jumped back [s].
         values : (C, N)
-            Of every channel.
+            Values of every channel.
 
         """
         if not len(seconds):
@@ -219,7 +219,7 @@ class Spectrum:
 
 
 def _segments(samples: int, length: int) -> int:
-    """Return how many segments of a length are in samples."""
+    """Return the number of segments of a length in samples."""
     return max((samples - length) // (length // 2) + 1, 0)
 
 
@@ -257,7 +257,7 @@ def drawn(frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     frequencies, amplitudes : (F,)
-        Of one channel, frequencies increasing, above zero.
+        Spectrum of one channel; the frequencies increase and are above zero.
 
     """
     if not len(frequencies):

@@ -74,7 +74,7 @@ class GeneratedBase:
         Parameters
         ----------
         index : int
-            Its number since the motion began; the first is 1, 0 is at rest.
+            Number of the period since the motion began; the first is 1, 0 is at rest.
         end : int
             The stamp of its end [ns], not used.
 
@@ -138,7 +138,7 @@ class BaseOfTopics:
         Parameters
         ----------
         index : int
-            Its number, not used.
+            Number of the period, not used.
         end : int
             The stamp of its end [ns].
 

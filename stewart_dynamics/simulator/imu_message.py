@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""sensor_msgs/Imu: how one is written."""
+"""Writing of sensor_msgs/Imu."""
 
 from __future__ import annotations
 

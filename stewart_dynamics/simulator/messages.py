@@ -93,8 +93,8 @@ class BaseMessages:
 
     def write(self, stamp: int, index: int, period: BasePeriod) -> Iterator[tuple[str, bytes]]:
         """Yield topics and messages for the end of a period: its time [ns] and its number."""
-        # The IMU first: who answers the motion of the base with a setpoint may be faster than what
-        # is published behind it, and the node then has no reading of the setpoint's time.
+        # The IMU first: a program that answers the motion of the base with a setpoint may be
+        # faster than messages published later, and the node would lack the reading of that time.
         if index % self._imu_periods == 0:
             readings = self._imu.read(period.rows[-1])
             yield IMU, self._imu_writer.write(stamp, readings[:3], readings[3:])

@@ -204,7 +204,7 @@ def advance(constants: Array, stops: Array, largest_forces: Array, loads: Array,
     result : (RESULT,)
         Written.
     steps, h
-        How many, and how long.
+        Number of steps, and their length.
     scratch, work : (SCRATCH,), forward_dynamics.WORK
         Scratch memory.
 
