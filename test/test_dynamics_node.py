@@ -268,7 +268,7 @@ def test_an_empty_frame_is_accepted(node: DynamicsNode) -> None:
     node.until_counted()
 
 
-def test_a_quaternion_nearly_of_unit_length_is_brought_to_it(node: DynamicsNode) -> None:
+def test_a_quaternion_nearly_of_unit_length_is_normalized(node: DynamicsNode) -> None:
     for factor in (1.0009, 0.9991):
         node.answer(MOVING._replace(quaternion=tuple(factor * q for q in MOVING.quaternion)))
     node.until_counted()
@@ -330,7 +330,7 @@ def test_zero_stamps_are_joined_in_order_of_arrival(fresh: Fresh) -> None:
     assert node.program.stderr.count('header stamps are zero') == 1
 
 
-def test_of_a_stamp_twice_on_one_topic_the_first_is_used(node: DynamicsNode) -> None:
+def test_if_a_stamp_comes_twice_on_one_topic_the_first_is_used(node: DynamicsNode) -> None:
     stamp = node.stamp()
     other = HOME.messages(stamp)
     for topic, message in MOVING.messages(stamp).items():
@@ -584,7 +584,7 @@ WITHOUT_EVENTS = [sys.executable, '-c', WITHOUT.format('rclpy.experimental.event
 WITHOUT_NUMBA = [sys.executable, '-c', WITHOUT.format('numba')]
 
 
-def test_of_a_burst_the_newest_is_answered_and_those_dropped_are_counted(start: Start) -> None:
+def test_in_a_burst_the_newest_is_answered_and_dropped_ones_are_counted(start: Start) -> None:
     node = start(NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
     node.until_active()
     key = 'rejected, setpoint: dropped: more came at once than can be answered'

@@ -320,7 +320,7 @@ def test_a_late_topic_is_waited_for(at_work: DynamicsNode, late: str) -> None:
     node.asked[stamp] = 0
 
 
-def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_dropped(
+def test_the_oldest_samples_are_dropped_if_a_topic_is_too_late(
         at_work: DynamicsNode) -> None:
     node = at_work
     stamps = [node.stamp() for _ in range(1010)]
@@ -341,7 +341,7 @@ def test_of_a_topic_that_is_later_than_the_queue_is_long_the_oldest_are_dropped(
 
 
 @pytest.mark.slow
-def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -> None:
+def test_the_newest_of_ten_thousand_messages_at_once_is_answered(begin: Start) -> None:
     node = begin(NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
     stamps = [node.stamp() for _ in range(10_000 // 3 + 1)]
     for stamp in stamps:
@@ -363,7 +363,7 @@ def test_of_ten_thousand_messages_at_once_the_newest_is_answered(begin: Start) -
     assert 'more came at once than can be answered' in node.program.stderr
 
 
-def test_of_a_series_of_rejections_the_first_and_the_last_are_logged(
+def test_the_first_and_the_last_of_a_series_of_rejections_are_logged(
         at_work: DynamicsNode) -> None:
     node = at_work
     for _ in range(50):

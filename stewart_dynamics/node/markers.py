@@ -51,16 +51,16 @@ _CENTER_OF_MASS: Color = (0.8, 0.475, 0.655, 1.0)  # Okabe and Ito's reddish pur
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 _AXES: list[Color] = [(0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.3, 0.9, 1.0)]
 
-# In terms of the platform's size, the mean distance of its joints from their center.
+# Relative to the platform's size, the mean distance of its joints from their center.
 _BARREL, _ROD, _BALL, _PLATE, _AXIS, _LINE = 0.1, 0.055, 0.14, 0.05, 1.2, 0.02
 _HEAVY = 0.2  # the ball at the centre of mass
 _TEXT_SIZE, _TEXT_ABOVE = 0.11, 1.4
-_NAME_OUTSIDE = 0.15  # in terms of the base's
-# The barrel's length, in terms of limits.length_min, or without it of the leg's length.
+_NAME_OUTSIDE = 0.15  # relative to the base's size
+# Length of the cylinder, relative to limits.length_min or, if not set, to the leg's length.
 _OF_SHORTEST, _OF_LENGTH = 0.9, 0.5
 
-# Markers stay so long [s]: setpoints that are sent by hand come once in a second. Where the
-# rate is lower it is two periods, a day at most: a Duration holds no more than 68 years.
+# Lifetime of markers [s]: setpoints sent by hand typically arrive once per second. At a lower
+# visualization_rate it is two periods, at most one day: a Duration is limited to 68 years.
 STAYS = 2.0
 _LONGEST = 86400.0
 
@@ -92,7 +92,7 @@ class Markers:
 
     """
 
-    # Near the end of what a double holds sizes overflow: nothing is answered there, nor drawn.
+    # Sizes near the maximum of a double overflow: then nothing is answered or drawn.
     @np.errstate(all='ignore')
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
@@ -136,7 +136,7 @@ class Markers:
                                      NO_FORCE) for n in range(12)]
         self._text = self._marker('singularity', 0, Marker.TEXT_VIEW_FACING, _WHITE, text_size)
         _COUNT.pack_into(self._body, len(LITTLE_ENDIAN), len(self._stamps))
-        # Its text is of any length: what stands before it is kept, and what behind it.
+        # The text has variable length: the bytes before and after it are kept.
         self._end = bytes(self._body[-_BEHIND_TEXT:])
         del self._body[-_BEHIND_TEXT - 8:]
 
@@ -147,7 +147,7 @@ class Markers:
         Parameters
         ----------
         motion : sequence of float
-            That of the setpoint, laid out as for ``inverse_dynamics``.
+            Motion of the setpoint, laid out as for ``inverse_dynamics``.
         output : Output
             The result for the setpoint.
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node: setpoints in, leg lengths, forces and the singularity warning out."""
+"""The node: takes setpoints, publishes leg lengths, forces and the singularity warning."""
 
 from __future__ import annotations
 
@@ -67,17 +67,17 @@ from stewart_dynamics.setpoints.step import Output, Setpoint, Step
 from stewart_dynamics.setpoints.topics import WRENCH
 
 
-# When more setpoints wait, the node has fallen behind: only the newest is answered.
+# If more setpoints wait, the node has fallen behind, and only the newest is answered.
 BACKLOG = 100
 
-# A message that arrives later than this after the last one was handled [s] has not waited: the
-# executor takes less time from one to the next. A task that gathers waiting messages, which costs
-# a tenth of the processor time, is not needed then.
+# A message that arrives later than this after the last one was handled [s] has not waited, because
+# the executor needs less time between two messages. The task that gathers waiting messages, which
+# takes a tenth of the processor time, is then not needed.
 _REST = 0.0003
 
 
 class _Models(NamedTuple):
-    """What computes, with one set of parameters."""
+    """Models that share one set of parameters."""
 
     step: Step
     external_wrench: ExternalWrench
@@ -92,12 +92,12 @@ class DynamicsNode(LifecycleNode):
     """
     Answers each joined setpoint with leg lengths, rates and forces.
 
-    Raises ParameterError where the parameters break a rule: nothing starts then.
+    Raises ParameterError if the parameters break a rule: then nothing starts.
     """
 
     def __init__(self) -> None:
-        # Undeclared parameters are allowed so that they come to our own check, which rejects
-        # them with a better text.
+        # Undeclared parameters are allowed so that our own check rejects them, with a better
+        # text.
         super().__init__('stewart_dynamics', automatically_declare_parameters_from_overrides=True,
                          allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, Parameters)
@@ -108,7 +108,7 @@ class DynamicsNode(LifecycleNode):
         self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
-        self._base_wrench_read = False  # somebody subscribes to it
+        self._base_wrench_read = False  # it has a subscriber
         self._planned: PlannedTrajectoryQueue = PlannedTrajectoryQueue(
             OneShotTimer(self, PAUSE, lambda: self._planned.tick()).start,
             self._planned_code, self._on_outcome)
@@ -142,7 +142,7 @@ class DynamicsNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin to answer; earlier messages do not matter."""
+        """Begin to answer; earlier messages are not used."""
         parameters, models = self._settings, self._models
         self._setpoints = Setpoints(parameters, self._on_rejection, self._on_notice)
         self._history = LegHistory(parameters['payload.window'])
@@ -152,8 +152,8 @@ class DynamicsNode(LifecycleNode):
         self._diagnostics = DynamicsDiagnostics(
             parameters, self._setpoints.topics, self._setpoints.base.topics, time.monotonic())
         self._heard = self._diagnostics.setpoints.heard
-        self._waiting: list[tuple[Setpoint, float]] = []  # joined setpoints, and when they came
-        self._gathering = False  # a task answers them, behind the messages that have come
+        self._waiting: list[tuple[Setpoint, float]] = []  # joined setpoints, and times of arrival
+        self._gathering = False  # a task answers them after the messages received
         self._last: Output | None = None
         self._target: tuple[float, ...] | None = None  # motion of the last answered setpoint
         self._restarting = False  # the last setpoint was a restart that could not be answered
@@ -168,7 +168,7 @@ class DynamicsNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Answer no more."""
+        """Stop answering."""
         self._active = False
         self._drop_work()
         self._log.write_last()
@@ -180,7 +180,7 @@ class DynamicsNode(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Answer no more and close the topics."""
+        """Stop answering and close the topics."""
         self._active = False
         self._drop_work()
         self._close()
@@ -238,10 +238,10 @@ class DynamicsNode(LifecycleNode):
 
     def _answer_waiting(self) -> None:
         """
-        Answer the setpoints that wait, in their order; of a backlog the newest.
+        Answer the waiting setpoints in order; only the newest if more than BACKLOG wait.
 
-        Where they have waited, the next ones are gathered first: a node that has fallen behind
-        must not answer one after the other, however late.
+        After setpoints have waited, the next ones are gathered first: a node that has fallen
+        behind must not answer every late setpoint.
         """
         self._gathering = False
         if not self._active or not self._waiting:
@@ -283,7 +283,7 @@ class DynamicsNode(LifecycleNode):
         self._note(setpoint, output, came)
 
     def _note(self, setpoint: Setpoint, output: Output, came: float) -> None:
-        """Pass an answer on to what shows it: base wrench, markers, model, diagnostics."""
+        """Publish the base wrench; pass the answer to markers, model and diagnostics."""
         if self._base_wrench_read:
             wrench = self._models.base_wrench(setpoint)
             if wrench is not None:
@@ -299,7 +299,7 @@ class DynamicsNode(LifecycleNode):
             self._report()
 
     def _is_only_writer(self, topic: str) -> bool:
-        """Return whether a topic has one writer; else reject a message on it."""
+        """Return whether a topic has only one writer; reject a message on it otherwise."""
         writers = self._topics.writers_of(topic)
         self._diagnostics.setpoints.found_writers(topic, writers)
         if writers > 1:
@@ -435,7 +435,7 @@ class DynamicsNode(LifecycleNode):
     # -- parameters -------------------------------------------------------------------------
 
     def _on_set_parameters(self, changes: list[RosParameter]) -> SetParametersResult:
-        """Take all of these, between two setpoints, or none."""
+        """Change all of these parameters between two setpoints, or reject all."""
         ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
         try:
             parameters = parameter_changes.changed(self._settings, ours, self._configured)

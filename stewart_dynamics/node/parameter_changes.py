@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which parameters may change when, and what is logged of a change."""
+"""Changes of parameters: when they are allowed, and their log lines."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from stewart_dynamics.parameters.table import Parameters
 
 def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool) -> Parameters:
     """
-    Return the parameters with changes.
+    Return the parameters with changes applied.
 
     Parameters
     ----------
     parameters : Parameters
-        The present ones.
+        The present parameters.
     changes : mapping of name to value
-        As ROS gives them.
+        New values, as given by ROS.
     configured : bool
-        Whether the node is configured: only some parameters may change then.
+        Whether the node is configured: then only some parameters may change.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool
 
 
 def log_lines(before: Parameters, after: Parameters) -> Iterator[LogLine]:
-    """Yield what becomes another value, and the likely mistakes that are new."""
+    """Yield log lines for changed values and for new likely mistakes."""
     changes = [f'{name}: {before.given.get(name)} -> {value}'
                for name, value in after.given.items() if value != before.given.get(name)]
     if changes:

@@ -32,24 +32,24 @@ from stewart_dynamics.ros.rclpy_workarounds import create_later_service, OneShot
 
 IDENTIFY_PAYLOAD = 'identify_payload'
 
-# Between two pieces of the work [s]: it takes less than a tenth of the time, and a second in all.
+# Pause between two pieces of the work [s]: they take less than a tenth of the time, 1 s in all.
 _PAUSE = 0.004
 
 
 class PayloadService:
     """
-    Does the work on requests in pieces, one at each tick of a timer; there is one work at a time.
+    Processes requests in pieces, one at each tick of a timer; one task at a time.
 
     The service exists in all states of the node's lifecycle.
 
     Parameters
     ----------
     node : Node
-        Whose service it is.
+        The node that offers the service.
     work : callable
-        Called at a request that no work is done for yet: returns the work, or its outcome.
+        Called at a request while no task is in progress: returns the task, or its outcome.
     done : callable
-        Gets an outcome, and how long the work took [s].
+        Called with an outcome and the duration of the task [s].
 
     """
 
@@ -61,11 +61,11 @@ class PayloadService:
         self._work: Iterator[Outcome | None] | None = None
         self._begun = 0.0
         self._waiting: list[Callable[[Any], None]] = []
-        # Never destroyed before the node: a request that waits would have no answer then.
+        # Never destroyed before the node: a waiting request would get no answer.
         create_later_service(node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)
 
     def drop(self, reason: str) -> None:
-        """End the work in progress without result, if there is any."""
+        """End the task in progress, if any, without result."""
         self._timer.stop()
         self._answer(Outcome(reason))
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The planned trajectories that wait to be checked, and the one that is being checked."""
+"""Queue of planned trajectories: the one being checked and those that wait."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from collections.abc import Callable, Iterator
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.planned.messages import Outcome
 
-# So many are in work or wait.
+# Maximum number of trajectories in work or waiting.
 LENGTH = 5
 
-# Between two pieces of the work [s]. While other programs need the processor as well, the
-# operating system would suspend a node that computes all the time, and its setpoints would wait.
+# Pause between two pieces of the work [s]. While other programs need the processor as well, the
+# operating system would suspend a node that computes all the time, and delay its setpoints.
 PAUSE = 0.001
 
 
 class PlannedTrajectoryQueue:
     """
-    Does the work on planned trajectories in pieces, one at each tick of a timer.
+    Checks planned trajectories in pieces, one at each tick of a timer.
 
     Parameters
     ----------
     start : callable
         Starts the timer; it ticks once after each start.
     code : Preparation
-        Of what the work calls; it waits until that is ready.
+        Compilation of the functions that the check calls; the check waits until it is ready.
     done : callable
-        Gets an outcome, and when the trajectory came [s].
+        Called with an outcome and the time of arrival of the trajectory [s].
 
     """
 
@@ -54,17 +54,17 @@ class PlannedTrajectoryQueue:
 
     @property
     def full(self) -> bool:
-        """Whether no more can wait."""
+        """Whether the queue is full."""
         return len(self._waiting) >= LENGTH
 
     def add(self, work: Iterator[Outcome | None], came: float) -> None:
-        """Add the work on a trajectory that came at a time [s]."""
+        """Add the check of a trajectory that arrived at a time [s]."""
         self._code.begin()
         self._waiting.append((work, came))
         self._start()
 
     def tick(self) -> None:
-        """Do one piece of the work on the first one."""
+        """Do one piece of the work on the first trajectory."""
         if not self._waiting:  # dropped
             return
         if not self._code.ready:
@@ -79,7 +79,7 @@ class PlannedTrajectoryQueue:
             self._start()
 
     def drop(self) -> int:
-        """Drop all of them and return how many there were."""
+        """Drop all trajectories and return their number."""
         number = len(self._waiting)
         self._waiting.clear()
         return number

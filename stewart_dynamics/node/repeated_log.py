@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node's log, where what happens over and over does not take a line each time."""
+"""The node's log, which limits the number of lines for repeated events."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RepeatedLog:
     Parameters
     ----------
     logger : rclpy logger
-        It writes the lines.
+        Logger of the node.
 
     """
 
@@ -41,7 +41,7 @@ class RepeatedLog:
         self._series = {level: Series() for level in (OK, WARN, ERROR)}
 
     def write(self, lines: Iterable[LogLine]) -> None:
-        """Write lines, those of a kind at most every few seconds."""
+        """Write lines; lines of one kind at most every few seconds."""
         for level, text, kind in lines:
             if kind is None:
                 self._write(level, text)
@@ -49,13 +49,13 @@ class RepeatedLog:
                 self._write(level, line)
 
     def write_last(self, now: float = math.inf) -> None:
-        """Write the last line of each series that is over by a time, by default of all."""
+        """Write the last line of each series that has ended by ``now``, by default of all."""
         for level, series in self._series.items():
             for line in series.over(now):
                 self._write(level, line)
 
     def _write(self, level: int, text: str) -> None:
-        # Each level its own call: rclpy takes a call's level for constant.
+        # One call for each level: rclpy requires the level of a call to be constant.
         if level == OK:
             self._logger.info(text)
         elif level == WARN:

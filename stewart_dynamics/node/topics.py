@@ -38,19 +38,19 @@ _INPUTS = {topic.name: topic for topic in SUBSCRIBED}
 
 class Topics:
     """
-    The publishers and subscriptions of the node; there are none before ``make``.
+    Publishers and subscriptions of the node; created by ``make``.
 
     Parameters
     ----------
     node : LifecycleNode
-        Whose they are.
+        The node that owns them.
 
     Attributes
     ----------
     publishers : dict of str to Publisher
-        By topic, without the node's name.
+        Publishers by topic, without the node's name.
     setpoints, base : dict of str to Subscription
-        Those of the setpoint topics and of the topics of the base; raw ones.
+        Raw subscriptions to the setpoint topics and to the topics of the base.
 
     """
 
@@ -66,17 +66,17 @@ class Topics:
              on_base: Callable[[str, bytes], None],
              others: Mapping[str, Callable[[bytes], None]]) -> None:
         """
-        Make all of them.
+        Create all publishers and subscriptions.
 
         Parameters
         ----------
         parameters : Parameters
-            Which setpoint topics, which of the base, and whether there are markers, joint states
-            and transforms.
+            Select the setpoint topics, the topics of the base, and whether markers, joint states
+            and transforms are published.
         on_setpoint, on_base : callable
-            Gets topic and bytes of a message on a setpoint topic, or on one of the base.
+            Called with topic and bytes of a message on a setpoint topic, or on one of the base.
         others : mapping of topic to callable
-            What gets the bytes of a message on the other topics.
+            Called with the bytes of a message on each of the other topics.
 
         Raises
         ------
@@ -89,8 +89,8 @@ class Topics:
         for topic in PUBLISHED:
             if there.get(topic.name, True):
                 self._publish(topic)
-        # The executor takes messages in the order of the subscriptions: a setpoint needs those of
-        # the base that have come before it.
+        # The executor takes messages in the order of the subscriptions: a setpoint needs the
+        # earlier messages of the base.
         self.base, self.setpoints = ({
             name: self._subscribe(_INPUTS[name], partial(take, name)) for name in names}
             for names, take in ((BASE_SOURCES[parameters['base.source']], on_base),
@@ -100,15 +100,15 @@ class Topics:
         self._names = {name: subscription.topic_name for name, subscription in inputs.items()}
 
     def writers(self) -> dict[str, int]:
-        """Return how many publishers each topic of setpoints and base has."""
+        """Return the number of publishers on each topic of setpoints and base."""
         return {topic: self.writers_of(topic) for topic in (*self.setpoints, *self.base)}
 
     def writers_of(self, topic: str) -> int:
-        """Return how many publishers an input topic has."""
+        """Return the number of publishers on an input topic."""
         return int(self._node.count_publishers(self._names[topic]))
 
     def destroy(self) -> None:
-        """Destroy all of them."""
+        """Destroy all publishers and subscriptions."""
         self.publishers, self.setpoints, self.base, self._names = {}, {}, {}, {}
         while self._destroy:
             self._destroy.pop()()

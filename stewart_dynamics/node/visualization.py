@@ -13,9 +13,10 @@
 # limitations under the License.
 
 """
-What shows the hexapod, at most at ``visualization_rate`` and while somebody subscribes.
+Visualization of the hexapod, while there are subscribers.
 
-``~/markers``, ``~/joint_states``, and with every pose the platform's transform on ``/tf``.
+``~/markers`` and ``~/joint_states`` at most at ``visualization_rate``, and the platform's
+transform on ``/tf`` with every pose.
 """
 
 from __future__ import annotations
@@ -31,12 +32,12 @@ from stewart_dynamics.setpoints.step import Output, Setpoint
 
 class _PublisherAtRate:
     """
-    Publishes the last of what is noted, at most at a rate, while somebody subscribes.
+    Publishes the last data noted, at most at a given rate, while there are subscribers.
 
     Parameters
     ----------
     publisher : Publisher, optional
-        Publishes the bytes that ``_write`` makes; None: nothing is published.
+        Publishes the bytes from ``_write``; None if nothing is to be published.
     rate : float
         Maximum rate [Hz].
 
@@ -49,11 +50,11 @@ class _PublisherAtRate:
         self._unpublished: tuple[Any, ...] | None = None
 
     def publish_due(self, now: float) -> None:
-        """Publish the last of what was noted if it is due and there is a subscriber."""
+        """Publish the last data noted if publication is due and there is a subscriber."""
         if self._unpublished is None or self._publisher is None or now < self._due:
             return
         last = self._unpublished
-        # A later subscriber gets nothing of an old setpoint.
+        # A later subscriber must not get data of an old setpoint.
         self._unpublished = None
         self._due = now + self._period
         if self._publisher.get_subscription_count():
@@ -70,9 +71,9 @@ class MarkersPublisher(_PublisherAtRate):
     Parameters
     ----------
     parameters : Parameters
-        What the markers show, and ``visualization_rate``.
+        Geometry, limits and names shown by the markers, and ``visualization_rate``.
     publisher : Publisher, optional
-        None where the rate is zero.
+        None if the rate is zero.
 
     """
 
@@ -81,7 +82,7 @@ class MarkersPublisher(_PublisherAtRate):
         self.use(parameters)
 
     def use(self, parameters: Parameters) -> None:
-        """Show other parameters from now on: a payload has another centre of mass."""
+        """Use other parameters from now on: a payload moves the centre of mass."""
         if self._publisher is not None:
             self._markers = Markers(parameters)
 
@@ -104,7 +105,7 @@ class ModelPublisher(_PublisherAtRate):
     rate : float
         Maximum rate of ``~/joint_states`` [Hz].
     joint_states, transforms : Publisher, optional
-        None where the rate is zero, or ``publish_tf`` is false.
+        None if the rate is zero, or if ``publish_tf`` is false.
 
     """
 
@@ -112,7 +113,7 @@ class ModelPublisher(_PublisherAtRate):
                  ) -> None:
         super().__init__(joint_states, rate)
         self._messages, self._transforms = messages, transforms
-        self._read = False  # somebody subscribes to the transforms
+        self._read = False  # the transforms have a subscriber
 
     def moved(self, stamp: int, pose: Sequence[float]) -> None:
         """Note a pose, a row of motion at a stamp [ns], and publish its transform."""
@@ -121,7 +122,7 @@ class ModelPublisher(_PublisherAtRate):
             self._transforms.publish(self._messages.transform(stamp, pose))
 
     def look(self) -> None:
-        """Look whether somebody subscribes to the transforms."""
+        """Check whether the transforms have a subscriber."""
         self._read = bool(self._transforms and self._transforms.get_subscription_count())
 
     def _write(self, stamp: int, pose: Sequence[float]) -> bytes:

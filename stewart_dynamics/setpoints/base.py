@@ -13,14 +13,13 @@
 # limitations under the License.
 
 """
-The motion of the base as its topics give it: the row that holds at a setpoint's stamp.
+Motion of the base, from its topics: the row that is valid at a setpoint's stamp.
 
-Base samples come at their own rate. Of those that have come, a setpoint takes the newest one that
-is not newer than the setpoint by more than the time from the sample before it, and goes from it
-along the straight line through both, forward by at most that time again: between two samples that
-is linear interpolation, behind the last one linear extrapolation, each number of the row by
-itself. A sample older than ``base.timeout`` is not used, nor a line from it to one that is newer
-than the setpoint: the base's motion is not known then.
+Base samples arrive at their own rate. Between the stamps of two received samples the row is
+interpolated linearly, number by number. After the stamp of the last received sample it is
+extrapolated along the line through the last two samples, by at most the time between them. The
+motion of the base is unknown if the newest sample that is not newer than the setpoint is missing
+or older than ``base.timeout``.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ from stewart_dynamics.setpoints.rejections import Rejections
 from stewart_dynamics.setpoints.sample_joining import SampleJoining
 from stewart_dynamics.setpoints.topics import BASE_SOURCES
 
-# So many samples are kept, for setpoints that have waited.
+# Maximum number of samples kept, for setpoints that had to wait.
 _KEPT = 1000
 
 _Row = tuple[float, ...]
@@ -59,9 +58,9 @@ class BaseInput:
     Parameters
     ----------
     parameters : Parameters
-        Where the base's motion comes from, frames, timeout, gravity and the mounting of the IMU.
+        Source of the base's motion, frames, timeout, gravity and the mounting of the IMU.
     rejections : Rejections
-        Counts what is rejected.
+        Counts rejected messages.
     noticed : callable
         Called with texts for the log.
 
@@ -71,7 +70,7 @@ class BaseInput:
                  noticed: Callable[[str], object]) -> None:
         source = parameters['base.source']
         self.topics = BASE_SOURCES[source]
-        """Which topics; none where the base is still."""
+        """Topics of the base; empty if the base is fixed."""
         self._joining = SampleJoining(
             self.topics, None if source == 'imu' else parameters['world_frame'],
             parameters['setpoint.sync_tolerance'], parameters['base.timeout'], rejections,
@@ -89,7 +88,7 @@ class BaseInput:
         return self._samples[-1] if self._samples else None
 
     def at_rest(self, known: bool) -> Array | None:
-        """Return the row (BASE,) at rest under the last gravity, nan if not known; None: still."""
+        """Return the row (BASE,) at rest, last gravity, nan if unknown; None if base is fixed."""
         if not self.topics:
             return None
         row = np.zeros(BASE)
@@ -107,7 +106,7 @@ class BaseInput:
         return True
 
     def at(self, stamp: int) -> _Row | None:
-        """Return the row (BASE,) at a stamp [ns]; nan where it is not known; None: still."""
+        """Return the row (BASE,) at a stamp [ns], nan if unknown; None if the base is fixed."""
         if not self.topics:
             return None
         samples = self._samples
@@ -129,17 +128,17 @@ class BaseInput:
                       for now, then in zip(row, row_before, strict=True)])
 
     def restarted(self, stamp: int) -> None:
-        """Forget samples of the future of a setpoint [ns] before which time has jumped back."""
+        """Discard samples later than the stamp [ns] of a setpoint that is a restart."""
         if self._samples and self._samples[-1][0] > stamp + self._restart:
             self._samples.clear()
             self._joining.restart('before setpoints restarted')
 
     def forget_layouts(self) -> None:
-        """Take the layout of the next sound message of each topic."""
+        """Learn the layout again, from the next valid message of each topic."""
         self._joining.forget_layouts()
 
     def end(self, why: str) -> None:
-        """Drop and count what still waits: no more messages come."""
+        """Drop and count waiting samples: no more messages arrive."""
         self._joining.end(why)
 
     def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
@@ -149,7 +148,7 @@ class BaseInput:
     def accept(self, joined: Joined, places: Mapping[str, Integers], stamps: Stamps,
                completed: Integers) -> Array | None:
         """
-        Go on behind the samples that ``join_many`` has joined.
+        Continue after the samples that ``join_many`` has joined.
 
         Parameters
         ----------
@@ -158,7 +157,7 @@ class BaseInput:
         places : mapping of topic to (K,)
             As for ``join_many``.
         stamps, completed : (N,)
-            Stamps of setpoints [ns], and where in the order of all messages they were complete.
+            Stamps of setpoints [ns], and the index of the message that completed each.
 
         Returns
         -------
@@ -178,7 +177,7 @@ class BaseInput:
         if not kept:
             return rows
         at, values = np.array([stamp for stamp, _ in kept]), np.array([row for _, row in kept])
-        # How many samples had come, the newest that may be used, and the oldest that was kept.
+        # Number of samples received, newest usable sample, oldest sample kept.
         come = old + np.searchsorted(joined.places, completed)
         newest = np.minimum(come - 1, np.searchsorted(at, stamps, side='right'))
         oldest = np.maximum(come - _KEPT, 0)
@@ -198,7 +197,7 @@ class BaseInput:
 
 
 class _OfPose:
-    """From values of a pose to rows of a base at rest that is tilted so."""
+    """Converts a pose to the row of a base at rest with this tilt."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._gravity: Any = tuple(parameters['gravity'].tolist())
@@ -208,7 +207,7 @@ class _OfPose:
 
 
 class _OfMotion(_OfPose):
-    """From values of pose, twist and acceleration in the world."""
+    """Converts pose, twist and acceleration in the world frame to a row."""
 
     def __call__(self, stamp: int, values: Any) -> _Row:
         return row_of_motion(values[3:12], values[18:21], values[15:18], values[21:24],
@@ -217,13 +216,13 @@ class _OfMotion(_OfPose):
 
 class _OfImu:
     """
-    From readings of an IMU.
+    Converts readings of an IMU to rows.
 
     The angular acceleration is the difference quotient of two angular velocities, through a
     low-pass filter of the first order, solved exactly for the time dt between them:
-    ``k = 1 - exp(-2 pi cutoff dt)``. Slow changes come late by ``dt (1 / k - 1 / 2)``,
-    for short dt ``1 / (2 pi cutoff)``; white noise of deviation s in the angular velocity becomes
-    ``s k / dt sqrt(2 / (2 - k))``.
+    ``k = 1 - exp(-2 pi cutoff dt)``. Slow changes are delayed by ``dt (1 / k - 1 / 2)``,
+    for short dt ``1 / (2 pi cutoff)``; white noise of standard deviation s in the angular velocity
+    becomes ``s k / dt sqrt(2 / (2 - k))``.
     """
 
     def __init__(self, parameters: Parameters) -> None:

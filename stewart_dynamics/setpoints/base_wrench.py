@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The base wrench of setpoints: what the hexapod puts on its base.
+The base wrench of setpoints: force and moment that the hexapod exerts on its base.
 
-It is no part of the step: the node computes it only while somebody subscribes. It gives the same
-bits whether setpoints come one at a time or by the thousand.
+It is not part of the step: the node computes it only while there is a subscriber. The result is
+bit-identical for single setpoints and for batches.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Batch, Setpoint
 
-# Under the node's name.
+# Topic, relative to the node's name.
 BASE_WRENCH = 'base_wrench'
 
-# One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
+# Layout of one setpoint in memory, inputs and result: packing is faster than passing arrays.
 _MOTION, _WRENCH, _BASE, _RESULT = consecutive(MOTION, WRENCH, BASE, WRENCH)
 _GIVEN = Struct(f'{_RESULT.start}d')
 _GIVES = Struct(f'{WRENCH}d')
 
-# The machine code that it needs.
+# Compiled functions required.
 FUNCTIONS = (base_wrench.base_wrenches,)
 
 
@@ -58,8 +58,8 @@ class BaseWrench:
     Parameters
     ----------
     parameters : Parameters
-        They hold for every call; another set of them makes another one. One thread at a time may
-        call it: a call for one setpoint works in memory that is its own.
+        Constant for all calls; create another object for other parameters. Not thread-safe: calls
+        for one setpoint share a buffer.
 
     """
 
@@ -70,7 +70,7 @@ class BaseWrench:
         self._memory = self._numbers.data  # the same as bytes
 
     def __call__(self, setpoint: Setpoint) -> Six | None:
-        """Return it; None where the base's motion is not known or numbers overflow."""
+        """Return the base wrench; None if the base's motion is unknown or numbers overflow."""
         base = setpoint.base
         _GIVEN.pack_into(self._memory, 0, *setpoint.motion, *setpoint.wrench,
                          *(self._still if base is None else base))
@@ -79,7 +79,7 @@ class BaseWrench:
         return wrench if all(map(math.isfinite, wrench)) else None
 
     def many(self, setpoints: Batch) -> Array:
-        """Return those of setpoints (N, 6); rows of nan where the call for one gives None."""
+        """Return base wrenches (N, 6); rows of nan where a call for one setpoint gives None."""
         wrenches = self._platform.base_wrenches(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         finite = np.isfinite(wrenches)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Many samples of several topics joined by stamp at once, where nothing is out of the ordinary."""
+"""Joins batches of samples of several topics by stamp, for messages without irregularities."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Integers, Stamps
 from stewart_dynamics.mechanics.rows import MOTION
 
-# Most samples of a topic that wait for those of the others, and most messages of a topic that wait
-# in the middleware, which may deliver all of one topic before those of another.
+# Maximum number of samples of a topic that wait for samples of the other topics, and depth of the
+# queues in the middleware, which may deliver all messages of one topic before another topic's.
 WAITING = 1000
 
 Waiting = dict[int, tuple[float, ...]]
-"""Values of the samples of a topic that wait, by stamp [ns], in the order in which they came."""
+"""Values of the waiting samples of a topic, by stamp [ns], in order of arrival."""
 
 
 class Samples(NamedTuple):
@@ -40,40 +40,40 @@ class Samples(NamedTuple):
     values: Array
     """(N, ...)"""
     places: Integers
-    """(N,): where in the order of all messages each came."""
+    """(N,): index of each message in the order of all messages."""
 
 
 class Joined(NamedTuple):
-    """What samples give: K setpoints, and what is left of each topic."""
+    """K joined setpoints, and the remaining samples of each topic."""
 
     stamps: Stamps
     """(K,) [ns]"""
     motions: Array
     """Rows of motion (K, MOTION)."""
     places: Integers
-    """(K,): where the message came that completed each."""
+    """(K,): index of the message that completed each."""
     waiting: dict[str, Waiting]
     dropped: dict[str, list[int]]
-    """Stamps of the samples that no setpoint can use any more."""
+    """Stamps of samples that can no longer be joined."""
 
 
 def join_many(samples: Mapping[str, Samples], waiting: Mapping[str, Waiting],
               last: Mapping[str, int]) -> Joined | None:
     """
-    Join samples; None where stamps do not only rise, or more samples than WAITING wait.
+    Join samples; None if stamps are not strictly increasing or more than WAITING samples wait.
 
     Parameters
     ----------
     samples : mapping of str to Samples
-        Of each topic, in the order of topics in a row of motion.
+        New samples of each topic, in the order of topics in a row of motion.
     waiting : mapping of str to Waiting
-        Of each topic, those that came before.
+        Earlier samples of each topic that still wait.
     last : mapping of str to int
-        The stamps that were used last [ns]; empty, or one for each topic.
+        Last used stamp of each topic [ns]; empty before the first.
 
     """
     stamps: dict[str, Stamps] = {}
-    places: dict[str, Integers] = {}  # -1 of those that wait already
+    places: dict[str, Integers] = {}  # -1 for samples already waiting
     values: dict[str, Array] = {}
     for topic, of_topic in samples.items():
         before = waiting[topic]
@@ -85,7 +85,7 @@ def join_many(samples: Mapping[str, Samples], waiting: Mapping[str, Waiting],
         if before:
             old = np.array(list(before.values()))
             values[topic] = np.concatenate([old, of_topic.values.reshape(-1, old.shape[1])])
-    # Stamps only rise, so setpoints are complete in the order of their stamps.
+    # Stamps are strictly increasing, so setpoints are completed in the order of their stamps.
     common, *others = stamps.values()
     for other in others:
         common = np.intersect1d(common, other, assume_unique=True)
@@ -112,16 +112,16 @@ def join_many(samples: Mapping[str, Samples], waiting: Mapping[str, Waiting],
 
 
 def _only_rise(stamps: Stamps, new: Stamps, last: int | None) -> bool:
-    """Return whether stamps rise, from the last one on, and no new one is zero or less."""
-    # What waits need not have come in the order of its stamps.
+    """Return whether stamps increase strictly from the last one on and new ones are positive."""
+    # Waiting samples may have arrived out of order.
     return not (np.any(np.diff(stamps) <= 0) or (len(new) and (
         new[0] <= 0 or (last is not None and stamps[0] <= last))))
 
 
 def _overflows(stamps: Stamps, places: Integers, common: Stamps, complete: Integers) -> bool:
-    """Return whether, at any time, more than WAITING samples of a topic wait."""
+    """Return whether more than WAITING samples of a topic wait at any time."""
     if len(stamps) <= WAITING:
         return False
-    completed = np.searchsorted(complete, places)  # setpoints, when a sample comes
+    completed = np.searchsorted(complete, places)  # setpoints completed when a sample arrives
     used = np.concatenate([[0], np.searchsorted(stamps, common, side='right')])[completed]
     return bool(np.any(np.arange(1, len(stamps) + 1) - used > WAITING))

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-From messages of an input topic to checked samples, one message at a time or many at once.
+Converts messages of an input topic to checked samples, one message at a time or in batches.
 
-A sample is a stamp and the message's numbers, the quaternion of a pose replaced by the rotation
-matrix. Node and replay check alike, and get the same bits.
+A sample is a stamp and the message's numbers, with the quaternion of a pose replaced by the
+rotation matrix. Node and replay apply the same checks and get bit-identical samples.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ _READERS: dict[str, Callable[[bytes], Stamped]] = {
     POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench,
     BASE_POSE: pose, BASE_TWIST: twist, BASE_ACCEL: twist, BASE_IMU: imu}
 
-# Of the values of an IMU: angular velocity, specific force, and the first entries of their
-# covariances, which are -1 where a quantity is not measured. Its orientation is not used.
+# Indices of an IMU's angular velocity, specific force, and the first entries of their
+# covariances, which are -1 if a quantity is not measured. Its orientation is not used.
 _OF_IMU = (13, 14, 15, 25, 26, 27)
 _COVARIANCES = {16: 'angular_velocity_covariance', 28: 'linear_acceleration_covariance'}
-# Larger numbers are no motion of a base [SI units]: a filter would keep what they leave for long.
+# Bound on numbers of the base's motion [SI units]: larger ones would disturb filters for long.
 LARGEST = 1e9
 
 
@@ -53,16 +53,16 @@ class SampleReader:
     """
     Reads the messages of one topic.
 
-    Most messages have the layout of the first sound one, and are read by it.
+    Messages with the layout of the first valid one are read by that layout, which is faster.
 
     Parameters
     ----------
     topic : str
         One of ``input_topics``.
     frame : str or None
-        The frame that messages must have, or none; None: that of the first message with one.
+        Required frame_id; an empty one is accepted. None: the first non-empty one is required.
     rejections : Rejections
-        Counts what is rejected.
+        Counts rejected messages.
 
     """
 
@@ -122,16 +122,16 @@ class SampleReader:
     def read_many(self, data: Bytes, starts: Integers, sizes: Integers,
                   ) -> tuple[Stamps, Array] | None:
         """
-        Return stamps (N,) [ns] and values (N, ...) of messages that are all sound.
+        Return stamps (N,) [ns] and values (N, ...) of messages that are all valid.
 
-        None where one is not, or has another layout: read them one by one then.
+        None if one is invalid or has another layout: then read them one by one.
 
         Parameters
         ----------
         data : (M,)
-            Bytes that have all the messages in them.
+            Bytes that contain all messages.
         starts, sizes : (N,)
-            Where each begins, and its length in bytes; at least one.
+            Offset and length of each message in bytes; N >= 1.
 
         """
         if self._layout is None:
@@ -156,16 +156,16 @@ class SampleReader:
         return stamps, values
 
     def forget_layout(self) -> None:
-        """Take the layout of the next sound message."""
+        """Learn the layout again, from the next valid message."""
         self._layout = None
 
     def _keep_frame(self, frame: bytes) -> None:
-        """Expect the frame of this sound message from now on, if none was given."""
+        """Require the frame of this valid message from now on, if no frame was specified."""
         if self._frame is None:
             self._frame = frame or None
 
     def _learn(self, data: bytes) -> None:
-        """Take the layout of a message if it can be read and its frame is right."""
+        """Learn the layout of a message if the message is well-formed and its frame correct."""
         try:
             frame = self._reader(data).frame
         except MalformedError:
@@ -174,13 +174,13 @@ class SampleReader:
             self._layout, self._frame_of_layout = layout_of(self._reader, data), frame
 
     def _is_other(self, frame: bytes) -> bool:
-        """Return whether a message has a frame that it must not have."""
+        """Return whether a message has a wrong frame."""
         return bool(frame) and self._frame is not None and frame != self._frame
 
 
 def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
     """
-    Return quaternions divided by their length, and which of them may be used.
+    Normalize quaternions; return lengths and which quaternions are valid as well.
 
     Parameters
     ----------
@@ -190,14 +190,14 @@ def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
     Returns
     -------
     quaternions : (4, N)
-        Of unit length, number by number.
+        Normalized quaternions, one row for each of x y z w.
     lengths : (N,)
-        As they were.
+        Lengths before normalization.
     unit : (N,)
         Which lengths are 1 within QUATERNION_TOLERANCE.
 
     """
-    # Number by number, as for one sample: the bits are the same.
+    # Element by element, as for one sample, so that results are bit-identical.
     x, y, z, w = quaternions.T
     with np.errstate(over='ignore', divide='ignore', invalid='ignore'):
         lengths = quaternion_length(x, y, z, w)

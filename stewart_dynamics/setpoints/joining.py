@@ -13,13 +13,12 @@
 # limitations under the License.
 
 """
-From messages on the setpoint topics to joined setpoints; what is rejected is counted.
+Joins messages on the setpoint topics to setpoints, and counts rejected messages.
 
-Node and replay feed it the same bytes in the same order, so both reject and join alike: the node
-one message at a time, the replay many at once. ``take`` handles one message;
-``take_many`` does the same for many of which none is out of the ordinary, and calls ``take`` for
-each of them where one is. The wrench and the base's motion come on topics of their own: a setpoint
-has those that hold when it is complete.
+Node and replay pass the same bytes in the same order, so both reject and join alike: the node
+one message at a time, the replay in batches. ``take`` handles one message; ``take_many`` handles a
+batch, and calls ``take`` for each message if one of them is irregular. The wrench and the base's
+motion have topics of their own: a setpoint gets the values that are valid when it is complete.
 """
 
 from __future__ import annotations
@@ -47,12 +46,12 @@ _STANDSTILL = (0.0,) * 6
 
 class Setpoints:
     """
-    Joins the topics' samples by stamp.
+    Joins the samples of the setpoint topics by stamp.
 
     Parameters
     ----------
     parameters : Parameters
-        Which topics, frame, tolerance and timeout.
+        Source of setpoints, frame, tolerance and timeout.
     rejected : callable
         Called with each rejection and its details; they are counted as well.
     noticed : callable
@@ -72,41 +71,41 @@ class Setpoints:
             self.topics, parameters['base_frame'], parameters['setpoint.sync_tolerance'],
             parameters['setpoint.timeout'], self._rejections, noticed)
         self.recorded: int | None = None
-        """When the message at work was recorded [ns], if it is one of ``take_many``."""
+        """Time of recording [ns] of the message being processed by ``take_many``."""
 
     @property
     def counts(self) -> Counter[Rejection]:
-        """Return what was rejected so far, and how often."""
+        """Return the number of rejections so far, by topic and reason."""
         return self._rejections.counts
 
     @property
     def wrench(self) -> Six:
-        """Return the known load on the platform, of the last message on ``~/wrench`` [N, N m]."""
+        """Return the known load on the platform, from the last ``~/wrench`` [N, N m]."""
         return self._wrench_input.wrench
 
     def take_wrench(self, data: bytes) -> None:
-        """Use this geometry_msgs/WrenchStamped for all setpoints to come, if it is sound."""
+        """Use this geometry_msgs/WrenchStamped for all later setpoints, if it is valid."""
         self._wrench_input.take(data)
 
     def take(self, topic: str, data: bytes, now: Callable[[], int]) -> Setpoint | None:
         """
-        Return the setpoint that this message completes, if it does; without the base's motion.
+        Return the setpoint that this message completes, if any; without the base's motion.
 
         Parameters
         ----------
         topic : str
             One of ``topics``.
         data : bytes
-            The message as it came, CDR.
+            The message as received, CDR.
         now : callable
-            The clock [ns]; asked where a setpoint's own stamps are zero.
+            The clock [ns]; read if the stamps of a setpoint are zero.
 
         """
         sample = self._joining.take(topic, data, now)
         if sample is None:
             return None
         stamp, values, restart, stamped = sample
-        # Zeros for what the topics do not give.
+        # Twist and acceleration are zero if only the pose is given.
         motion = values + _STANDSTILL + _STANDSTILL if len(values) == 12 else values
         if restart:
             self.base.restarted(stamp)
@@ -152,16 +151,16 @@ class Setpoints:
             np.array([each.stamped for each in setpoints], dtype=bool))
 
     def end(self, why: str) -> None:
-        """Drop and count what still waits: no more messages come."""
+        """Drop and count waiting samples: no more messages arrive."""
         self._joining.end(why)
         self.base.end(why)
 
     def reject(self, topic: str, reason: str, details: str, number: int = 1) -> None:
-        """Count and report what is not used."""
+        """Count and report messages that are not used."""
         self._rejections.reject(topic, reason, details, number)
 
     def _take_ordinary(self, messages: Messages) -> Batch | None:
-        """Do what ``take_many`` does; None, and nothing done, if a message is unusual."""
+        """Join a batch as ``take_many``; None, without effect, if a message is irregular."""
         places = messages.places()
         wrenches = NO_SAMPLES
         if WRENCH in places:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The messages to publish or write for what step, external wrench and base wrench give."""
+"""Messages to publish or write for outputs of the step, external wrenches and base wrenches."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 from stewart_dynamics.setpoints.step import Output, Outputs
 
-# Under the node's name, in the order in which they are published for a setpoint.
+# Topics relative to the node's name, in the order in which they are published for a setpoint.
 OUTPUT_TYPES = {
     'leg_states': 'sensor_msgs/msg/JointState',
     'leg_lengths': 'std_msgs/msg/Float64MultiArray',
@@ -40,13 +40,13 @@ OUTPUT_TYPES = {
     'singularity_warning': 'std_msgs/msg/Bool',
     BASE_WRENCH: 'geometry_msgs/msg/WrenchStamped',
 }
-# Messages of a topic: which of the outputs have one, and their messages.
+# A topic, the indices of the outputs that have a message on it, and the messages.
 Written = tuple[str, Stamps, NDArray[np.void]]
 
 
 class OutputMessages:
     """
-    Writes the messages.
+    Writes the output messages.
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ class OutputMessages:
 
     def of_outputs(self, outputs: Outputs) -> list[Written]:
         """
-        Return the same messages as ``of_output``, of many outputs.
+        Return the same messages as ``of_output`` for a batch of outputs.
 
         Returns
         -------
         list of (topic, which, messages)
-            In the order in which they are published for one output; ``which`` (K,) outputs have
-            such a message, and the messages (K,) as entries of their length. A topic may come
-            twice, for its messages with and without forces.
+            In the order in which they are published for one output: indices (K,) of the outputs
+            that have this message, and the messages (K,), all of one length. A topic may occur
+            twice, for messages with and without forces.
 
         """
         positions = outputs.lengths - self._zero_lengths
@@ -113,6 +113,6 @@ class OutputMessages:
         return self._wrench.write(stamp, wrench)
 
     def of_base_wrenches(self, stamps: Stamps, base_wrenches: Array) -> Written:
-        """Return the same of setpoints (N,) [ns] and rows (N, 6); a row of nan has no message."""
+        """Return messages for stamps (N,) [ns] and wrenches (N, 6); none for rows of nan."""
         known = np.flatnonzero(~np.isnan(base_wrenches[:, 0]))
         return BASE_WRENCH, known, self._wrenches.write(stamps[known], base_wrenches[known])

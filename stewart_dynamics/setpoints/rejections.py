@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Why messages are rejected or dropped: the reasons, their texts, and the counts."""
+"""Reasons for which messages are rejected or dropped, their texts and counts."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ TOO_OLD = 'older than the last used'
 TWICE = 'same stamp twice'
 OUT_OF_RANGE = 'out of range: numbers overflow'
 NOT_EXCLUSIVE = 'more than one writer'
-# Of sound messages that are not used.
+# Prefix of reasons for which valid messages are not used.
 _DROPPED = 'dropped: '
 NOT_JOINED = f'{_DROPPED}not all topics had its stamp'
 DROPPED = f'{_DROPPED}more came at once than can be answered'
 
 
 class Rejection(NamedTuple):
-    """On which topic messages are not used, and why."""
+    """Topic and reason of messages that are not used."""
 
     topic: str
     reason: str
@@ -55,7 +55,7 @@ class Rejection(NamedTuple):
 
 class Rejections:
     """
-    Counts what is rejected.
+    Counts rejected and dropped messages.
 
     Parameters
     ----------
@@ -76,11 +76,11 @@ class Rejections:
 
 
 def frame_details(frame: bytes, wanted: bytes) -> str:
-    """Return the details of a WRONG_FRAME."""
+    """Return the details for WRONG_FRAME."""
     given, must = (each[:60].decode(errors='replace') for each in (frame, wanted))
     return f'{given!r}, must be {must!r} or empty'
 
 
 def length_details(length: float) -> str:
-    """Return the details of a quaternion that is NOT_UNIT."""
+    """Return the details for NOT_UNIT."""
     return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'

@@ -13,10 +13,9 @@
 # limitations under the License.
 
 """
-Samples of several topics joined by stamp; what is rejected is counted.
+Joins samples of several topics by stamp, and counts rejected samples.
 
-``take`` handles one message; ``join_many`` does the same for many of which none is out of the
-ordinary.
+``take`` handles one message; ``join_many`` handles a batch of messages without irregularities.
 """
 
 from __future__ import annotations
@@ -38,16 +37,16 @@ NO_SAMPLES = Samples(_NOWHERE, np.empty((0, 0)), _NOWHERE)
 
 
 class JoinedSample(NamedTuple):
-    """Samples of one time, one of each topic."""
+    """Samples of the same time, one of each topic."""
 
     stamp: int
-    """Of the first topic [ns]."""
+    """Stamp of the first topic's sample [ns]."""
     values: tuple[float, ...]
-    """Topic by topic, in the order of topics."""
+    """Concatenated values, in the order of topics."""
     restart: bool
     """Time has jumped back before it."""
     stamped: bool = True
-    """The stamp is that of the samples, not the time of arrival."""
+    """Whether the stamp comes from the samples; otherwise it is the time of arrival."""
 
 
 class SampleJoining:
@@ -57,14 +56,14 @@ class SampleJoining:
     Parameters
     ----------
     topics : sequence of str
-        Which topics, in the order in which their values are joined.
+        Topics, in the order in which their values are joined.
     frame : str or None
-        The frame that their messages must have, or none; None: that of the first message.
+        Required frame_id; an empty one is accepted. None: the first non-empty one is required.
     tolerance, timeout : float
-        How far the stamps of joined samples may differ, and a longer jump back in time is a
-        restart [s].
+        Maximum difference between the stamps of joined samples, and the jump back in time above
+        which a restart is assumed [s].
     rejections : Rejections
-        Counts what is rejected.
+        Counts rejected messages.
     noticed : callable
         Called with texts for the log: a restart, stamps that are all zero.
 
@@ -87,16 +86,16 @@ class SampleJoining:
 
     def take(self, topic: str, data: bytes, now: Callable[[], int]) -> JoinedSample | None:
         """
-        Return the joined sample that this message completes, if it does.
+        Return the joined sample that this message completes, if any.
 
         Parameters
         ----------
         topic : str
             One of ``topics``.
         data : bytes
-            The message as it came, CDR.
+            The message as received, CDR.
         now : callable
-            The clock [ns]; asked where the stamps of samples are zero.
+            The clock [ns]; read if the stamps of samples are zero.
 
         """
         sample = self._readers[topic].read(data)
@@ -108,7 +107,7 @@ class SampleJoining:
         if topic not in self._stamped:
             if stamp == 0:
                 return self._join_unstamped(topic, values, now)
-            # From now on zero is a time as others are.
+            # From now on a stamp of zero is a time like any other.
             self._stamped.add(topic)
             if self._unstamped.pop(topic, None):
                 self._reject(topic, NOT_JOINED, 'stamp 0')
@@ -123,12 +122,12 @@ class SampleJoining:
         return self._join(stamp)
 
     def forget_layouts(self) -> None:
-        """Take the layout of the next sound message of each topic."""
+        """Learn the layout again, from the next valid message of each topic."""
         for reader in self._readers.values():
             reader.forget_layout()
 
     def end(self, why: str) -> None:
-        """Drop and count what still waits: no more messages come."""
+        """Drop and count waiting samples: no more messages arrive."""
         for topic, waiting in self._waiting.items():
             for stamp in waiting:
                 self._reject(topic, NOT_JOINED, f'stamp {stamp} ns: {why}')
@@ -136,22 +135,22 @@ class SampleJoining:
         self._drop_unstamped()
 
     def restart(self, why: str) -> None:
-        """Take samples of any time from now on; drop and count what waits."""
+        """Accept samples of any time from now on; drop and count waiting samples."""
         self.end(why)
         self._last = {}
 
     def join_many(self, messages: Messages, places: Mapping[str, Integers]) -> Joined | None:
         """
-        Join messages of which none is out of the ordinary; None if one is. Nothing is changed.
+        Join a batch of messages; None if one is irregular. The state is not changed.
 
-        Ordinary are sound messages of one layout for each topic, whose stamps only rise.
+        Regular messages are valid, have one layout for each topic and strictly increasing stamps.
 
         Parameters
         ----------
         messages : Messages
-            Of these topics and others.
+            Messages of these and other topics.
         places : mapping of topic to (K,)
-            Where the messages of topics are among them; no topic, no message.
+            Indices of the messages of each topic; topics without a message are absent.
 
         """
         if self._tolerance or self._unstamped_logged:
@@ -168,7 +167,7 @@ class SampleJoining:
         return join_many(samples, self._waiting, self._last)
 
     def accept(self, joined: Joined, places: Mapping[str, Integers]) -> None:
-        """Go on behind what ``join_many`` has joined."""
+        """Continue after the samples that ``join_many`` has joined."""
         self._stamped |= {topic for topic in self.topics if topic in places}
         self._waiting = joined.waiting
         if len(joined.stamps):
@@ -178,7 +177,7 @@ class SampleJoining:
                 self._reject(topic, NOT_JOINED, f'stamp {stamp} ns')
 
     def _in_time(self, topic: str, stamp: int) -> bool:
-        """Return whether a sample may still be used, or reject it."""
+        """Return whether a sample is in time; reject it otherwise."""
         if stamp in self._waiting[topic]:
             self._reject(topic, TWICE, f'stamp {stamp} ns')
             return False
@@ -193,7 +192,7 @@ class SampleJoining:
         return False
 
     def _join(self, stamp: int) -> JoinedSample | None:
-        """Return what a sample completes, all its stamps within the tolerance."""
+        """Return the joined sample that a sample completes, if stamps are within the tolerance."""
         if self._tolerance:
             stamps = self._nearest(stamp)
         elif all(stamp in waiting for waiting in self._waiting.values()):
@@ -207,9 +206,9 @@ class SampleJoining:
         return JoinedSample(stamps[self.topics[0]], sum(values, ()), restart)
 
     def _nearest(self, stamp: int) -> dict[str, int]:
-        """Return the stamps that belong to one, none if they are not all within the tolerance."""
+        """Return the stamps that belong to a stamp; empty if not all are within the tolerance."""
         stamps = {}
-        # It has the stamp of the first topic: what is nearest to it belongs to it.
+        # The first topic defines the stamp; the nearest samples of the others belong to it.
         at = stamp
         for other, waiting in self._waiting.items():
             if at not in waiting:
@@ -222,7 +221,7 @@ class SampleJoining:
 
     def _drop_passed(self, stamps: dict[str, int]) -> bool:
         """
-        Drop and count what waits and can no longer be used once these stamps are.
+        Drop and count waiting samples that can no longer be used after these stamps.
 
         Return whether time has jumped back.
         """
@@ -233,7 +232,7 @@ class SampleJoining:
         for topic, stamp in stamps.items():
             waiting = self._waiting[topic]
             if len(waiting) > 1:
-                # After a restart, what is left of the time before it lies in the future.
+                # After a restart, remaining samples from before the restart lie in the future.
                 future = (self._last[topic] - self._timeout if jump > self._timeout
                           else math.inf)
                 for other in [other for other in waiting if other != stamp and (
@@ -247,11 +246,11 @@ class SampleJoining:
             self, topic: str, values: tuple[float, ...] | None, now: Callable[[], int],
     ) -> JoinedSample | None:
         """
-        Join samples without a stamp in their order of arrival; one without values was rejected.
+        Join samples without a stamp in order of arrival; ``values`` is None if one was rejected.
 
-        A joined sample begins with the topic that began the first one, and has one of each.
-        What is incomplete when the next one begins is dropped, all of it: else a lost sample
-        would join the following ones wrongly for ever.
+        A joined sample begins with the same topic as the first one, and has one sample of each
+        topic. If it is incomplete when the next one begins, all of it is dropped: otherwise one
+        lost sample would shift all following ones.
         """
         if not self._unstamped_logged:
             self._unstamped_logged = True

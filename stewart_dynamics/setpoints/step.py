@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The one step from a setpoint to legs, forces and the warning; node and replay both take it.
+The step from a setpoint to leg lengths, forces and the singularity warning, in node and replay.
 
-It uses neither messages nor bags, keeps no state, and gives the same bits for the same input,
-whether setpoints come one at a time or by the thousand.
+It uses neither messages nor bags and keeps no state. Results are bit-identical for single
+setpoints and for batches.
 """
 
 from __future__ import annotations
@@ -55,38 +55,38 @@ class Setpoint(NamedTuple):
     wrench: Six = NO_WRENCH
     """Load on the platform at its origin, base axes [N, N m]."""
     restart: bool = False
-    """Time has jumped back before it: earlier setpoints do not matter for it."""
+    """Time has jumped back: earlier setpoints no longer apply."""
     base: tuple[float, ...] | None = None
-    """A row of the base's motion; one of nan: it is not known. None: the base is still."""
+    """Row of the base's motion, nan if unknown; None if the base is fixed."""
     stamped: bool = True
-    """The stamp is that of its messages, not the time of their arrival."""
+    """Whether the stamp comes from the messages; otherwise it is the time of arrival."""
 
     @property
     def base_known(self) -> bool:
-        """Return whether the base is still, or its motion is known."""
+        """Return whether the base is fixed or its motion is known."""
         return self.base is None or self.base[0] == self.base[0]
 
 
 class State(NamedTuple):
-    """What the step needs to know of the setpoints before; the first setpoint follows State()."""
+    """State after earlier setpoints; before the first setpoint it is State()."""
 
     singularity: Singularity | None = None
     stamp: int = 0
     """Stamp of the last setpoint that was not a jump [ns]."""
     lengths: Six | None = None
-    """Leg lengths of that setpoint [m]; None: there is none."""
+    """Leg lengths of that setpoint [m]; None before the first one."""
 
 
 class Output(NamedTuple):
-    """What one setpoint gives."""
+    """Result of the step for one setpoint."""
 
     stamp: int
     lengths: Six
     rates: Six
     demanded_forces: Six | None
-    """As the dynamics have them; none where J_inv cannot be solved or the base is not known."""
+    """Unclipped [N]; None if J_inv cannot be solved or the base's motion is unknown."""
     forces: Six | None
-    """As published, clipped to limits.force_max; None where suppressed or not demanded."""
+    """As published [N], clipped to limits.force_max; None if suppressed or not computed."""
     unit_load_forces: Six
     determinant: float
     determinant_rate: float
@@ -95,7 +95,7 @@ class Output(NamedTuple):
     warning_changed: bool
     exceedances: tuple[Exceedance, ...]
     joint_angles: tuple[float, ...] = ()
-    """A row of joint angles [rad], nan those without a limit; empty where none has one."""
+    """Row of joint angles [rad], nan for those without a limit; empty without any limit."""
     state: State = State()
     """For the next setpoint."""
 
@@ -106,7 +106,7 @@ class Output(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Setpoints one after the other, N of them."""
+    """Sequence of N setpoints."""
 
     stamps: Stamps
     """(N,) [ns]"""
@@ -115,41 +115,41 @@ class Batch(NamedTuple):
     wrenches: Array
     """(N, 6) [N, N m], or one row for all."""
     restarts: Flags
-    """(N,): time has jumped back before it."""
+    """(N,): time has jumped back before the setpoint."""
     times: Stamps
-    """When the message that completed each came (N,) [ns]."""
+    """Time of arrival of the message that completed each (N,) [ns]."""
     bases: Array | None = None
-    """Rows of the base's motion (N, 12); one of nan: it is not known. None: the base is still."""
+    """Rows of the base's motion (N, 12), nan where unknown; None if the base is fixed."""
     stamped: Flags | None = None
-    """(N,): the stamp is that of its messages, not the time of arrival. None: all are."""
+    """(N,): the stamp comes from the messages, not from the time of arrival. None: all do."""
 
     @property
     def base_known(self) -> Flags:
-        """(N,): the base is still, or its motion is known."""
+        """(N,): the base is fixed or its motion is known."""
         if self.bases is None:
             return np.ones(len(self.stamps), dtype=bool)
         return ~np.isnan(self.bases[:, 0])
 
     def chosen(self, which: Any) -> Batch:
-        """Return some of them: a slice, or an index or a mask (N,)."""
+        """Return selected setpoints: by a slice, an index or a mask (N,)."""
         return Batch._make(None if part is None else part[which] for part in self)
 
 
 class Outputs(NamedTuple):
-    """What a batch gives: of those setpoints that could be answered, N of them."""
+    """Results of the step for the N setpoints of a batch that could be answered."""
 
     answered: Flags
-    """Which setpoints of the batch these are; of the others numbers overflow."""
+    """Mask of the batch: setpoints that could be answered; the others overflow."""
     stamps: Stamps
     """(N,) [ns]"""
     results: Array
-    """Rows of results (N, 27), laid out as for ``inverse_dynamics``; no forces are nan."""
+    """Rows of results (N, 27), laid out as for ``inverse_dynamics``; missing forces are nan."""
     forces: Array
     """As published (N, 6): clipped to limits.force_max; nan where suppressed or not solved."""
     states: Array
     """Rows of Singularity (N, STATE)."""
     changed: Flags
-    """(N,): the singularity warning is another than before."""
+    """(N,): the singularity warning has changed."""
     exceeding: Flags
     """(N,): a limit is exceeded."""
     jumped: Flags
@@ -171,7 +171,7 @@ class Outputs(NamedTuple):
 
     @property
     def demanded_forces(self) -> Array:
-        """As the dynamics have them (N, 6) [N]; nan where they are not known, as in Output."""
+        """Unclipped forces (N, 6) [N]; nan where they cannot be computed, as in Output."""
         return self.results[:, FORCES]
 
     @property
@@ -196,7 +196,7 @@ class Outputs(NamedTuple):
 
     @property
     def times_to_crossing(self) -> Array:
-        """(N,) [s]; inf where det(J) does not go toward zero."""
+        """(N,) [s]; inf where det(J) does not approach zero."""
         return self.states[:, TIME]
 
     @property
@@ -210,12 +210,12 @@ class Outputs(NamedTuple):
         return self.states[:, STOPPED] > 0.0
 
 
-# The settings as numbers, those of the warning first; whether to suppress inside stop_condition
-# and while a limit is exceeded, the thresholds of the limits, what forces are clipped to.
+# Layout of the settings: thresholds of the warning, whether to suppress forces inside
+# stop_condition and while a limit is exceeded, thresholds of the limits, limits.force_max.
 _THRESHOLDS, _SUPPRESS, _LIMITS_SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(
     THRESHOLDS, 1, 1, 24, 6)
 
-# One setpoint as numbers, since an array costs time to pass: what is given, and what is written.
+# Layout of one setpoint in memory, inputs and results: packing is faster than passing arrays.
 _RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING, _JUMPED = consecutive(RESULT, 6, STATE, 1, 1, 1)
 (_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _FOLLOWED, _ELAPSED, _RESTART, _IS_STAMP,
  _BASE_KNOWN, _WRITTEN, _TILE) = consecutive(
@@ -264,11 +264,11 @@ def _check_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: F
                 slack: Array, state: Array, followed_at: Stamps, followed: Array, results: Array,
                 forces: Array, states: Array, answered: Flags, exceeding: Flags, jumped: Flags,
                 ) -> None:
-    """Check results in their order, see Outputs; ``followed`` and its stamp are updated."""
+    """Check results in order, see Outputs; update ``followed`` and its stamp."""
     limits = settings[_LIMITS]
     restart = False
     for n in range(len(results)):
-        # Where this one cannot be answered, the next one is the restart.
+        # If this one cannot be answered, the next one is the restart.
         restart = restart or restarts[n]
         is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
         elapsed = math.inf
@@ -288,7 +288,7 @@ def _check_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: F
 
 @entry_point('f8[::1]')
 def _one(numbers: Array) -> None:
-    """Do with one setpoint what solve and check do with many."""
+    """Solve and check one setpoint, as ``solve`` and ``_check_many`` do for a batch."""
     settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
     for n in range(STATE):
@@ -302,22 +302,22 @@ def _one(numbers: Array) -> None:
         numbers[_FOLLOWED], numbers[_ELAPSED.start], result, written[_FORCES])
 
 
-# The machine code that a batch needs.
+# Compiled functions required for a batch.
 FUNCTIONS = inverse_dynamics.solve, _check_many
 
 _FIRST = Singularity()
-_NO_LENGTHS = (math.nan,) * 6  # which no setpoint is far from
+_NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
 
 
 class Step:
     """
-    The step, for a hexapod with given parameters.
+    The step for a hexapod with given parameters.
 
     Parameters
     ----------
     parameters : Parameters
-        They hold for every call; another set of them makes another step. One thread at a time
-        may call it: a call for one setpoint works in memory that is the step's own.
+        Constant for all calls; create another step for other parameters. Not thread-safe: calls
+        for one setpoint share a buffer.
 
     """
 
@@ -335,7 +335,7 @@ class Step:
         settings[_LIMITS_SUPPRESS] = self._limits_suppress
         settings[_LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
         settings[_FORCE_MAX] = self._limits.force_max
-        # How much longer than their stamps say the time between two setpoints may be [s].
+        # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']
         self._slack_of_arrival = JITTER + parameters['setpoint.timeout']
         self._solve = _one.bound(self._numbers)
@@ -345,14 +345,14 @@ class Step:
 
     def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
-        Return the output, or None where numbers overflow, the stamp's own among them.
+        Return the output, or None if the stamp or other numbers overflow.
 
         Parameters
         ----------
         setpoint : Setpoint
-            A finite one, its rotation a rotation.
+            Finite, with a valid rotation matrix.
         before : State, optional
-            Of the output before this one; None for the first.
+            State of the previous output; None for the first setpoint.
 
         """
         stamp = setpoint.stamp
@@ -394,7 +394,7 @@ class Step:
             State(after, followed_at, followed) if jumped else State(after, stamp, lengths))
 
     def many(self, setpoints: Batch, before: State | None) -> Outputs:
-        """Return what setpoints give one after the other; see the call for one."""
+        """Return the outputs of a sequence of setpoints, as calls for one setpoint would."""
         results = self._platform.solve(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
         n_setpoints = len(results)

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics on which setpoints, the base's motion and the known wrench come; their types."""
+"""Topics of setpoints, of the base's motion and of the known wrench, and their types."""
 
 from __future__ import annotations
 
-# Under the node's name.
+# Topics, relative to the node's name.
 POSE = 'setpoint/pose'
 TWIST = 'setpoint/twist'
 ACCEL = 'setpoint/accel'
@@ -39,8 +39,8 @@ INPUT_TYPES = {
     WRENCH: 'geometry_msgs/msg/WrenchStamped',
 }
 
-# Of each value of setpoint.source: the topics that are joined.
+# Topics that are joined, for each value of setpoint.source.
 SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}
-# The same of each value of base.source.
+# Topics that are joined, for each value of base.source.
 BASE_SOURCES = {'fixed': (), 'pose': (BASE_POSE,), 'motion': (BASE_POSE, BASE_TWIST, BASE_ACCEL),
                 'imu': (BASE_IMU,)}

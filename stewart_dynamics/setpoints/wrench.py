@@ -33,9 +33,9 @@ class WrenchInput:
     Parameters
     ----------
     parameters : Parameters
-        For ``base_frame``.
+        ``base_frame`` is used.
     rejections : Rejections
-        Counts what is rejected.
+        Counts rejected messages.
 
     """
 
@@ -45,7 +45,7 @@ class WrenchInput:
         self.reader = SampleReader(WRENCH, parameters['base_frame'], rejections)
 
     def take(self, data: bytes) -> None:
-        """Use the wrench of this geometry_msgs/WrenchStamped from now on, if it is sound."""
+        """Use the wrench of this geometry_msgs/WrenchStamped from now on, if it is valid."""
         sample = self.reader.read(data)
         if sample is not None:
             fx, fy, fz, tx, ty, tz = sample[1]
@@ -53,14 +53,14 @@ class WrenchInput:
 
     def at(self, samples: Samples, places: Integers) -> Array:
         """
-        Use new wrenches one after the other, and return which of them held at some places.
+        Use new wrenches in order, and return the one that is valid at each of the given indices.
 
         Parameters
         ----------
         samples : Samples
             Read by ``reader``.
         places : (K,)
-            In the order of all messages.
+            Indices in the order of all messages.
 
         Returns
         -------

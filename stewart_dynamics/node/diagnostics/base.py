@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``base``: whether the base's motion is known; there is one where it is asked for."""
+"""The status ``base``: whether the base's motion is known; omitted if the base is fixed."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ _QUANTITIES = (('gravity', 'm/s^2', GRAVITY), ('acceleration', 'm/s^2', BASE_ACC
 
 class BaseDiagnostics(Part):
     """
-    Notes what becomes of the base's messages, and for which setpoints its motion is known.
+    Counts the base's messages, and notes for which setpoints its motion is known.
 
     Parameters
     ----------
     parameters : Parameters
-        For the timeout.
+        ``base.timeout`` is used.
     topics : sequence of str
-        Those of the base; none where it is still.
+        Topics of the base; empty if the base is fixed.
 
     """
 
@@ -57,7 +57,7 @@ class BaseDiagnostics(Part):
         self._unknown_held = Held()
 
     def heard(self, topic: str, now: float) -> None:
-        """Note that a message came."""
+        """Note that a message has arrived."""
         self._heard[topic] = now
 
     def sampled(self, base: BaseInput, now: float) -> None:
@@ -68,7 +68,7 @@ class BaseDiagnostics(Part):
             self._row = base.last[1]
 
     def stale(self, now: float) -> bool:
-        """Return whether there is no sample, or only an old one."""
+        """Return whether no recent sample is available."""
         return now - self._sampled_at > self._timeout
 
     def answered(self, setpoint: Setpoint, now: float) -> None:
@@ -87,7 +87,7 @@ class BaseDiagnostics(Part):
         return held if held.level > lack.level else lack
 
     def values(self, now: float) -> list[tuple[str, str]] | None:
-        """Return keys and values, None where the base is still."""
+        """Return keys and values; None if the base is fixed."""
         if not self._heard:
             return None
         values = [('samples', str(self._samples)),
@@ -105,7 +105,7 @@ class BaseDiagnostics(Part):
         return self._log.lines(self._lack(now)) if self._samples or self._unknown else []
 
     def _lack(self, now: float) -> Level:
-        """Return whether the base's motion lacks."""
+        """Return whether the base's motion is missing."""
         if self.stale(now):
             return Level(ERROR, f'no forces: {self._why(now)}')
         unknown = self._unknown_held.at(now)
@@ -113,7 +113,7 @@ class BaseDiagnostics(Part):
                 else Level(OK, 'its motion is known'))
 
     def _why(self, now: float) -> str:
-        """Return why the base's motion is not known."""
+        """Return why the base's motion is unknown."""
         silent = silent_topics(self._heard, self._timeout, now)
         if silent or self.stale(now):
             return silent or self.held.at(now).message or (

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""All that the dynamics node reports, and where what happens in it is noted."""
+"""Diagnostics of the dynamics node: passes its events to the parts of the report."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class DynamicsDiagnostics:
     parameters : Parameters
         Names, timeouts and thresholds.
     topics, base_topics : sequence of str
-        The setpoint topics that are joined, and those of the base.
+        Setpoint topics that are joined, and topics of the base.
     now : float
         The time of the activation.
 
@@ -66,7 +66,7 @@ class DynamicsDiagnostics:
 
     def answered(self, output: Output, came: float, now: float) -> bool:
         """
-        Note an output and when its setpoint came.
+        Note an output and the time of arrival of its setpoint.
 
         Returns
         -------
@@ -81,7 +81,7 @@ class DynamicsDiagnostics:
         return crossed or self.report.due(now)
 
     def rejected(self, rejection: Rejection, details: str, now: float) -> None:
-        """Note a rejection of whatever topic."""
+        """Note a rejection on any topic."""
         if rejection.topic == MEASURED_LEGS:
             self.external_wrench.rejected(rejection, details, now)
         elif rejection.topic in self._base_topics:
@@ -94,7 +94,7 @@ class DynamicsDiagnostics:
         """
         Return whether a report is due at a tick, every TICK seconds.
 
-        While setpoints are answered it is made behind an answer, when there is time for it.
+        While setpoints are answered the report is made after an answer, when there is time.
         """
         if now - self._answers.at < TICK:
             return self.report.level_changed(now)

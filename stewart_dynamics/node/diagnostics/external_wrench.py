@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``external wrench``: there is one once a measurement has come."""
+"""The status ``external wrench``, present after the first measurement."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'm
 
 class ExternalWrenchDiagnostics(Part):
     """
-    Notes what becomes of measured legs.
+    Notes estimates from measured legs, and rejections of measurements.
 
     Parameters
     ----------
@@ -54,20 +54,20 @@ class ExternalWrenchDiagnostics(Part):
         self._reported = OK  # the level in the last report
 
     def heard(self, now: float) -> None:
-        """Note that a message came."""
+        """Note that a message has arrived."""
         self._heard = now
         if self._begun == NEVER:
             self._begun = now
 
     def silence(self, now: float) -> float:
-        """Return how long no message has come [s]."""
+        """Return the time since the last message [s]."""
         return now - self._heard
 
     def estimated(self, estimate: Estimate, target: Sequence[float] | None, now: float) -> bool:
         """
-        Note an estimate and the last setpoint, a row of motion, None where there is none.
+        Note an estimate, and the row of motion of the last setpoint; None without a setpoint.
 
-        Return whether the level is another than in the last report.
+        Return whether the level has changed since the last report.
         """
         self._estimate, self._target = estimate, target
         if estimate.wrench is None:
@@ -85,7 +85,7 @@ class ExternalWrenchDiagnostics(Part):
         return STALE if self._is_stale(now) else self.held.level(now)
 
     def values(self, now: float) -> list[tuple[str, str]] | None:
-        """Return keys and values, None before a measurement has come."""
+        """Return keys and values; None before the first measurement."""
         if self._begun == NEVER:
             return None
         values = [('wrenches', str(self._estimated))]
@@ -134,7 +134,7 @@ class ExternalWrenchDiagnostics(Part):
 
 
 def _apart(motion: Sequence[float], target: Sequence[float]) -> tuple[float, float]:
-    """Return how far two rows of motion are apart [m] and turned against each other [rad]."""
+    """Return the distance [m] and the angle [rad] between the poses of two rows of motion."""
     # The difference of two rotations has the norm sqrt(8) sin(angle / 2), exact for small angles.
     half = math.dist(motion[3:12], target[3:12]) / math.sqrt(8.0)
     return math.dist(motion[:3], target[:3]), 2.0 * math.asin(min(half, 1.0))

@@ -27,23 +27,23 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
 
 
-# Legs that are this many times longer than they can be, with positions in mm for m.
+# Factor by which legs exceed their maximum length if positions are in mm instead of m.
 _MILLIMETRES = 1000.0
 
 
 class _Limit:
-    """What is known of one kind of limit."""
+    """State of one kind of limit."""
 
     def __init__(self) -> None:
         self.held = Held()
         self.log = LevelLog(LimitsDiagnostics.name)
         self.setpoints = 0
-        """How many have exceeded it."""
+        """Number of setpoints that have exceeded it."""
         self.worst: Exceedance | None = None
 
     def see(self, exceeded: Sequence[Exceedance], words: Callable[[Exceedance], str],
             consequence: str, now: float) -> None:
-        """Note which legs exceed it with a setpoint."""
+        """Note the legs that exceed the limit at a setpoint."""
         if not exceeded:
             self.held.see(FINE, now)
             return

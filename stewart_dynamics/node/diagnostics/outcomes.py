@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The statuses ``planned trajectory`` and ``payload``: the outcome of the last work of each.
+The statuses ``planned trajectory`` and ``payload``: the outcome of the last task of each.
 
 There is no status before the first outcome.
 """
@@ -45,11 +45,11 @@ class _LastOutcome(Part):
         return self._last.level
 
     def state(self, now: float) -> Level:
-        """Return the level of the last outcome, and its words."""
+        """Return the level of the last outcome, and its message."""
         return self._last
 
     def values(self, now: float) -> list[tuple[str, str]] | None:
-        """Return keys and values, None before the first outcome."""
+        """Return keys and values; None before the first outcome."""
         return self._values
 
     def log_lines(self, now: float) -> list[LogLine]:
@@ -68,7 +68,7 @@ class PlannedTrajectoryDiagnostics(_LastOutcome):
         self._counts: Counter[str] = Counter()
 
     def done(self, outcome: Outcome, seconds: float) -> None:
-        """Note an outcome, and how long it took from the message on [s]."""
+        """Note an outcome, and the time from the message to the outcome [s]."""
         level = ERROR if outcome.reason else WARN if outcome.warning else OK
         counts = self._counts
         counts[f'rejected: {outcome.reason}' if outcome.reason else 'accepted'] += 1
@@ -80,7 +80,7 @@ class PlannedTrajectoryDiagnostics(_LastOutcome):
             *outcome.values, ('time it took (s)', f'{seconds:.3f}')]
         message = outcome.message + (f' (took {seconds:.1f} s)' if seconds > _LONG else '')
         lines = self._log.lines(Level(level, message))
-        if outcome.reason:  # each, whatever came before
+        if outcome.reason:  # each one is logged
             lines = [LogLine(ERROR, f'{self.name} {message}', outcome.reason)]
         elif seconds > _LONG:
             lines = [LogLine(level, f'{self.name}: {message}')]
@@ -93,7 +93,7 @@ class PayloadDiagnostics(_LastOutcome):
     name = 'payload'
 
     def done(self, outcome: PayloadOutcome, seconds: float) -> None:
-        """Note an outcome, and how long the work took [s]."""
+        """Note an outcome, and the duration of the task [s]."""
         payload = outcome.payload
         self._last = Level(OK, f'identified from {payload.seconds:.1f} s') if payload else (
             Level(WARN, f'not identified: {outcome.message}'))

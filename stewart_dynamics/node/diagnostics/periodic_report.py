@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The report: when it is due, and what its parts have in common.
+The periodic report: when it is due, and the base class of its parts.
 
-A report is due once in a second and whenever the level of a part has changed.
+A report is due once per second and whenever the level of a part has changed.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from typing import NamedTuple
 
 from stewart_dynamics.setpoints.rejections import Rejection
 
-# Of diagnostic_msgs/DiagnosticStatus.
+# Levels of diagnostic_msgs/DiagnosticStatus.
 OK, WARN, ERROR, STALE = range(4)
 
-# When a message came last that has not come.
+# Time of the last message before the first one.
 NEVER = -math.inf
 
-# The longest time between two reports [s].
+# Maximum time between two reports [s].
 PERIOD = 1.0
 
-# How often a node calls ``Report.due`` where nothing else happens [s].
+# Period at which a node calls ``Report.due`` if nothing else happens [s].
 TICK = 0.05
 
 # A level is kept for this long after its cause was last seen [s], so that a hexapod that moves
@@ -64,7 +64,7 @@ class Status(NamedTuple):
 
 
 class LogLine(NamedTuple):
-    """What is to be logged."""
+    """A line for the log."""
 
     level: int
     text: str
@@ -73,7 +73,7 @@ class LogLine(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """A state, and when it was last there."""
+    """A state, and when it was last active."""
 
     at: float
     state: Level
@@ -94,7 +94,7 @@ class Held:
             self._seen[state.level] = _Seen(now, state, lasts=True)
 
     def happened(self, state: Level, now: float) -> None:
-        """Note what is over as soon as it has happened."""
+        """Note an instantaneous event."""
         self._seen[state.level] = _Seen(now, state, lasts=False)
 
     def level(self, now: float) -> int:
@@ -105,7 +105,7 @@ class Held:
         return max(self._state.level, *self._seen) if self._seen else self._state.level
 
     def at(self, now: float) -> Level:
-        """Return what has the highest level; that of a past state contains its age."""
+        """Return the state of the highest level; the message of a past state contains its age."""
         self._forget(now)
         worst = max(self._seen, default=OK)
         if worst <= self._state.level:
@@ -123,12 +123,12 @@ class Held:
 
 class LevelLog:
     """
-    What is logged of a level: its changes.
+    Log lines for the changes of a level.
 
     Parameters
     ----------
     name : str
-        What the lines begin with.
+        Prefix of the lines.
 
     """
 
@@ -137,7 +137,7 @@ class LevelLog:
         self._level = OK
 
     def lines(self, state: Level) -> list[LogLine]:
-        """Return the line for a state, none where its level is that of the last one."""
+        """Return the line for a state; empty if the level has not changed."""
         if state.level == self._level:
             return []
         self._level = state.level
@@ -164,7 +164,7 @@ class Part:
         self._count(self.held, rejection, details, now)
 
     def level(self, now: float) -> int:
-        """Return the present level, in little time: it is compared behind every answer."""
+        """Return the present level; must be fast, because it is called after every answer."""
         return self.held.level(now)
 
     def state(self, now: float) -> Level:
@@ -172,16 +172,16 @@ class Part:
         return self.held.at(now)
 
     def values(self, now: float) -> list[tuple[str, str]] | None:
-        """Return keys and values of the status; None while there is no status."""
+        """Return keys and values of the status; None if it is omitted."""
         raise NotImplementedError
 
     def status(self, now: float) -> Status | None:
-        """Return the status for a report, None while there is nothing to report."""
+        """Return the status for a report; None if it is omitted."""
         values = self.values(now)
         return None if values is None else Status(self.name, *self.state(now), tuple(values))
 
     def log_lines(self, now: float) -> list[LogLine]:
-        """Return what is to be logged since the last report: changes of level."""
+        """Return log lines for changes of level since the last report."""
         return self._log.lines(self.state(now))
 
     def _count(self, held: Held, rejection: Rejection, details: str, now: float) -> None:
@@ -189,20 +189,20 @@ class Part:
         held.happened(Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
 
     def rejections(self) -> list[tuple[str, str]]:
-        """Return how often what was rejected, as keys and values."""
+        """Return the number of rejections by topic and reason, as keys and values."""
         return [(f'rejected, {topic}: {reason}', str(n))
                 for (topic, reason), n in sorted(self._rejections.items())]
 
 
 def silent_topics(heard: Mapping[str, float], timeout: float, now: float) -> str:
-    """Return the topics without a message for longer than a timeout; empty: none of them."""
+    """Return the topics silent for longer than a timeout; empty if no topic is silent."""
     return ', '.join(
         f'{topic} never came' if at == NEVER else f'{topic} silent for {now - at:.1f} s'
         for topic, at in heard.items() if now - at > timeout)
 
 
 def last_heard(heard: Mapping[str, float], now: float) -> list[tuple[str, str]]:
-    """Return when the last message came on each topic, as keys and values."""
+    """Return the time since the last message on each topic, as keys and values."""
     return [(f'{topic}: last heard (s ago)', 'never' if at == NEVER else f'{now - at:.3f}')
             for topic, at in heard.items()]
 
@@ -216,7 +216,7 @@ class Report:
     parts : sequence of Part
         In the order of their statuses.
     now : float
-        From when on there are reports.
+        Start time of the reports.
 
     """
 
@@ -227,15 +227,15 @@ class Report:
         self._levels: list[int] = []
 
     def level_changed(self, now: float) -> bool:
-        """Return whether a level is another than in the last report."""
+        """Return whether a level has changed since the last report."""
         return [level(now) for level in self._levels_of] != self._levels
 
     def due(self, now: float, early: float = 0.0) -> bool:
-        """Return whether to make a report, so much before its time at most."""
+        """Return whether a report is due, at most ``early`` seconds before its time."""
         return now - self._made >= PERIOD - early or self.level_changed(now)
 
     def make(self, now: float) -> tuple[list[Status], list[LogLine]]:
-        """Return the statuses, and what is to be logged."""
+        """Return the statuses and the log lines."""
         self._made = now
         self._levels = [level(now) for level in self._levels_of]
         statuses = [part.status(now) for part in self._parts]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Publishes the node's report as diagnostic_msgs/DiagnosticArray, and logs what changes."""
+"""Publishes the node's report as diagnostic_msgs/DiagnosticArray, and logs changes."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``setpoints``: which topics are silent, what is rejected, and who else publishes."""
+"""The status ``setpoints``: silent topics, rejections, other publishers of setpoints."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_events import SECONDS
 from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection
 
-# Setpoint messages arrive for so long, but no setpoint is complete: that is logged [s].
+# Time after which arriving messages that complete no setpoint are logged [s].
 _PATIENCE = 0.9
 
 
 class Answers:
     """
-    How many setpoints have been answered, and when the last one was.
+    Number of answered setpoints, and time of the last one.
 
     Parameters
     ----------
     timeout : float
-        After this time the last one is old [s].
+        Age from which the last answer counts as old [s].
     now : float
-        From when on they are counted.
+        Start time of the count.
 
     """
 
@@ -53,11 +53,11 @@ class Answers:
         self.at = now
 
     def stale(self, now: float) -> bool:
-        """Return whether there is none, or only an old one."""
+        """Return whether there is no recent answer."""
         return not self.number or now - self.at > self._timeout
 
     def age(self, now: float) -> str:
-        """Return how old the last one is, in words to append, where it is old."""
+        """Return the age of the last answer as a text to append; empty if it is recent."""
         if not self.number or not self.stale(now):
             return ''
         return f' (of the last setpoint, {now - self.at:.1f} s ago)'
@@ -65,7 +65,7 @@ class Answers:
 
 class SetpointDiagnostics(Part):
     """
-    Notes what becomes of setpoint messages.
+    Notes received and rejected setpoint messages, publishers and subscribers.
 
     Parameters
     ----------
@@ -94,29 +94,29 @@ class SetpointDiagnostics(Part):
         self._readers: dict[str, int] = {}
         self._namesakes = '', 1
         self._lines: list[LogLine] = []
-        self._trouble: list[str] = []  # who publishes that should not
+        self._trouble: list[str] = []  # unexpected publishers and namesakes
         self._incomplete = Held()
-        # Since when messages arrive that complete no setpoint, as reports have seen it.
+        # Start of the time in which messages complete no setpoint, as seen by reports.
         self._incomplete_since = math.inf
         self._warned_at = NEVER
-        # When the last windows of a second began, and how many answers there were.
+        # Start times of the last two one-second windows, and the answer counts at their start.
         self._windows = [(now, 0), (now, 0)]
 
     def found(self, writers: Mapping[str, int], readers: Mapping[str, int], name: str,
               namesakes: int) -> None:
         """
-        Note who else takes part.
+        Note publishers, subscribers and nodes of the same name.
 
         Parameters
         ----------
         writers : mapping of topic to int
-            How many publishers setpoint topics have; others keep their number.
+            Number of publishers on setpoint topics; other topics keep their number.
         readers : mapping of topic to int
-            How many subscribers the topics have that controllers read.
+            Number of subscribers to the topics for controllers.
         name : str
             The node's name.
         namesakes : int
-            How many nodes have it.
+            Number of nodes with this name.
 
         """
         self._writers.update(writers)
@@ -130,7 +130,7 @@ class SetpointDiagnostics(Part):
                 self._lines = [LogLine(WARN, f'setpoints: {self._trouble[-1]}')]
 
     def found_writers(self, topic: str, writers: int) -> None:
-        """Note how many publishers one setpoint topic has."""
+        """Note the number of publishers on one setpoint topic."""
         if writers != self._writers.get(topic):
             self.found({topic: writers}, {}, *self._namesakes)
 
@@ -170,7 +170,7 @@ class SetpointDiagnostics(Part):
 
     def log_lines(self, now: float) -> list[LogLine]:
         """
-        Return the warnings: another node of this name; messages that complete no setpoint.
+        Return warnings of another node of this name and of messages that complete no setpoint.
 
         Nothing else: rejections are logged one by one, and without setpoints there is no
         fault.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``singularity``: how near one is, why the warning is on, and each crossing."""
+"""The status ``singularity``: distance from a singularity, cause of the warning, crossings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from stewart_dynamics.setpoints.step import Output
 
 
 def singularity_state(output: Output, parameters: Parameters) -> Level:
-    """Return the level of one output, and its cause with the output's own numbers."""
+    """Return the level of one output, and its cause with the numbers of the output."""
     if not output.solvable:
         return Level(ERROR, 'J_inv cannot be solved: no forces')
     state = output.singularity
@@ -58,12 +58,12 @@ def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
 
 class SingularityDiagnostics(Part):
     """
-    Notes how near a singularity setpoints come.
+    Notes the distance of setpoints from a singularity.
 
     Parameters
     ----------
     parameters : Parameters
-        Names of the legs, thresholds. Others may take their place at any time.
+        Names of the legs, thresholds; may be replaced at any time.
     answers : Answers
         The setpoints that were answered.
     now : float
@@ -87,7 +87,7 @@ class SingularityDiagnostics(Part):
         self._second_begin = now
 
     def answered(self, output: Output, now: float) -> bool:
-        """Note an output; return whether it is to be reported at once, whatever the level."""
+        """Note an output; return whether it must be reported at once, at any level."""
         before, self._output = self._output, output
         if output.condition > self._second_largest:
             self._second_largest = output.condition

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``timing``: how long setpoints take, and which are dropped for lack of time."""
+"""The status ``timing``: processing times, and setpoints dropped for lack of time."""
 
 from __future__ import annotations
 
@@ -46,24 +46,24 @@ class TimingDiagnostics(Part):
         super().__init__()
         self._answers = answers
         self._counts = Counter(dict.fromkeys(_COUNTED, 0))
-        # Processing times [s] of this second and of the one before.
+        # Processing times [s] of the present and of the previous second.
         self._begin = now
         self._times: list[float] = []
         self._times_before: list[float] = []
 
     def answered(self, seconds: float) -> None:
-        """Note how long a setpoint took, from its last message on."""
+        """Note the processing time of a setpoint, from its last message on."""
         self._times.append(seconds)
 
     def rejected(self, rejection: Rejection, details: str, now: float) -> None:
-        """Note a rejection; only what was dropped counts here."""
+        """Note a rejection; only dropped setpoints count here."""
         if rejection.reason in _COUNTED:
             self._counts[rejection.reason] += 1
         if rejection.reason == DROPPED:
             super().rejected(rejection, details, now)
 
     def status(self, now: float) -> Status | None:
-        """Return the status; without setpoints now, it says how old the last one is."""
+        """Return the status; while setpoints are missing, with the age of the last one."""
         status = super().status(now)
         return status and status._replace(message=status.message + self._answers.age(now))
 
