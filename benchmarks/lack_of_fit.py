@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-How often stewart_identify notices a model that lacks something, and names the right cause.
+Study of how often stewart_identify detects a wrong model and names the right cause.
 
-Recordings are simulated with one error each that the parameter file does not have, and others
-without any; they go through the identification without bag files. Run by hand, ``make
-bench-lack-of-fit``; README.md beside this file says how.
+Recordings are simulated with one error each relative to the parameter file, and others without
+an error, and are identified without bag files. Run by hand, ``make
+bench-lack-of-fit``; see README.md in this folder.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ BEGIN, END = '<!-- lack of fit: begin -->', '<!-- lack of fit: end -->'
 
 
 class Answer(NamedTuple):
-    """What the identification says of one run."""
+    """Result of one identification."""
 
     cause: str | None
-    """The likeliest one; None: no notice."""
+    """Likeliest cause; None: no notice."""
     rejected: bool
-    """As a likely mistake."""
+    """Whether the run is rejected as a likely mistake."""
     held: float
-    """Share of the 95 % intervals that hold the truth; nan: no intervals are given."""
+    """Share of the 95 % intervals that contain the true value; nan: no intervals."""
     narrow: float
-    """The same without the widening."""
+    """Share without the widening."""
 
 
 def answer(given: tuple[str, int]) -> Answer:

@@ -39,7 +39,7 @@ LIMITS = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limi
 
 @pytest.fixture(scope='module')
 def small() -> Design:
-    """Return a motion that was designed in little time."""
+    """Return a motion designed with few generations."""
     return design(HEXAPOD, SMALL)
 
 
@@ -58,7 +58,7 @@ def test_it_is_within_the_limits_less_their_margins(small: Design) -> None:
     assert np.all(np.abs(result.rates) < 0.901 * p['limits.velocity_max'])
     assert np.all(np.abs(result.forces) < 0.801 * p['limits.force_max'])
     assert np.all(result.condition_number < 0.501 * p['singularity.warn_condition'])
-    # It uses what it may.
+    # The motion uses the limits fully.
     assert 0.99 < max(small.use.values()) <= 1.0
     assert np.abs(result.rates).max() > 0.89 * p['limits.velocity_max'].max()
 
@@ -86,7 +86,7 @@ def test_generations_make_the_intervals_smaller(small: Design) -> None:
 
 
 def test_its_intervals_are_three_times_narrower_than_those_of_sine_sweeps() -> None:
-    """Of inertia and all of the platform; its weight tells the mass in any motion."""
+    """Compare inertia and all platform parameters; the mass is identifiable in any motion."""
     platform, options = StewartPlatform(HEXAPOD), DesignOptions(
         kinds=('platform',), generations=60, harmonics=6)
     designed = design(HEXAPOD, options)
@@ -102,7 +102,7 @@ def test_its_intervals_are_three_times_narrower_than_those_of_sine_sweeps() -> N
 
 
 def test_the_predicted_intervals_are_those_of_a_fit(small: Design) -> None:
-    """Of least squares on efforts with noise, many times."""
+    """Compare with the spread of least squares over repeated noisy efforts."""
     random, options = np.random.default_rng(4), SMALL._replace(rate=50.0)
     platform, unknowns = StewartPlatform(HEXAPOD), small.unknowns
     times = np.arange(0.0, 12.0, 1.0 / options.rate)
@@ -174,7 +174,7 @@ def test_the_file_is_for_stewart_trajectory(
     assert f'motion: {folder / "trajectory.yaml"}' in lines[-1]
     head = (folder / 'trajectory.yaml').read_text(encoding='utf-8')
     assert head.startswith('# Designed to identify platform, friction, seed 0.')
-    # Nothing that exists is replaced without --force.
+    # Existing files are not replaced without --force.
     code, out, err = run(capsys, *QUICK, '--output', folder)
     assert code == 2 and str(folder) in err and not out
     assert run(capsys, *QUICK, '--output', folder, '--force')[0] == 0
@@ -198,7 +198,7 @@ def test_a_motion_may_be_designed_for_the_tilt_as_well(
      'piston: legs.cylinder.second_moment.leg_1 is not identifiable; ask for less'),
     (('--params', 'missing.yaml'), 'missing.yaml: '),
 ])
-def test_what_cannot_be_designed_is_one_line(
+def test_a_failed_design_is_reported_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:
     code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
     assert (code, out) == (2, '')

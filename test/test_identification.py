@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Identification from bags whose forces are Pinocchio's: values, intervals, what is not told."""
+"""Identification from bags with Pinocchio's forces: values, intervals, identifiability."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ TRUE = GIVEN.replaced({
     'platform.mass': 180.0, 'platform.center_of_mass': [0.03, -0.02, 0.15],
     'platform.inertia': [14.0, 0.5, -0.3, 16.0, 0.4, 24.0],
     'actuator.viscous_friction': 400.0, 'actuator.coulomb_friction': 50.0})
-# The same on a base that is not level.
+# The true hexapod on a base that is not level.
 TILTED = TRUE.replaced({'gravity': rotation_about(
     np.array([np.cos(0.7), np.sin(0.7), 0.0]), np.radians(1.5)) @ GIVEN['gravity']})
 RATE = 100.0
 SECONDS = 20.0
-# Of 100 samples per second, each the mean of ten at 1 kHz.
+# Noise at 100 samples per second, each the mean of ten at 1 kHz.
 NOISE = Noise(length=3e-6, rate=3e-4, effort=1.6, coloured=2.0, delay=3e-3)
 Change = Callable[[Recorded], Recorded]
 
@@ -63,7 +63,7 @@ def motions() -> dict[str, Recorded]:
 @pytest.fixture
 def identified(motions: dict[str, Recorded], tmp_path: Path,
                capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
-    """Return a function that identifies from a recording: exit code, document, output."""
+    """Return a function that identifies from a recording; it returns code, document, output."""
     def run(name: str, *options: str, change: Change = lambda given: given,
             params: Path = FILE) -> tuple[int, Any, str, str]:
         bag = tmp_path / 'a bag'
@@ -79,7 +79,7 @@ def identified(motions: dict[str, Recorded], tmp_path: Path,
 
 
 def values_of(result: Any, key: str = 'value') -> dict[str, Any]:
-    """Return a value of each parameter by name."""
+    """Return an entry of each parameter by parameter name."""
     return {each['name']: each[key] for each in result['parameters']}
 
 
@@ -121,10 +121,10 @@ def test_the_true_hexapod_is_found_within_its_intervals(
     assert '22 of 22 parameters identified' in report
 
 
-def test_at_rest_weight_is_told_and_nothing_else(identified: Callable[..., Any],
+def test_at_rest_only_the_weight_is_identifiable(identified: Callable[..., Any],
                                                  tmp_path: Path) -> None:
     code, result, out, _ = identified('rest', '--no-report', '--strict')
-    assert code == 1  # not everything that was asked for
+    assert code == 1  # not all requested parameters are identifiable
     states = values_of(result, 'state')
     told = {name for name, state in states.items() if state == 'identified'}
     assert told == {'platform.mass', 'platform.center_of_mass.x', 'platform.center_of_mass.y'}
@@ -140,9 +140,9 @@ def test_at_rest_weight_is_told_and_nothing_else(identified: Callable[..., Any],
     assert not (tmp_path / 'found' / 'report.html').exists()
 
 
-def test_turning_about_one_axis_tells_the_inertia_about_it(identified: Callable[..., Any],
-                                                           ) -> None:
-    # I n of n = (1, 1, 0): its three components are told, each a sum of two products.
+def test_rotation_about_one_axis_identifies_the_inertia_about_it(
+        identified: Callable[..., Any]) -> None:
+    # I n for n = (1, 1, 0) is identifiable: each of its components is a sum of two elements of I.
     _, result, out, _ = identified('diagonal', '--no-report')
     states = values_of(result, 'state')
     assert states['platform.inertia.zz'] == 'not_told'
@@ -165,7 +165,7 @@ WITH_TILT = ('--identify', 'platform,friction,tilt')
 
 
 def _turned(result: Any) -> Array:
-    """Return the gravity that was identified, of the file's length."""
+    """Return the identified gravity, which has the file's magnitude."""
     gravity: Array = np.array(result['identified']['gravity'])
     assert np.linalg.norm(gravity) == pytest.approx(np.linalg.norm(GIVEN['gravity']), rel=1e-12)
     return gravity
@@ -181,7 +181,7 @@ def test_the_tilt_of_a_base_is_found_within_its_interval(
     code, result, out, err = identified('tilted', *WITH_TILT, '--no-report', '--strict')
     assert (code, err) == (0, '')
     assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
-    assert _degrees_between(GIVEN['gravity'], TILTED['gravity']) > 1.4  # that of the file
+    assert _degrees_between(GIVEN['gravity'], TILTED['gravity']) > 1.4  # unlike the file's gravity
     truth = Unknowns(TRUE)
     true = dict(zip(truth.names, truth.start, strict=True)) | {
         'gravity.tilt_x': np.radians(1.5) * np.cos(0.7),
@@ -216,9 +216,9 @@ def test_a_tilted_base_is_a_likely_mistake_unless_it_is_asked_for(
     assert err.count('\n') == 1
 
 
-def test_at_rest_the_tilt_is_told_unless_efforts_have_offsets(
+def test_at_rest_the_tilt_is_identifiable_unless_efforts_have_offsets(
         identified: Callable[..., Any]) -> None:
-    # Six forces at rest: the weight's three components, and its moment.
+    # Six forces at rest determine the weight's three components and its moment.
     _, result, _, _ = identified('tilted at rest', *WITH_TILT, '--no-report')
     assert _degrees_between(_turned(result), TILTED['gravity']) < 0.02
     states = values_of(result, 'state')
@@ -226,7 +226,7 @@ def test_at_rest_the_tilt_is_told_unless_efforts_have_offsets(
     moments = [np.cross(p['platform.center_of_mass'], p['gravity'])
                for p in (Parameters(result['identified']), TILTED)]
     np.testing.assert_allclose(*moments, atol=5e-3)
-    # With offsets it is told in combination with them only, as weight and center of mass are.
+    # Offsets make tilt, weight and center of mass identifiable only in combination with them.
     _, result, out, _ = identified(
         'tilted at rest', '--identify', 'platform,offset,tilt', '--no-report', '--force')
     states = values_of(result, 'state')

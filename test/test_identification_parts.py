@@ -50,7 +50,7 @@ INNER = TIMES[FILTER.half:-FILTER.half]
 
 
 def wave(frequency: float, order: int = 0, times: Array = TIMES) -> Array:
-    """Return a sine about one (N, 1), or its derivative."""
+    """Return a sine with mean one (N, 1), or its derivative."""
     w = 2.0 * np.pi * frequency
     sine: Array = w ** order * np.sin(w * times + 0.3 + 0.5 * np.pi * order)[:, None]
     return sine + 1.0 if not order else sine
@@ -71,19 +71,19 @@ def test_filters_give_derivatives_without_phase(frequency: float) -> None:
     assert np.abs(late - wave(frequency, 0, INNER + 3e-3)).max() < 1e-3
 
 
-def test_filters_stop_what_is_above_the_band() -> None:
+def test_filters_remove_frequencies_above_the_band() -> None:
     assert np.abs(convolved(wave(40.0) - 1.0, FILTER.taps())).max() < 1e-3
 
 
 @pytest.mark.parametrize('step', [1, 7, 25])
-def test_a_lower_rate_is_every_so_many_th_sample(step: int) -> None:
+def test_decimation_keeps_every_nth_filtered_sample(step: int) -> None:
     signal = rng(1).normal(size=(1500, 2, 3))
     whole = convolved(signal.reshape(1500, -1), FILTER.taps())[::step]
     np.testing.assert_allclose(decimated(signal, FILTER.taps(), step).reshape(len(whole), -1),
                                whole, atol=1e-12)
 
 
-def test_white_noise_is_told_from_the_signal() -> None:
+def test_white_noise_is_separated_from_the_signal() -> None:
     noisy = wave(2.0) + 1e-5 * rng(2).normal(size=(4000, 1))
     assert white_deviation(noisy)[0] == pytest.approx(1e-5, rel=0.05)
 
@@ -111,7 +111,7 @@ def test_uneven_stamps_are_interpolated_and_wild_values_replaced() -> None:
     noisy = exact + 1e-5 * random.normal(size=exact.shape)
     spoiled = noisy.copy()
     spoiled[1000, 2] += 0.5
-    spoiled[2000:, 4] += 0.1  # a step is none
+    spoiled[2000:, 4] += 0.1  # a step is not an outlier
     stamps = np.round(times * 1e9).astype(np.int64) + 10 ** 12
     window = uniform(Signal(stamps, spoiled), Signal(stamps, noisy), PERIOD, False)
     assert window is not None
@@ -153,7 +153,7 @@ def test_forces_under_a_turned_gravity_are_those_of_the_hexapod_with_it() -> Non
     assert turned['gravity'][2] > GIVEN['gravity'][2] + 1.0
     forces = StewartPlatform(turned).inverse_dynamics(motion).forces
     np.testing.assert_allclose(regressor @ u.theta(values) + known, forces, rtol=1e-9, atol=1e-9)
-    # To first order about the library's columns.
+    # The library's columns are the first-order approximation.
     columns = regressor @ u.derivative(u.start)
     matrix = StewartPlatform(GIVEN).regressor(motion, tilt=True).matrix
     np.testing.assert_allclose(columns[..., -2:], matrix[..., -2:], rtol=1e-9, atol=1e-7)
@@ -169,7 +169,7 @@ def test_gravity_turns_about_the_axes_across_it() -> None:
         atol=5e-3)
 
 
-def test_what_is_no_body_becomes_the_nearest_one() -> None:
+def test_an_impossible_body_becomes_the_nearest_possible_one() -> None:
     u = Unknowns(GIVEN)
     values = u.start.copy()
     values[4:10] = [1.0, 0.0, 0.0, 1.0, 0.0, 5.0]  # one moment larger than the sum of the others
@@ -181,7 +181,7 @@ def test_what_is_no_body_becomes_the_nearest_one() -> None:
     assert found[12] == 0.0
     assert set(beyond) == {*u.names[:10], u.names[12]}
     np.testing.assert_allclose(found[[0, 1, 2, 3]], values[[0, 1, 2, 3]], rtol=1e-3, atol=1e-4)
-    # all three moments give way
+    # all three moments are changed
     assert found[4] > 1.0 and found[7] > 1.0 and found[9] < 5.0
     u.parameters(found)
 

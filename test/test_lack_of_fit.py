@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Notices of what the model lacks: a small part of benchmarks/lack_of_fit.py."""
+"""Notices of a lack of fit: a small part of benchmarks/lack_of_fit.py."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
     assert result['lack_of_fit']['cause'] in right
     assert result_text(result).startswith('LACK OF FIT: the residuals are more than noise: likely')
     if cause in ('saturation', 'two payloads in two bags', 'payload of 2 to 6 kg drops'):
-        return  # no true values of the whole time
+        return  # true values do not hold for the whole recording
     off = np.abs(found.fit.values - Unknowns(case.true).start)
     half = TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))
     narrow, given = off < half, [each['interval'] for each in result['parameters']]
@@ -64,7 +64,7 @@ def test_a_right_model_gives_no_notice(seed: int) -> None:
     assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
 
 
-def test_what_is_asked_for_is_no_lack_of_fit() -> None:
+def test_identified_offsets_are_no_lack_of_fit() -> None:
     case = CAUSES['offsets of 20 N RMS'][0](true_hexapod(1), rng(1001))
     kinds = ('platform', 'friction', 'offset')
     assert identify(simulated(case, 1), GIVEN, kinds).lack_of_fit is None
@@ -91,7 +91,7 @@ def test_longer_delays_are_a_likely_mistake(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize(('velocity', 'said'), [(1e-3, False), (2.0, True)])
-def test_rates_inside_the_band_of_coulomb_friction_are_said(velocity: float, said: bool) -> None:
+def test_rates_inside_the_coulomb_friction_band_are_reported(velocity: float, said: bool) -> None:
     band = {'actuator.coulomb_velocity': velocity}
     case = Case(true_hexapod(2).replaced(band))
     (bag,) = identify(simulated(case, 2), GIVEN.replaced(band)).bags

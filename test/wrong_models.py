@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Hexapods that a parameter file does not describe, and what is identified from their legs."""
+"""Hexapods that differ from their parameter file, and the identification of their parameters."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ Array = NDArray[np.float64]
 
 GIVEN = Parameters.from_yaml(ROOT / 'config' / 'platform.yaml')
 RATE, SECONDS = 250.0, 20.0
-# Of 250 samples per second, each the mean of four at 1 kHz.
+# Noise at 250 samples per second, each the mean of four at 1 kHz.
 NOISE = Noise(length=5e-6, rate=5e-4, effort=2.5, coloured=2.0, delay=3e-3)
 RIGHT = 'right model'
 
 
 class Case(NamedTuple):
-    """A true hexapod: its parameters, what happens to its forces, and a later payload."""
+    """A true hexapod: its parameters, the disturbance of its forces, and a later payload."""
 
     true: Parameters
     forces: Callable[[Array, Array], Array] = lambda forces, rates: forces
@@ -51,7 +51,7 @@ class Case(NamedTuple):
 
 
 def true_hexapod(seed: int) -> Parameters:
-    """Return a hexapod with another payload and friction than the file's."""
+    """Return a hexapod whose payload and friction differ from the file's."""
     random = rng(seed)
     mass = GIVEN['platform.mass'] * random.uniform(0.9, 1.3)
     return GIVEN.replaced({
@@ -178,7 +178,7 @@ def simulated(case: Case, seed: int) -> list[Recorded]:
 
 def identify(bags: Sequence[Recorded], given: Parameters = GIVEN,
              kinds: Sequence[str] = DEFAULT) -> Identified:
-    """Return what the recordings of one hexapod give."""
+    """Return the identification from the recordings of one hexapod."""
     with closing(Identification(given, Options(kinds=tuple(kinds), hold_out=0.0))) as work:
         for n, each in enumerate(bags):
             work.add(Path(f'bag {n}'), [Window(

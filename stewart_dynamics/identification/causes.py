@@ -42,13 +42,13 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Times at which a payload may change, as parts of all samples.
+# Times at which a payload may change, as fractions of all samples.
 _CHANGES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
-# Largest number of bags at whose begin a payload may change, besides.
+# Payload changes between bags are tested as well, up to this number of bags.
 _MOST_BAGS = 6
-# Predicted forces above this part of the largest effort may be cut off by saturation.
+# Predicted forces above this fraction of the largest effort may be cut off by saturation.
 _SATURATED = 0.97
-# Step of the finite differences by a joint or a zero length, in sizes of the platform.
+# Finite-difference step of joint coordinates and zero lengths, relative to the platform's size.
 _STEP = 1e-4
 UNKNOWN, BLUR = 'unknown', 'blur'
 
@@ -57,15 +57,15 @@ class Cause(NamedTuple):
     """A possible cause of a lack of fit."""
 
     what: str
-    """One word for programs."""
+    """Keyword for programs."""
     places: Integers
-    """Its columns."""
+    """Indices of its columns."""
     text: str
     """Description; ``{}`` stands for the amounts."""
     factor: float = 1.0
-    """Unit of the text, in units of the amounts."""
+    """Factor from the amounts to the unit of the text."""
     measure: Callable[[Array], Any] = np.asarray
-    """What of the amounts (k,) the text gives."""
+    """Function from the amounts (k,) to the values in the text."""
 
     def described(self, amounts: Array) -> str:
         """Return the description with the amounts (k,) of the columns."""
@@ -81,19 +81,19 @@ class Causes:
     Parameters
     ----------
     platform : StewartPlatform
-        With the parameters of the file.
+        Hexapod with the parameters of the file.
     unknowns : Unknowns
         Unknowns of the fit.
     fit : Fit
-        The result.
+        Result of the fit.
     samples : int
         Number of samples of all blocks.
     bag_starts : sequence of float
-        Part of all samples before each bag but the first.
+        Fraction of all samples before each bag except the first.
     largest : float
         Largest effort [N].
     geometry : bool
-        With joints and zero lengths, which take longer.
+        Whether joints and zero lengths are tested as well, which takes longer.
 
     """
 
@@ -174,13 +174,13 @@ class Causes:
                 yield f'{end}_joint', self._by_joint(block, poses, end)
 
     def _by_geometry(self, block: Block, poses: Pose) -> Array:
-        """Return the derivative of the forces by each zero length, (N, 6, 6) [N/m]."""
+        """Return the derivative of the forces with respect to zero lengths, (N, 6, 6) [N/m]."""
         step = _STEP * self._size
         return np.stack([self._difference(self._platform, block, poses, change, step)
                          for change in step * np.eye(6)], axis=-1)
 
     def _by_joint(self, block: Block, poses: Pose, end: str) -> Array:
-        """Return the derivative of the forces by joint coordinates, (N, 6, 18) [N/m]."""
+        """Return the derivative with respect to joint coordinates, (N, 6, 18) [N/m]."""
         p, step = self._platform.parameters, _STEP * self._size
         name = f'geometry.{end}_joints'
         found = []
@@ -254,13 +254,13 @@ class Causes:
 
 
 def _mass(amounts: Array) -> Array:
-    """Return the change of the mass by its amounts at one or two times, with first moments."""
+    """Return the mass change from amounts (mass, first moments) at one or two times."""
     mass: Array = amounts[::4].sum()
     return mass
 
 
 def _by_leg(values: Array) -> Array:
-    """Return columns (N, 6, 6 k) of values (N, 6, k), for each value one of each leg."""
+    """Return columns (N, 6, 6 k) of values (N, 6, k): one column per value and leg."""
     columns = np.zeros((len(values), 6, values.shape[-1], 6))
     for leg in range(6):
         columns[:, leg, :, leg] = values[:, leg]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The columns of the regression: forces by what they are linear in, and those that are known."""
+"""Regression columns: the regressor of the linear parameters, and the known forces."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def regression(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> tu
     Parameters
     ----------
     platform : StewartPlatform
-        With the parameters of the file.
+        Hexapod with the parameters of the file.
     unknowns : Unknowns
-        What is asked for.
+        Parameters to be identified.
     rows : (N, MOTION)
-        Of motion.
+        Rows of motion.
 
     """
     matrix, fixed = platform.regressors(rows), unknowns.fixed

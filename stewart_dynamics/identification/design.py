@@ -13,16 +13,16 @@
 # limitations under the License.
 
 """
-A motion that makes the intervals of an identification small, within the limits of the hexapod.
+Design of a motion that minimizes identification intervals within the limits of the hexapod.
 
-A Fourier series of all six coordinates about home (``reference_motion.motion``), whose
-coefficients minimize the sum of the squared standard errors of what is asked for, each by the
-change that would matter (A-optimal; J. Swevers et al., "Optimal robot excitation and
+The motion is a Fourier series of all six coordinates about home (``reference_motion.motion``).
+Its coefficients minimize the sum of the squared standard errors of the requested parameters, each
+divided by its scale (A-optimal; J. Swevers et al., "Optimal robot excitation and
 identification", IEEE Trans. Robotics and Automation 13, 1997, doi:10.1109/70.631234). Every set of
-coefficients is taken as large as the limits allow, so that only their proportions are sought:
-with an evolution strategy that adapts the spread of each of them (R. Ros, N. Hansen, "A simple
+coefficients is scaled up to the limits, so that only their ratios are searched, with an
+evolution strategy that adapts the spread of each coefficient (R. Ros, N. Hansen, "A simple
 modification in CMA-ES achieving linear time and space complexity", PPSN X, 2008,
-doi:10.1007/978-3-540-87700-4_30), from the seed alone.
+doi:10.1007/978-3-540-87700-4_30). The result depends on the seed only.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
-# Samples in a period of the highest harmonic, and in each of the final check.
+# Samples per period of the highest harmonic: in the search, and in the final check.
 _SAMPLES, _FINE_SAMPLES = 20, 100
-# A little of a parameter that a motion does not tell at all: its standard error, by its scale.
+# Standard error of an unidentifiable parameter, relative to its scale.
 _NOT_TOLD = 100.0
-# Scalings of a motion to its limits, before it is judged and at the end.
+# Number of iterations that scale a motion to its limits: in the search, and at the end.
 _SCALINGS, _LAST_SCALINGS = 2, 30
 _CLOSE = 1e-3
 # Digits of coefficients in a file [m, rad].
@@ -64,13 +64,13 @@ class Design(NamedTuple):
     Attributes
     ----------
     trajectory : ReferenceMotionParameters
-        For stewart_trajectory.
+        Parameters for stewart_trajectory.
     unknowns : Unknowns
-        What it is to tell.
+        Parameters to be identified.
     half_widths : (k,)
         Predicted 95 % intervals of the unknowns, for white noise in the efforts.
     use : dict of str to float
-        Part of each limit that it uses.
+        Fraction of each limit that the motion uses.
 
     """
 
@@ -83,16 +83,16 @@ class Design(NamedTuple):
 def design(parameters: Parameters, options: DesignOptions,
            progress: Callable[[int], object] = lambda done: None) -> Design:
     """
-    Return a motion that tells what is asked for, and its predicted intervals.
+    Return a motion from which the parameters are identifiable, and its predicted intervals.
 
     The same parameters, options and seed give the same motion.
 
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod as far as they are known; its limits.
+        Known or estimated parameters of the hexapod, and its limits.
     options : DesignOptions
-        What is asked for, and how the motion is to be.
+        Parameters to be identified, and settings of the motion.
     progress : callable
         Called with the number of generations done.
 
@@ -101,7 +101,7 @@ def design(parameters: Parameters, options: DesignOptions,
     ParameterError
         A limit is missing, or home is not within the limits.
     StewartError
-        No motion tells all that is asked for.
+        A requested parameter is not identifiable from any motion.
 
     """
     search = _Search(parameters, options)
@@ -120,7 +120,7 @@ def design(parameters: Parameters, options: DesignOptions,
 
 
 def fine_times(options: DesignOptions) -> Array:
-    """Return the times of the final check [s]: all of the motion."""
+    """Return the times of the final check [s], which cover the whole motion."""
     many = math.ceil(options.duration * options.frequency * _FINE_SAMPLES)
     return np.arange(many + 1, dtype=np.float64) * (options.duration / many)
 
@@ -128,9 +128,9 @@ def fine_times(options: DesignOptions) -> Array:
 def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion: Motion,
                           seconds: float, options: DesignOptions) -> Array:
     """
-    Return the half widths (k,) of the 95 % intervals that a motion of so many seconds gives.
+    Return the half widths (k,) of the 95 % intervals for a motion of the given duration [s].
 
-    For efforts with white noise alone; nan where the motion tells nothing of a parameter.
+    Assumes white noise in the efforts alone; unidentifiable parameters get very wide intervals.
     """
     columns = columns_of(platform, unknowns, motion.rows.reshape(-1, 24))
     per_sample = columns.reshape(-1, columns.shape[-1])
@@ -145,14 +145,14 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
 
 
 def columns_of(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> Array:
-    """Return how efforts (N, 6) change with the unknowns, (N, 6, k), of rows of motion."""
+    """Return the derivative of the efforts with respect to the unknowns, (N, 6, k)."""
     regressor, _ = regression(platform, unknowns, rows)
     columns: Array = regressor @ unknowns.derivative(unknowns.start)
     return columns
 
 
 class _Search:
-    """The cost of proportions of coefficients."""
+    """Cost function of the search over ratios of coefficients."""
 
     def __init__(self, parameters: Parameters, options: DesignOptions) -> None:
         self._options = options
@@ -166,17 +166,17 @@ class _Search:
         angle = 2.0 * np.pi * turns[:, None] * np.arange(1, many + 1)
         omega = 2.0 * np.pi * self._base * np.arange(1, many + 1)
         c, s = np.cos(angle), np.sin(angle)
-        # Of cosine and sine coefficients: position, velocity, acceleration of each sample.
+        # Position, velocity and acceleration of each sample by cosine and sine coefficients.
         self._bases = (np.hstack([c, s]), np.hstack([-omega * s, omega * c]),
                        np.hstack([-omega ** 2 * c, -omega ** 2 * s]))
-        # Proportions of one are of one velocity, and of one displacement at the joints.
+        # Equal ratios give equal velocities, and equal displacements at the joints.
         size = parameters['singularity.characteristic_length']
         self._units = (1.0 / np.tile(np.arange(1, many + 1), 2)[:, None]
                        / np.array([1.0, 1.0, 1.0, size, size, size]))
         self._first = 0.02 * size
 
     def costs(self, proportions: Array) -> Array:
-        """Return the cost (M,) of proportions (M, size)."""
+        """Return the cost (M,) of coefficient ratios (M, size)."""
         coefficients = proportions.reshape(len(proportions), -1, 6) * self._units
         coefficients *= self._first / np.abs(coefficients).max(axis=(1, 2), keepdims=True)
         for _ in range(_SCALINGS):
@@ -191,12 +191,12 @@ class _Search:
             / self._options.noise ** 2)
         information += np.eye(information.shape[-1]) / _NOT_TOLD ** 2
         variances = np.trace(np.linalg.inv(information), axis1=1, axis2=2)
-        # Information grows with the square of the amplitude: what is too large costs that.
+        # Information grows with the square of the amplitude; excess amplitude costs as much.
         cost: Array = np.log(variances) + 2.0 * np.abs(np.log(np.maximum(excess, 0.2)))
         return np.where(np.isfinite(cost), cost, np.inf)
 
     def _rows(self, coefficients: Array) -> Array:
-        """Return rows of motion (M, N, MOTION) of one period, of coefficients (M, 2 n, 6)."""
+        """Return rows of motion (M, N, MOTION) of one period for coefficients (M, 2 n, 6)."""
         pose, rate, acceleration = (base @ coefficients for base in self._bases)
         pose = self.limits.center + pose
         rows: Array = Motion.from_euler(
@@ -205,7 +205,7 @@ class _Search:
         return rows
 
     def trajectory(self, proportions: Array) -> ReferenceMotionParameters:
-        """Return the motion of these proportions, as large as the limits allow at any time."""
+        """Return the motion with these ratios, as large as the limits allow."""
         coefficients = proportions.reshape(-1, 6) * self._units
         coefficients *= self._first / np.abs(coefficients).max()
         times = fine_times(self._options)
@@ -232,14 +232,14 @@ class _Search:
 
 def _evolution(costs: Callable[[Array], Array], size: int, options: DesignOptions,
                progress: Callable[[int], object]) -> Array:
-    """Return the best proportions that an evolution strategy with adapted spreads finds."""
+    """Return the best ratios found by an evolution strategy with adapted spreads."""
     random = np.random.default_rng(options.seed)
     many = 4 + int(3.0 * math.log(size))
     parents = many // 2
     weights = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
     weights /= weights.sum()
     effective = 1.0 / float(np.sum(weights ** 2))
-    # Hansen's constants; those of the covariance for a diagonal one.
+    # Hansen's constants, with those for a diagonal covariance matrix.
     c_step = (effective + 2.0) / (size + effective + 5.0)
     damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (size + 1.0)) - 1.0) + c_step
     c_path = (4.0 + effective / size) / (size + 4.0 + 2.0 * effective / size)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``stewart_identify --design``: its options, the parameter file it writes, what it prints."""
+"""``stewart_identify --design``: options, parameter file and terminal output."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TRAJECTORY = 'trajectory.yaml'
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a design, without those that every run has."""
+    """Add the options that only a design has."""
     default = DesignOptions()
     group = parser.add_argument_group('design of a motion (--design)')
     group.add_argument('--design', action='store_true',
@@ -122,14 +122,14 @@ def _head(designed: Design, asked: DesignOptions) -> Iterator[str]:
 
 
 def _lines(designed: Design, asked: DesignOptions) -> Iterator[str]:
-    """Yield the lines for the terminal: legs by their worst."""
+    """Yield the lines for the terminal; of the six legs the widest interval is shown."""
     yield (f'predicted 95 % intervals: {asked.duration:g} s, white noise of {asked.noise:g} N in '
            f'efforts at {asked.rate:g} Hz')
     unknowns = designed.unknowns
     of_legs: dict[str, tuple[float, str]] = {}
     for n, (name, unit, half) in enumerate(zip(
             unknowns.names, unknowns.units, designed.half_widths, strict=True)):
-        if n in unknowns.legs:  # its name ends with that of the leg
+        if n in unknowns.legs:  # the name of a leg parameter ends with the name of the leg
             name = name.rpartition('.')[0]
         of_legs[name] = max(of_legs.get(name, (0.0, unit)), (float(half), unit))
     for name, (half, unit) in of_legs.items():

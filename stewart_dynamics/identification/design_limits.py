@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How much of its limits a hexapod uses in a motion that is being designed."""
+"""Use of the hexapod's limits by a motion that is being designed."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, FORCES, LENGTHS, MOTION, POSE, POSITION, RATES, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Parts that stay free: of the stroke at each end, of rates, forces and joint angles. The masses
+# Margins, as fractions of the stroke (at each end), rates, forces and joint angles: the masses
 # are not known yet, and a controller overshoots.
 _STROKE, _RATE, _FORCE, _ANGLE = 0.02, 0.1, 0.2, 0.1
-# The condition number at most, by singularity.warn_condition.
+# Largest condition number, relative to singularity.warn_condition.
 _CONDITION = 0.5
 
 
@@ -47,10 +47,10 @@ class DesignLimits:
     platform : StewartPlatform
         The hexapod.
     amplitude : float, optional
-        Displacement of the origin at most [m], of turns by the characteristic length; with it
-        limits may be missing.
+        Largest displacement of the origin [m]; rotations are limited to it divided by the
+        characteristic length. If it is given, limits may be missing.
     center : six numbers, optional
-        X Y Z alpha beta gamma of the center [m, rad]; by default home.
+        X Y Z alpha beta gamma of the center [m, rad]; home by default.
 
     Raises
     ------
@@ -104,16 +104,16 @@ class DesignLimits:
 
     def excess(self, rows: Array) -> Array:
         """
-        Return how much of what is free the motions use, of rows (M, N, MOTION): 1 is all of it.
+        Return the fraction of the free range that motions (M, N, MOTION) use; 1 is all of it.
 
-        Beyond a singularity, or where numbers overflow, it is a large number.
+        The value is large beyond a singularity, or if numbers overflow.
         """
         parts = np.array(list(self._parts(rows).values()))
         worst: Array = np.where(np.isfinite(parts), parts, 10.0).max(axis=0)
         return np.minimum(worst, 10.0)
 
     def use(self, motion: Motion) -> dict[str, float]:
-        """Return the part of each limit, with its margin, that a motion (N,) uses."""
+        """Return the fraction of each limit, less its margin, that a motion (N,) uses."""
         return {name: float(part[0]) for name, part in self._parts(motion.rows[None]).items()
                 if part[0] > 0.0}
 

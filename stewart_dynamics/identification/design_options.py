@@ -25,19 +25,19 @@ class DesignOptions(NamedTuple):
     """Options of a design."""
 
     kinds: tuple[str, ...] = DEFAULT
-    """What is to be identified, of ``unknowns.KINDS``."""
+    """Parameters to be identified, from ``unknowns.KINDS``."""
     duration: float = 60.0
-    """[s]"""
+    """Duration of the motion [s]."""
     frequency: float = 2.0
-    """Of the highest harmonic [Hz]."""
+    """Frequency of the highest harmonic [Hz]."""
     harmonics: int = 10
     amplitude: float | None = None
-    """Displacement of the platform's origin at most [m]; turns: by the characteristic length."""
+    """Largest displacement [m]; rotations: divided by the characteristic length."""
     center: tuple[float, ...] | None = None
-    """X Y Z alpha beta gamma about which it moves [m, rad]; None: home."""
+    """Center of the motion, X Y Z alpha beta gamma [m, rad]; None: home."""
     noise: float = 5.0
     """Standard deviation of the efforts [N], for the predicted intervals."""
     rate: float = 500.0
-    """Of setpoints and of measured efforts [Hz]."""
+    """Rate of setpoints and measured efforts [Hz]."""
     generations: int = 400
     seed: int = 0

@@ -13,15 +13,15 @@
 # limitations under the License.
 
 """
-From a window of recorded legs to regressor and efforts, filtered alike and at a lower rate.
+Extraction of regressor and efforts from a window of recorded legs, filtered and decimated.
 
-Lengths are filtered with a wide band and differentiated, forward kinematics and J_inv make the
-motion of it, and the regressor is computed at the full rate. Then the same narrow low-pass filter
-takes the regressor and the efforts to a lower rate: as f = Y theta holds before, it holds after.
+Lengths are filtered with a wide band and differentiated, forward kinematics and J_inv give the
+motion, and the regressor is computed at the full rate. Then the same narrow low-pass filter
+decimates regressor and efforts: f = Y theta holds for the filtered signals as well.
 (Gautier, Venture: "Identification of standard dynamic parameters of robots with positive definite
 inertia matrix", IROS 2013, doi:10.1109/IROS.2013.6697198, section V.)
 
-Efforts are kept with their first derivatives, so that a delay shifts them later.
+Efforts are stored with their first derivatives, so that a delay can be applied to them later.
 """
 
 from __future__ import annotations
@@ -40,70 +40,71 @@ from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# The wide band, by the narrow one; and samples for each period of the narrow cut-off.
+# Wide cut-off relative to the narrow one; samples per period of the narrow cut-off.
 WIDE, SAMPLES = 2.5, 4.0
-# The transition of both, by the narrow cut-off.
+# Transition width of both filters, relative to the narrow cut-off.
 _TRANSITION = 1.0
 ORDERS = 4
-"""Efforts and so many of their derivatives less one."""
-# Of the limits [m]: nearer to them an end stop may be touched. Of force_max, as a part.
+"""Number of columns of an effort: its value and its first ORDERS - 1 derivatives."""
+# Distance from a length limit within which an end stop may be touched [m]; fraction of force_max
+# above which an effort may be saturated.
 _STOP, _SATURATED = 5e-5, 0.999
-# Lags are tried in steps of this part of a period of the cut-off; the residual squares must become
-# smaller by this.
+# Lags are tried in steps of this fraction of a cut-off period; a lag must reduce the squared
+# residuals to this fraction.
 _LAG_STEP, _LESS = 0.05, 0.8
-# Samples of which the regressor is computed at once.
+# Number of samples for which the regressor is computed at once.
 _TOGETHER = 4096
-# Rates at which Stribeck friction may have fallen to 1/e, in RMS rates of the first window; and
-# in changes of the rate from one sample to the next, which blur the reversals.
+# Rates at which Stribeck friction may have fallen to 1/e, relative to the RMS rate of the first
+# window, and at least this multiple of the rate that blurs reversals between samples.
 _STRIBECK, _BLURRED = (0.1, 0.3), 6.0
 BLURS = (1.0, 3.0)
 SLIP = 1 + len(BLURS) + len(_STRIBECK)
-"""Shapes of friction over the rate: its sign, the blur of reversals, Stribeck friction."""
+"""Number of friction shapes over the rate: sign, blur of reversals, Stribeck friction."""
 
 
 class Extract(NamedTuple):
     """Regressor and efforts of N samples, filtered and at a lower rate."""
 
     times: Array
-    """(N,) since the begin of the window [s]"""
+    """(N,) since the start of the window [s]"""
     regressor: Array
     """(N, 6, n) of ``Unknowns.theta``"""
     known: Array
     """(N, 6) force of all other parameters [N]"""
     efforts: Array
-    """(N, 6, ORDERS) and derivatives by time [N, N/s, ...]"""
+    """(N, 6, ORDERS) efforts and their time derivatives [N, N/s, ...]"""
     sound: Flags
-    """(N, 6) whether nothing is wrong with what went into it"""
+    """(N, 6) whether all samples that contribute to an effort are valid"""
     legs: Array
     """(N, 6, 3) length, rate and acceleration [m, m/s, m/s^2]"""
     slip: Array
     """(N, 6, SLIP) shapes of friction over the rate"""
     poses: Array
-    """(N, POSE) of the platform, near those of the lengths"""
+    """(N, POSE) platform poses at the output times, guesses for forward kinematics"""
     deviations: tuple[float, float]
-    """Of the white noise of lengths [m] and of rates [m/s]; nan: none are measured."""
+    """Standard deviations of the white noise of lengths [m] and rates [m/s]; nan: no rates."""
     stops: int
-    """Recorded samples at an end stop or a force limit."""
+    """Number of recorded samples at an end stop or a force limit."""
     end: Pose
-    """The last pose."""
+    """Last pose."""
 
 
 class Extraction:
     """
-    Makes extracts of windows.
+    Computes the extracts of windows.
 
     Parameters
     ----------
     platform : StewartPlatform
-        With the parameters of the file.
+        Hexapod with the parameters of the file.
     unknowns : Unknowns
-        What is asked for.
+        Parameters to be identified.
     period : float
-        Of the windows [s].
+        Sampling period of the windows [s].
     cutoff : float
-        Of the narrow band [Hz].
+        Cut-off frequency of the narrow band [Hz].
     speeds : tuple of float, optional
-        Rates of the shapes of friction [m/s]; by default they follow from the first window.
+        Rates of the friction shapes [m/s]; derived from the first window by default.
 
     """
 
@@ -115,7 +116,7 @@ class Extraction:
         self.cutoff, self.speeds = cutoff, speeds
         self.step = max(1, int(1.0 / (SAMPLES * cutoff * period)))
         self.margin = self._wide.half + self._narrow.half
-        """Samples at each end of a window that give no output."""
+        """Number of samples at each end of a window without an output."""
 
     def __call__(self, window: Window, guess: Pose, noise: np.random.Generator | None = None,
                  ) -> Extract:
@@ -127,9 +128,9 @@ class Extraction:
         window : Window
             Longer than twice the margin.
         guess : Pose
-            Near the first.
+            Pose near the first one.
         noise : Generator, optional
-            Add as much noise to lengths and rates as there is in them.
+            Add noise to lengths and rates, as large as the noise they contain.
 
         """
         deviations = self._deviations(window)
@@ -158,10 +159,10 @@ class Extraction:
 
     def lag(self, window: Window, guess: Pose, longest: float) -> int:
         """
-        Return by how many samples the efforts are later than the positions, roughly.
+        Return a coarse lag of the efforts behind the positions, in samples.
 
-        The lag of which the forces that fit leave least, in steps of a period of the high band;
-        0 unless it is much less than without a lag.
+        It is the lag with the smallest residual, in steps of a fraction of a cut-off period; 0
+        unless the residual is much smaller than without a lag.
         """
         extract = self(window, guess)
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
@@ -193,16 +194,16 @@ class Extraction:
         of_lengths = float(np.sqrt(np.mean(white_deviation(window.positions) ** 2)))
         if window.rates is None:
             return of_lengths, float('nan')
-        # Whatever rates are off the derivative of the lengths by is noise, a wrong unit as well.
+        # Any deviation of rates from differentiated lengths counts as noise, even a wrong unit.
         smooth = self._wide.taps(1), self._wide.taps()
         off = convolved(window.rates, smooth[1]) - convolved(window.positions, smooth[0])
-        in_band = np.sqrt(2.0 * WIDE / SAMPLES / self.step)  # of white noise, what the band keeps
+        in_band = np.sqrt(2.0 * WIDE / SAMPLES / self.step)  # fraction of white noise in the band
         white = float(np.sqrt(np.mean(white_deviation(window.rates) ** 2)))
         return of_lengths, max(white, float(np.sqrt(np.mean(off ** 2))) / max(in_band, 1e-3), 1e-9)
 
     def _filtered(self, window: Window, deviations: tuple[float, float],
                   noise: np.random.Generator | None) -> tuple[Array, Array, Array]:
-        """Return lengths, rates and accelerations of the legs, without a margin."""
+        """Return lengths, rates and accelerations of the legs, without the margin."""
         positions, rates = window.positions, window.rates
         positions = positions + self.platform.parameters['geometry.zero_length']
         if noise is not None:
@@ -220,10 +221,10 @@ class Extraction:
         return derivatives[0], derivatives[1], derivatives[2]
 
     def _decimated(self, rows: Array) -> tuple[Array, Array]:
-        """Return the regressor and the known forces of rows of motion, at the lower rate."""
+        """Return the decimated regressor and known forces of rows of motion."""
         taps = self._narrow.taps()
         parts, known = [], []
-        # A part begins where the next output does.
+        # Each part begins at the input of its first output.
         stride = max(1, _TOGETHER // self.step) * self.step
         last = len(rows) - len(taps)
         for first in range(0, last + 1, stride):
@@ -235,7 +236,7 @@ class Extraction:
         return np.concatenate(parts), np.concatenate(known)
 
     def _wrong(self, window: Window) -> tuple[Flags, int]:
-        """Return which outputs (N, 6) a wrong sample went into, and how many are at a stop."""
+        """Return outputs (N, 6) affected by invalid samples, and the count of samples at stops."""
         p = self.platform.parameters
         lengths = window.positions + p['geometry.zero_length']
         stopped = np.zeros(lengths.shape, dtype=bool)
@@ -245,7 +246,7 @@ class Extraction:
         if p['limits.force_max'] is not None:
             stopped |= np.abs(window.efforts) > _SATURATED * p['limits.force_max']
         bad = (window.outliers | stopped)[self._wide.half:-self._wide.half]
-        # Two half waves of the cut-off: what is farther has a small part in the output.
+        # Two half waves of the cut-off: samples farther away have little weight in the output.
         reach = min(self._narrow.half, round(1.0 / (self._narrow.cutoff * self._period)))
         sums = np.cumsum(np.concatenate([np.zeros((1, 6)), bad]), axis=0)
         at = self._narrow.half + self.step * np.arange(

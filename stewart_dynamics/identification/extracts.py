@@ -27,12 +27,12 @@ from stewart_dynamics.identification.extraction import Extract
 
 
 class Block(NamedTuple):
-    """What the fit needs of one window, N samples."""
+    """Data of one window of N samples for the fit."""
 
     number: int
     bag: int
     times: Array
-    """(N,) since the begin of the bag [s]"""
+    """(N,) since the start of the bag [s]"""
     columns: Array
     """(N, 6, n + 1 + ORDERS): regressor, known force, effort and its derivatives"""
     sound: Flags
@@ -40,11 +40,11 @@ class Block(NamedTuple):
     legs: Array
     slip: Array
     poses: Array
-    """As in ``Extract``."""
+    """Legs, slip and poses as in ``Extract``."""
 
 
 class Extracts:
-    """Extracts in the order in which they were added; may be read many times."""
+    """Extracts in the order of addition; can be iterated over repeatedly."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()
@@ -62,7 +62,7 @@ class Extracts:
         self.samples += len(extract.times)
 
     def __iter__(self) -> Iterator[Block]:
-        """Read them."""
+        """Read the extracts from the file."""
         self._file.seek(0)
         for number, bag in enumerate(self._bags):
             yield Block(number, bag, *(np.load(self._file) for _ in range(6)))

@@ -15,13 +15,13 @@
 """
 Zero-phase filters of uniformly sampled signals, as symmetric FIR filters.
 
-Three of them take positions, and rates where they are measured, to positions, rates and
-accelerations of the same low-pass band. Where both are there, each frequency takes them by their
-noise: positions of white noise s_q give rates of noise w s_q, which is less than that of the rates
-s_v below w = s_v / s_q (Wiener's weights). Another takes any signal to a lower rate.
+Three filters convert positions, and measured rates if available, into positions, rates and
+accelerations of the same low-pass band. If both are available, they are weighted by their noise at
+each frequency: positions with white noise s_q give rates with noise w s_q, which is less than the
+noise s_v of the rates below w = s_v / s_q (Wiener weights). A fourth filter decimates any signal.
 
-The output at a time needs the input half a filter before and after it, and nothing else: so what
-is wrong with a sample spoils no more than that, and windows can be filtered one by one.
+An output depends only on the input within half a filter length before and after it: an invalid
+sample affects no other outputs, and windows can be filtered one by one.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 
-# Of Blackman's window: the width between its first zeros, in periods of its length.
+# Width of the Blackman window's main lobe between its first zeros, times the window length.
 _TRANSITION = 5.5
 
 
 class LowPass(NamedTuple):
     """
-    A low-pass filter of a sampling period.
+    A low-pass filter for a sampling period.
 
     Attributes
     ----------
     period : float
-        [s]
+        Sampling period [s].
     cutoff : float
-        Where the amplitude is a half [Hz].
+        Frequency at which the amplitude is one half [Hz].
     half : int
-        Samples before and after that an output needs.
+        Number of samples before and after an output on which it depends.
 
     """
 
@@ -59,25 +59,25 @@ class LowPass(NamedTuple):
 
     @classmethod
     def of(cls, period: float, cutoff: float, transition: float) -> LowPass:
-        """Return a filter whose amplitude falls from 1 to 0 in a band of some width [Hz]."""
+        """Return a filter whose amplitude falls from 1 to 0 over a transition width [Hz]."""
         return cls(period, cutoff, math.ceil(0.5 * _TRANSITION / (transition * period)))
 
     def taps(self, order: int = 0, delay: float = 0.0) -> Array:
         """
-        Return the filter's numbers (2 half + 1,), the newest sample last.
+        Return the filter coefficients, shape (2 half + 1,), the newest sample last.
 
         Parameters
         ----------
         order : int
-            Of the derivative that it gives.
+            Order of the derivative.
         delay : float
-            The output is that of a time later by this [s]; less than a tenth of the filter.
+            The output belongs to a time later by this [s]; less than a tenth of the filter.
 
         """
         return self._sampled(lambda w: (1j * w) ** order * np.exp(1j * w * delay))
 
     def fused(self, order: int, deviation: float, rate_deviation: float) -> tuple[Array, Array]:
-        """Return the numbers for positions and for rates, by their standard deviations."""
+        """Return the taps for positions and for rates, given their standard deviations."""
         def of_positions(w: Array) -> Any:
             return rate_deviation ** 2 / (rate_deviation ** 2 + (w * deviation) ** 2)
 
@@ -88,8 +88,8 @@ class LowPass(NamedTuple):
                 self._sampled(lambda w: (1j * w) ** order * of_rates(w)))
 
     def _sampled(self, response: Callable[[Array], Any]) -> Array:
-        """Return the numbers of the low-pass filter times a response at frequencies [rad/s]."""
-        # A finite pulse, whose derivatives end where it ends.
+        """Return the taps of the low-pass filter times a frequency response."""
+        # A pulse of finite length has derivatives of the same length.
         lags = np.arange(-self.half, self.half + 1)
         pulse = 2.0 * self.cutoff * self.period * np.sinc(2.0 * self.cutoff * self.period * lags)
         pulse *= np.blackman(2 * self.half + 3)[1:-1]
@@ -101,11 +101,11 @@ class LowPass(NamedTuple):
         impulse = np.fft.irfft(np.fft.rfft(circle) * response(w), many)
         # y(t) = sum h(k) x(t - k): the newest sample, k = -half, last
         taps: Array = impulse[lags[::-1]]
-        # What is cut off at its ends must change nothing of slow signals: exact at 0 and at a low
-        # frequency, by parts of the pulse and of its differences.
+        # Truncation must not affect slow signals: make the response exact at 0 and at a low
+        # frequency by adding multiples of the pulse and of its differences.
         low = 0.05 * 2.0 * np.pi * self.cutoff
         parts = np.column_stack([pulse, np.gradient(pulse), np.gradient(np.gradient(pulse))])
-        wave = np.exp(1j * low * self.period * lags)  # as the taps stand: the newest last
+        wave = np.exp(1j * low * self.period * lags)  # in the order of the taps: the newest last
         should, is_now = response(np.array([0.0, low])), np.array([taps.sum(), taps @ wave])
         of_parts = np.array([parts.sum(axis=0), wave @ parts])
         system = np.array([of_parts[0].real, of_parts[1].real, of_parts[1].imag])
@@ -115,7 +115,7 @@ class LowPass(NamedTuple):
 
 
 def convolved(signal: Array, taps: Array) -> Array:
-    """Return a filtered signal (N, k), without the half filter at each end."""
+    """Return the filtered signal (N, k), shorter by half a filter at each end."""
     many = len(signal) - len(taps) + 1
     size = 1 << (len(signal) - 1).bit_length()
     spectrum = np.fft.rfft(signal, size, axis=0) * np.fft.rfft(taps[::-1], size)[:, None]
@@ -124,7 +124,7 @@ def convolved(signal: Array, taps: Array) -> Array:
 
 
 def decimated(signal: Array, taps: Array, step: int) -> Array:
-    """Return every so many-th sample of the same (M, ...)."""
+    """Return every ``step``-th sample of the filtered signal (M, ...)."""
     many = (len(signal) - len(taps)) // step + 1
     blocks = -(-len(taps) // step)
     padded = np.zeros(blocks * step)
@@ -141,7 +141,7 @@ def decimated(signal: Array, taps: Array, step: int) -> Array:
 
 
 def white_deviation(signal: Array) -> Array:
-    """Return the standard deviation of the white noise in a smooth signal (N, k), by columns."""
-    # Fourth differences remove the signal; 1 4 6 4 1 have the sum of squares 70.
+    """Return the standard deviation of white noise in each column of a smooth signal (N, k)."""
+    # Fourth differences remove the signal; the squares of 1 4 6 4 1 add up to 70.
     deviations: Array = np.sqrt(np.mean(np.diff(signal, 4, axis=0) ** 2, axis=0) / 70.0)
     return deviations

@@ -15,10 +15,10 @@
 """
 Weighted least squares of the unknowns on the sums of the extracts.
 
-Gauss's and Newton's steps: forces are linear in theta, of which the platform's mass, center of
-mass and inertia are products; the delay of the efforts of each bag is found along with them and
-eliminated. The noise of each leg in each bag is that of its residuals. What the samples cannot
-tell keeps its value (``mechanics.least_squares``).
+Gauss-Newton steps: forces are linear in theta, whose elements for the platform are products of
+its mass, center of mass and inertia. The delay of the efforts of each bag is estimated jointly
+and eliminated. The noise of each leg in each bag is estimated from its residuals. Unidentifiable
+parameters keep their values (``mechanics.least_squares``).
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ from stewart_dynamics.mechanics.least_squares import (
 
 _STEPS = 30
 _DONE = 1e-10
-# Taylor's series of the delay hold up to this change in one step [s].
+# Largest change of the delay in one step for which its Taylor series is valid [s].
 LONGEST_DELAY = 0.02
-# The derivative of the efforts tells a delay if it is so many times that of noise, squared.
+# A delay is identifiable if the squared derivative of the efforts exceeds that of noise by this
+# factor.
 _TIMES_NOISE = 10.0
-# Unknowns of which less than this part is told are not told at all.
+# Unknowns whose identifiable share is smaller are reported as not identifiable.
 LEAST_TOLD = 0.1
 _HELD = 1e-6
-# Below this variance [N^2] efforts are exact.
+# Lower bound of the variance of exact efforts [N^2].
 _SMALLEST_VARIANCE = 1e-12
 
 
@@ -54,21 +55,21 @@ class Fit(NamedTuple):
     Attributes
     ----------
     values : (k,)
-        Of the unknowns.
+        Values of the unknowns.
     covariance : (k, k)
-        For white noise.
+        Covariance of the unknowns for white noise.
     delays : (B,)
-        Of the efforts of each bag [s], + later than the positions.
+        Delay of the efforts of each bag [s], + later than the positions.
     delay_errors : (B,)
-        Their standard errors, for white noise; 0 where the motion does not tell the delay.
+        Standard errors of the delays for white noise; 0: the delay is not identifiable.
     variances : (B, 6)
-        Of the residuals [N^2].
+        Variances of the residuals [N^2].
     identifiability : Identifiability
-        Of the unknowns.
+        Identifiability of the unknowns.
     matrix : (k, k)
-        Their information, delays eliminated.
+        Information matrix of the unknowns, delays eliminated.
     at_bound : tuple of str
-        What would be no body, or negative, without the bounds.
+        Names of parameters that would be inconsistent or negative without the bounds.
 
     """
 
@@ -90,24 +91,25 @@ def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float
     Parameters
     ----------
     sums : Sums
-        Of B bags.
+        Sums of B bags.
     unknowns : Unknowns
-        What is asked for, and its values in the file.
+        Parameters to be identified, with their values in the file.
     noise : (6, n, n), optional
-        The sums of the noise in the regressor alone.
+        Sums of the noise in the regressor alone.
     prior : float, optional
-        The file's values are as good as this part of the unknowns' scales: they count as well.
+        Standard error of the file's values as a fraction of the scales; by default they do not
+        count.
     cutoffs : (B,), optional
-        Of the filter of each bag [Hz]; find delays. By default they are zero.
+        Cut-off frequency of each bag [Hz], to estimate delays. By default delays are zero.
     largest_error : float
-        Of a direction that is known, see ``least_squares``.
+        Largest standard error of an identifiable direction, see ``least_squares``.
 
     """
     found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs, largest_error)
     not_told = found.identifiability.told < LEAST_TOLD
     if not not_told.any():
         return found
-    # What is hardly told is held at the file's value, not moved by what is told of it.
+    # Weakly identifiable parameters keep the value from the file.
     found = _fit(sums, unknowns, np.where(not_told, _HELD, 1.0) * unknowns.scales, noise, prior,
                  cutoffs, largest_error)
     return found._replace(values=np.where(not_told, unknowns.start, found.values))
@@ -132,7 +134,7 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
         solution = solve(information, unknowns.start, scales, of_noise, largest_error)
         change = solution.values - values
         largest = float(np.max(np.abs(change) / unknowns.scales, initial=0.0))
-        # A mass far from the file's: its products are linear in a part of the way only.
+        # Limit the step if the mass is far from the file's: its products are nonlinear.
         change *= min(1.0, 2.0 / largest) if largest > 0.0 else 1.0
         if unknowns.many_of_platform and values[0] + change[0] <= 0.0 and unknowns.names[0] == (
                 'platform.mass'):
@@ -156,7 +158,7 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
 
 
 def directions(unknowns: Unknowns, values: Array, delay: float, with_delay: bool = True) -> Array:
-    """Return the derivative of minus a residual by unknowns, then by the delay, (q, k + 1)."""
+    """Return the negative derivative of a residual by unknowns and delay, (q, k + 1)."""
     theta = unknowns.theta(values)
     by_delay = -delayed_by(theta, delay)
     columns = np.zeros((len(by_delay), len(values) + 1))
@@ -166,7 +168,7 @@ def directions(unknowns: Unknowns, values: Array, delay: float, with_delay: bool
 
 
 def without_delay(normal: Array) -> Array:
-    """Return how the delay follows the unknowns, (k,), from the normal matrix (k + 1, k + 1)."""
+    """Return the derivative of the delay by the unknowns, (k,), from a normal matrix."""
     along: Array = -normal[-1, :-1] / normal[-1, -1] if normal[-1, -1] > 0.0 else (
         np.zeros(len(normal) - 1))
     return along
@@ -175,14 +177,14 @@ def without_delay(normal: Array) -> Array:
 def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, variances: Array,
                  noise: Array | None, cutoffs: Array | None,
                  ) -> tuple[Information, list[tuple[float, Array, float]], Array | None]:
-    """Return what the sums tell, how each delay follows, and what noise alone seems to tell."""
+    """Return the information of the sums, each bag's delay step, and information due to noise."""
     theta, derivative = unknowns.theta(values), unknowns.derivative(values)
     total, steps = nothing(len(values)), []
     for bag, delay in enumerate(delays):
         c = residual_of(theta, delay)
         gram = np.tensordot(1.0 / variances[bag], sums.grams[bag], axes=1)
         by_delay = delayed_by(theta, delay)
-        # By its weighted residuals' own: what white noise up to the cut-off makes of it.
+        # Compare with the derivative of white noise below the cut-off.
         told = cutoffs is not None and by_delay @ gram @ by_delay > (
             _TIMES_NOISE * sums.counts[bag].sum() * (2.0 * np.pi * cutoffs[bag]) ** 2 / 3.0)
         e = directions(unknowns, values, delay, told)

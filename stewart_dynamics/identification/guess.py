@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A pose from lengths without one to begin with."""
+"""Pose of leg lengths without an initial guess."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Turns about z that are tried, the platform's axes parallel to the base's first [rad].
+# Rotations about z that are tried, platform axes parallel to base axes first [rad].
 _TURNS = (0.0, 0.3, -0.3, 0.6, -0.6)
 
 
 def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
     """
-    Return the pose of lengths (6,), sought from home and from level poses on both sides.
+    Return the pose of lengths (6,), starting from home and level poses on both sides.
 
     Raises
     ------
     PoseError, SingularityError
-        No beginning leads to a pose with these lengths.
+        Forward kinematics converges from no initial guess.
 
     """
     p = platform.parameters

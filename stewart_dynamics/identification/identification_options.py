@@ -33,17 +33,17 @@ class Options(NamedTuple):
     measured: str | None = None
     """Topic of the measured legs; None: the usual one."""
     efforts: str | None = None
-    """Topic of the efforts; None: that of the measured legs."""
+    """Topic of the efforts; None: the topic of the measured legs."""
     kinds: tuple[str, ...] = DEFAULT
-    """What is identified, of ``unknowns.KINDS``."""
+    """Parameters to be identified, from ``unknowns.KINDS``."""
     motor_torque: bool = False
-    """Efforts are torques of the motors [N m]."""
+    """Efforts are motor torques [N m]."""
     cutoff: float = CUTOFF
-    """Of the filter on regressor and efforts [Hz]."""
+    """Cut-off frequency of the filter on regressor and efforts [Hz]."""
     prior: float | None = None
-    """Standard error of the file's values, as a part of the scales; None: they do not count."""
+    """Standard error of the file's values, relative to the scales; None: they do not count."""
     hold_out: float = HOLD_OUT
-    """Part of each bag, its end, that validates what is fitted to the rest."""
+    """Fraction at the end of each bag that validates a fit to the rest."""
     delay: bool = True
     """Estimate the delay of the efforts."""
     accept_mistakes: bool = False
@@ -51,5 +51,5 @@ class Options(NamedTuple):
     report: bool = True
     """Write report.html."""
     force: bool = False
-    """Replace results."""
+    """Replace existing results."""
     run: str = ''

@@ -13,9 +13,10 @@
 # limitations under the License.
 
 """
-The report of an identification: an HTML page for an engineer and a colleague.
+The report of an identification as one HTML page.
 
-It needs no network, as the replay's: plotly.js is in it, numbers are base64 of typed arrays.
+Like the replay's report it needs no network: plotly.js is included, numbers are base64 of typed
+arrays.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from stewart_dynamics.reporting.spectrum import drawn, Spectrum
 from stewart_dynamics.whole_file import write_files
 
 _FOLDER = Path(__file__).with_name('templates')
-# Samples of the curves at most, the first ones.
+# Largest number of samples in the curves; later samples are not drawn.
 _MOST = 12_000
 
 
@@ -49,9 +50,9 @@ class Report:
     Parameters
     ----------
     work : Identification
-        With the extracts.
+        Identification with its extracts.
     found : Identified
-        Its result.
+        Result of the identification.
 
     """
 

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-An identification: from bags to what they tell about the hexapod; numbers only, no files.
+Identification of a hexapod from bags; computes the result and writes no files.
 
-Windows of each bag become extracts (``extraction``), whose sums are fitted (``fit``) twice, the
-second time without outliers. Then come intervals, and the validation: the end of each bag,
-predicted by a fit to the rest.
+Windows of each bag are converted into extracts (``extraction``), whose sums are fitted (``fit``)
+twice, the second time without outliers. Intervals and validation follow; the validation predicts
+the end of each bag by a fit to the rest.
 """
 
 from __future__ import annotations
@@ -49,26 +49,26 @@ from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 
-# Of bags that are sampled so slowly the cut-off is lower: samples for each of its periods.
+# Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
 _FEWEST_SAMPLES = 10.0
-# A residual beyond so many deviations of its leg is an outlier: a contact, a collision.
+# Residuals above this multiple of the leg's deviation are outliers: a contact, a collision.
 _OUTLIER = 8.0
-# More than this part are no outliers.
+# If a larger fraction exceeds it, no residual counts as an outlier.
 _MOST_OUTLIERS = 0.2
-# Filtered samples at least.
+# Minimum number of filtered samples.
 _FEWEST = 20
-# Of fewer seconds the correlations of the residuals are not known well.
+# Below this duration the correlations of the residuals are not well known [s].
 _SHORT = 10.0
-# Delays of the efforts up to this are found [s].
+# Largest delay of the efforts that is estimated [s].
 LONGEST_LAG = 0.1
-# A larger share of the rates inside the band of Coulomb friction is said.
+# A notice is given if a larger share of the rates is inside the band of Coulomb friction.
 _MOST_INSIDE = 0.5
-# A seed: of the noise that is added to see what noise alone seems to tell.
+# Seed of the noise that is added to determine the information due to noise alone.
 _SEED = 20221
 
 
 class BagRead(NamedTuple):
-    """What was read of one bag."""
+    """Metadata of a bag that was read."""
 
     path: Path
     topics: Topics
@@ -81,7 +81,7 @@ class BagRead(NamedTuple):
     """Time by which the efforts were shifted beforehand [s]; delays of the fit are added."""
     rejected: dict[str, int]
     windows_left_out: int
-    """Too short for the filters, between gaps."""
+    """Number of windows between gaps that are too short for the filters."""
     stops: int
     outliers: int
     deviations: tuple[float, float]
@@ -90,7 +90,7 @@ class BagRead(NamedTuple):
 
 
 class Validation(NamedTuple):
-    """Residuals on held-out time, RMS of each leg (6,) [N]: by the file, and by the fit."""
+    """Residuals on held-out time, RMS per leg (6,) [N], with the file's and fitted values."""
 
     before: Array
     after: Array
@@ -99,26 +99,26 @@ class Validation(NamedTuple):
 
 
 class Identified(NamedTuple):
-    """What bags tell about a hexapod."""
+    """Result of an identification."""
 
     parameters: Parameters
-    """The file's, changed by what was identified."""
+    """The file's parameters with the identified values."""
     unknowns: Unknowns
     fit: Fit
     errors: Errors
     bags: tuple[BagRead, ...]
     samples: int
-    """Filtered, of all bags."""
+    """Number of filtered samples of all bags."""
     outliers: int
-    """Filtered efforts that were left out."""
+    """Number of filtered efforts left out after the first fit."""
     unsound: int
-    """Filtered efforts left out beforehand: outliers of samples, end stops, force limits."""
+    """Number left out before it: outliers in samples, end stops, force limits."""
     before: Array
-    """Residuals by the file, RMS (6,) [N]."""
+    """Residuals with the file's parameters, RMS (6,) [N]."""
     after: Array
-    """By the identified parameters."""
+    """Residuals with the identified parameters, RMS (6,) [N]."""
     measured: Array
-    """Efforts, RMS (6,) [N]."""
+    """Measured efforts, RMS (6,) [N]."""
     validation: Validation | None
     likely: tuple[Likely, ...]
     lack_of_fit: LackOfFit | None
@@ -130,14 +130,14 @@ Progress = Callable[[int], None]
 
 class Identification:
     """
-    Reads bags and identifies.
+    Reads bags and identifies parameters.
 
     Parameters
     ----------
     parameters : Parameters
-        Of the hexapod, as far as they are known.
+        Known or estimated parameters of the hexapod.
     options : Options
-        What is identified, and how.
+        Options of the identification.
 
     """
 
@@ -166,7 +166,7 @@ class Identification:
         Raises
         ------
         BagError
-            It cannot be read, or contains nothing that can be used.
+            The bag cannot be read, or contains no usable data.
 
         """
         options = self._options
@@ -188,7 +188,7 @@ class Identification:
                 notices=[*recording.notices, *bag.notices])
 
     def add(self, path: Path, windows: Iterable[Window]) -> BagRead | None:
-        """Add the windows of a bag; return None if nothing of them can be used."""
+        """Add the windows of a bag; return None if none of them is usable."""
         options, p = self._options, self.parameters
         number, left_out, stops, outliers, samples, lag = len(self.bags), 0, 0, 0, 0, 0
         inside = rows = 0.0
@@ -279,7 +279,7 @@ class Identification:
         return extract
 
     def result(self) -> Identified:
-        """Return what the bags tell."""
+        """Fit all bags and return the result."""
         options, unknowns = self._options, self.unknowns
         if self.extracts.samples < _FEWEST:
             raise BagError(f'{self.bags[0].path}: {self.extracts.samples} samples are left after '
@@ -328,7 +328,7 @@ class Identification:
                 for block in self.extracts]
 
     def _leave_out_outliers(self, found: Fit) -> int:
-        """Choose no efforts whose residuals are far off; return how many."""
+        """Deselect efforts with outlying residuals; return their number."""
         residuals = self.residuals(found)
         used = np.concatenate([np.where(which, each, np.nan) for which, each in zip(
             self.chosen, residuals, strict=True)])
@@ -344,7 +344,7 @@ class Identification:
         return number
 
     def _validation(self, noise: Array) -> Validation | None:
-        """Return the residuals of the end of each bag by a fit to the rest of it."""
+        """Return the residuals at the end of each bag with a fit to the rest."""
         part, options = self._options.hold_out, self._options
         ends = [bag.seconds * (1.0 - part) for bag in self.bags]
 
@@ -368,7 +368,7 @@ class Identification:
 
 
 def _margin(cutoff: float) -> float:
-    """Return the time at each end that the filters of a cut-off need [s]."""
+    """Return the time at each end that the filters need for a cut-off [s]."""
     fine = 1e-4
     return 2.0 * LowPass.of(fine, cutoff, cutoff).half * fine
 

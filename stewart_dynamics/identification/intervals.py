@@ -15,16 +15,16 @@
 """
 Standard errors of a fit whose residuals are coloured, by a sandwich estimator.
 
-Filtered noise of efforts, of lengths in the regressor, and what the model lacks are correlated in
-time and between legs. With N the normal matrix and e_t the directions of the fit weighted,
-``cov = N^-1 (sum_t sum_s e_t E[r_t r_s^T] e_s^T) N^-1``; two estimates of the sum in the middle:
+Filtered noise of efforts, noise of lengths in the regressor, and modeling errors are correlated in
+time and between legs. With N the normal matrix and e_t the weighted directions of the fit,
+``cov = N^-1 (sum_t sum_s e_t E[r_t r_s^T] e_s^T) N^-1``. The inner sum is estimated in two ways:
 
 - by frequency, from the smoothed cross spectra of the residuals of the six legs: little scatter,
-  for residuals of a noise that is the same all the time;
-- by blocks of time (White 1980, doi:10.2307/1912934, clustered): for residuals that depend on the
-  motion as well, with more scatter.
+  for stationary noise;
+- by blocks of time (White 1980, doi:10.2307/1912934, clustered): more scatter, also for residuals
+  that depend on the motion.
 
-The larger of both counts for each parameter.
+For each parameter the larger estimate is used.
 """
 
 from __future__ import annotations
@@ -40,14 +40,15 @@ from stewart_dynamics.identification.fit import directions, Fit, without_delay
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 
-# Half width of the smoothing of spectra [Hz]; blocks of time [s], at least so many.
+# Half width of the smoothing of spectra [Hz]; length of the blocks of time [s], and their minimum
+# number.
 _SMOOTHING = 0.4
 _BLOCK = 2.5
 _FEWEST_BLOCKS = 15
 
 
 class Errors(NamedTuple):
-    """Standard errors: the covariance (k, k) of the unknowns, and of each delay (B,) [s]."""
+    """Covariance (k, k) of the unknowns, and standard errors of the delays (B,) [s]."""
 
     covariance: Array
     delays: Array
@@ -61,17 +62,17 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
     Parameters
     ----------
     extracts : Extracts
-        Of B bags.
+        Extracts of B bags.
     sums : Sums
-        Of their chosen efforts.
+        Sums of the efforts that were used.
     unknowns : Unknowns
-        What was asked for.
+        Unknowns of the fit.
     fit : Fit
-        The result.
+        Result of the fit.
     chosen : sequence of (N, 6)
-        The efforts of each block that were used.
+        Whether each effort of a block was used.
     prior : float, optional
-        As in the fit.
+        Standard error of the file's values, as in the fit.
 
     """
     theta, many = unknowns.theta(fit.values), len(fit.values)
@@ -92,7 +93,7 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
         residuals = columns @ residual_of(theta, fit.delays[bag])
         weighted = columns @ e_of_bags[bag] / fit.variances[bag][:, None]
         period = float(np.median(np.diff(block.times))) if len(block.times) > 1 else 1.0
-        # The delay follows the unknowns; its own error is that of its column.
+        # The delay depends on the unknowns; its own error comes from its own column.
         follow = weighted[..., :-1] + weighted[..., -1:] * alongs[bag]
         both = np.concatenate([follow, weighted[..., -1:]], axis=-1)
         middle = _by_frequency(both, residuals, period)
@@ -122,7 +123,7 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
 
 
 def _by_frequency(weighted: Array, residuals: Array, period: float) -> Array:
-    """Return the sum in the middle of one block: columns (N, 6, k), residuals (N, 6)."""
+    """Return the inner sum of a block from columns (N, 6, k) and residuals (N, 6)."""
     many = len(residuals)
     size = 1 << (2 * many - 1).bit_length()
     r = np.fft.rfft(residuals, size, axis=0)
@@ -130,7 +131,7 @@ def _by_frequency(weighted: Array, residuals: Array, period: float) -> Array:
     width = max(1, round(_SMOOTHING * size * period))
     smooth = _smoothed(spectra, width)
     e = np.fft.rfft(weighted, size, axis=0)
-    # one-sided: all frequencies but the first and the last stand for two
+    # one-sided: all frequencies except the first and the last count twice
     twice = np.full(len(e), 2.0)
     twice[0] = twice[-1] = 1.0
     first = np.einsum('fij,fjk->fik', smooth.conj(), e)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The motion of the platform from lengths of the legs and their derivatives, of a whole window."""
+"""Motion of the platform over a whole window, from leg lengths and their derivatives."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Samples between those whose pose is found one after the other; the others begin there.
+# Stride of the poses that are computed in sequence; they are the guesses of the others.
 _STRIDE = 32
 
 
 def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:
     """
-    Return the poses of lengths (N, 6) that change little from one to the next.
+    Return the poses of lengths (N, 6) that change little between samples.
 
     Parameters
     ----------
     platform : StewartPlatform
         The hexapod.
     lengths : (N, 6)
-        [m]
+        Leg lengths [m].
     guess : Pose
-        Near the first.
+        Pose near the first one.
 
     Raises
     ------
@@ -56,10 +56,10 @@ def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:
 
 def motions(platform: StewartPlatform, poses: Pose, rates: Array, accelerations: Array) -> Array:
     """
-    Return rows of motion (N, MOTION) of poses, leg rates and leg accelerations (N, 6).
+    Return rows of motion (N, MOTION) for poses, leg rates and leg accelerations (N, 6).
 
-    ``J_inv X' = L'`` and ``J_inv X'' = L'' - J_inv' X'``; the last term is the acceleration of the
-    legs in a motion with the twist and without acceleration.
+    ``J_inv X' = L'`` and ``J_inv X'' = L'' - J_inv' X'``; the last term is the leg
+    acceleration at this twist without platform acceleration.
     """
     p = platform.parameters
     rows = np.zeros((len(poses.rows), MOTION))

@@ -16,12 +16,12 @@
 Lack of fit: whether the residuals are more than noise, and the likeliest cause.
 
 The columns C of each possible cause (``causes``) are compared with the residuals r by frequency,
-weighted by the inverse of the noise's spectrum S, which is that of the residuals when all causes
-are fitted at once. With the columns of the fit projected out, the scores s = C^H S^-1 r are zero
-but for noise if the model is right, with the covariance N = C^H S^-1 C; so s^T N^-1 s is
-chi-squared distributed with as many degrees of freedom as columns (a score test: Rao 1948,
-doi:10.1017/S0305004100023987). The cause that explains most is found, then the next one along
-with it, until nothing significant is left.
+weighted by the inverse of the noise spectrum S, the spectrum of the residuals when all causes
+are fitted at once. With the columns of the fit projected out, the scores s = C^H S^-1 r have zero
+mean and the covariance N = C^H S^-1 C if the model is right; so s^T N^-1 s is chi-squared
+distributed with as many degrees of freedom as columns (a score test: Rao 1948,
+doi:10.1017/S0305004100023987). The cause that explains most is selected first; further causes are
+added to it until nothing significant is left.
 """
 
 from __future__ import annotations
@@ -43,34 +43,34 @@ from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Blocks that are tested at most, evenly spread.
+# Maximum number of blocks that are tested, evenly spread.
 _BLOCKS = 16
-# Standard deviations of a normal distribution with the probability of the statistic.
+# Significance for a notice, in standard deviations of a normal distribution.
 _NOTICE = 7.0
-# Causes that are named at most.
+# Maximum number of causes that are named.
 _CAUSES = 3
-# Columns of which a smaller part is left have no effect that the fit does not take in.
+# Columns with a smaller fraction left after projection are explained by the fit.
 _IN_THE_FIT = 1e-8
-# Standard deviations that call for the causes that take longer.
+# Standard deviations above which the slower causes are tested as well.
 _SUSPICIOUS = 4.0
-# Frequencies that count, by the cut-off; half width of the smoothing of spectra [Hz], at least so
-# many frequencies.
+# Highest frequency used, relative to the cut-off; half width of the smoothing of spectra [Hz], and
+# its minimum in frequencies.
 _BAND, _SMOOTHING, _FEWEST = 0.9, 0.5, 8
 _COLLINEAR = 1e-7
-# A cause with more columns must explain more, for each of them.
+# Penalty on the statistic for each column of a cause.
 _PENALTY = 4.0
 
 
 class Found(NamedTuple):
-    """A cause, and how much it explains."""
+    """A cause with the test statistic that it explains."""
 
     what: str
     text: str
     statistic: float
-    """Chi-squared distributed, of the scores of its columns."""
+    """Chi-squared statistic of the scores of its columns."""
     columns: int
     deviations: float
-    """Of a normal distribution with the same probability."""
+    """Standard deviations of a normal distribution with the same probability."""
     places: Integers
 
 
@@ -78,15 +78,15 @@ class LackOfFit(NamedTuple):
     """A lack of fit and its likeliest causes."""
 
     causes: tuple[Found, ...]
-    """In the order in which they explain most, the likeliest first."""
+    """Causes in the order in which they were found, the likeliest first."""
     others: tuple[Found, ...]
     """Causes that explain the residuals nearly as well as the first."""
     shifts: Array
-    """(k,) change of each unknown if the causes are taken in"""
+    """(k,) change of each unknown if the causes are added to the model"""
     left: float
-    """Part of the residual RMS that is left by the first cause."""
+    """Fraction of the residual RMS that remains with the first cause."""
     unexplained: bool
-    """Something significant is left, or the cause is unknown."""
+    """Whether something significant remains, or the cause is unknown."""
 
     @property
     def text(self) -> str:
@@ -105,7 +105,7 @@ class LackOfFit(NamedTuple):
                '; the intervals are widened by what it changes'))
 
 
-# What to ask for where a cause is likely.
+# Values of --identify that take a likely cause into account.
 IDENTIFY = {'offset': 'offset', 'tilt': 'tilt', 'reflected_mass': 'reflected_mass',
             'leg_mass': 'cylinder,piston', 'platform': 'platform',
             'viscous_friction': 'viscous_friction', 'coulomb_friction': 'coulomb_friction'}
@@ -119,10 +119,10 @@ class _Scores(NamedTuple):
     scores: Array
     """(m,)"""
     squares: float
-    """Of the residuals."""
+    """Sum of squared residuals."""
 
     def without(self, places: Integers) -> _Scores:
-        """Return the same with some columns in the fit."""
+        """Return the sums with some columns added to the fit."""
         along = _inverse(self.normal[np.ix_(places, places)]) @ self.normal[places]
         normal = self.normal - self.normal[places].T @ along
         scores = self.scores - along.T @ self.scores[places]
@@ -131,12 +131,12 @@ class _Scores(NamedTuple):
         return _Scores(normal * np.outer(free, free), scores * free, self.squares)
 
     def amounts(self, places: Integers) -> Array:
-        """Return least-squares amounts of some columns."""
+        """Return the least-squares amounts of some columns."""
         amounts: Array = _inverse(self.normal[np.ix_(places, places)]) @ self.scores[places]
         return amounts
 
     def statistic(self, places: Integers) -> tuple[float, int]:
-        """Return the statistic of some columns, and its degrees of freedom."""
+        """Return the statistic of some columns and its degrees of freedom."""
         sizes = np.sqrt(np.diag(self.normal)[places])
         usable = sizes > 0.0
         if not usable.any():
@@ -157,15 +157,15 @@ def lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknown
     Parameters
     ----------
     platform : StewartPlatform
-        With the parameters of the file.
+        Hexapod with the parameters of the file.
     extracts : Extracts
         Samples of B bags.
     unknowns : Unknowns
         Unknowns of the fit.
     fit : Fit
-        The result.
+        Result of the fit.
     chosen : sequence of (N, 6)
-        The efforts of each block that were used.
+        Whether each effort of a block was used.
 
     """
     numbers = np.unique(np.linspace(0, len(extracts) - 1, min(_BLOCKS, len(extracts))).astype(int))
@@ -180,7 +180,7 @@ def _lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknow
     for geometry in (False, True):
         causes = _causes(platform, extracts, unknowns, fit, numbers, geometry)
         scores, follow, squares = _scores(causes, extracts, unknowns, fit, chosen, numbers)
-        # The shape of friction at a reversal is not known: samples are too far apart.
+        # The shape of friction at a reversal is unknown because samples are too far apart.
         scores = scores.without(causes.blur)
         if not geometry and max(each.deviations for each in _tested(causes.all, scores)) < (
                 _SUSPICIOUS):
@@ -222,7 +222,7 @@ def deviations(statistic: float, freedom: int) -> float:
     """
     Return a chi-squared value as standard deviations of a normal distribution.
 
-    By the cube root (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
+    Uses the cube-root approximation (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
     """
     part = 2.0 / (9.0 * freedom)
     return float((np.cbrt(statistic / freedom) - 1.0 + part) / math.sqrt(part))
@@ -248,7 +248,7 @@ def _selected(extracts: Extracts, numbers: Integers) -> Iterator[Block]:
 
 def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
             chosen: Sequence[Flags], numbers: Integers) -> tuple[_Scores, Array, _Scores]:
-    """Return sums weighted by spectra, how unknowns follow columns (k, m), plain sums."""
+    """Return weighted sums, derivatives of unknowns by columns (k, m), and plain sums."""
     theta, bags = unknowns.theta(fit.values), len(fit.delays)
     known = fit.identifiability.known
     inner = known.shape[1] + bags  # known directions, then the delays
@@ -278,7 +278,7 @@ def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
             np.save(file, spectra)
             np.save(file, period * len(whole))
         assert gram is not None and plain is not None
-        # Weighted by leg alone, as in the fit; then by the spectra of what is left.
+        # First weight by leg alone, as in the fit, then by the spectra of the residuals.
         inverse = _inverse(gram[:-1, :-1])
         rest = inverse @ gram[:-1, -1]
         file.seek(0)
@@ -298,10 +298,10 @@ def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
 
 
 def _spectra(columns: Array, period: float) -> Array:
-    """Return real and imaginary parts (F, 2, 6, m) of the frequencies below the cut-off."""
+    """Return real and imaginary parts (F, 2, 6, m) at frequencies below the cut-off."""
     many = len(columns)
     spectra = np.fft.rfft(columns, axis=0)[:int(many * period * _BAND / (SAMPLES * period)) + 1]
-    # one-sided: all frequencies but the first stand for two
+    # one-sided: all frequencies except the first count twice
     spectra *= np.sqrt(2.0 / many)
     spectra[0] *= np.sqrt(0.5)
     parts: Array = np.stack([spectra.real, spectra.imag], axis=1)
@@ -309,9 +309,9 @@ def _spectra(columns: Array, period: float) -> Array:
 
 
 def _whitened(spectra: Array, rest: Array, inverse: Array, seconds: float) -> Array:
-    """Return the columns (F, 2, 6, m), weighted by what all columns together leave."""
+    """Return the columns (F, 2, 6, m), whitened by the residuals of a fit with all causes."""
     left = spectra[..., -1] - spectra[..., :-1] @ rest
-    # The variance of a residual is that of the noise less what the columns take.
+    # The fit of the columns reduces the variance of a residual below the noise variance.
     flat = spectra[..., :-1].reshape(-1, len(rest))
     free = 1.0 - np.sum((flat @ inverse) * flat, axis=1).reshape(left.shape)
     width = max(_FEWEST, round(_SMOOTHING * seconds))
@@ -338,7 +338,7 @@ def _smoothed(values: Array, width: int) -> Array:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Return the pseudo-inverse of a normal matrix, by the sizes of its columns."""
+    """Return the pseudo-inverse of a normal matrix after scaling its columns."""
     sizes = np.sqrt(np.diag(matrix))
     scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
     inverse: Array = scale[:, None] * np.linalg.pinv(

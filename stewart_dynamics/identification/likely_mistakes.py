@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Likely mistakes in a recording or a parameter file, by what they do to the fit.
+Likely mistakes in a recording or a parameter file, detected by their effect on the fit.
 
-Efforts of the wrong sign or unit scale everything, also the weight and inertia of what the file
-knows: legs and actuators. Swapped legs, a wrong zero length and a tilted base make another
-machine, which fits worse than the right one.
+Efforts of the wrong sign or unit scale all forces, including the weight and inertia that the file
+gives for legs and actuators. Swapped legs, a wrong zero length and a tilted base correspond to
+another hexapod, which fits worse than the right one.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ from stewart_dynamics.identification.windows import Window
 from stewart_dynamics.mechanics.least_squares import Information, information, nothing, solve
 from stewart_dynamics.parameters.table import AUTO, Parameters
 
-# A scale of the efforts that is as near to a known factor as this is that factor.
+# A scale of the efforts within this ratio of a known factor is attributed to that factor.
 _NEAR = 1.35
-# A scale farther from 1 than this is a mistake.
+# A scale that differs from 1 by a larger ratio is a mistake.
 _FAR = 2.0
 _FACTORS = ((1e-3, 'kN in place of N'), (1.0 / 9.80665, 'kgf in place of N'),
             (1.0 / 4.448222, 'pounds in place of N'), (1e3, 'mN in place of N'))
-# A residual above this part of the efforts calls for a search.
+# A residual above this fraction of the efforts starts the search for swapped legs.
 _SUSPICIOUS = 0.03
-# With one above this part the model says nothing.
+# A residual above this fraction means that the model does not describe the recording.
 _UNEXPLAINED = 0.3
-# What is found must make it smaller by this.
+# A cause must reduce the residual to this fraction.
 _BETTER = 0.5
-# Part of the samples that must be sound for a comparison.
+# Minimum fraction of valid samples for a comparison.
 _FEWEST = 0.5
-# The time of the search at most [s].
+# Duration of the part that is searched [s], longer if the filters need it.
 _PIECE = 5.0
 
 
@@ -62,13 +62,13 @@ class Likely(NamedTuple):
     """A likely mistake."""
 
     what: str
-    """One word for programs: sign, unit, torque, scale, swapped, zero_length, tilt or misfit."""
+    """Keyword for programs: sign, unit, torque, scale, swapped, zero_length, tilt or misfit."""
     text: str
-    """In one line."""
+    """Description in one line."""
 
 
 def of_no_pose(p: Parameters, positions: Array) -> str:
-    """Return why lengths may belong to no pose."""
+    """Return the likely reason why no pose has the measured lengths."""
     lengths = positions + p['geometry.zero_length']
     low, high = lengths.min(), lengths.max()
     text = (f'the measured lengths belong to no pose of this hexapod: with geometry.zero_length '
@@ -83,7 +83,7 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
 
 
 def of_delay(bags: Iterable[tuple[float, float]]) -> Iterator[Likely]:
-    """Yield a likely mistake of delays; takes the delay of each bag and its upper limit [s]."""
+    """Yield a likely mistake for bags, given as delay and its upper limit [s]."""
     for delay, limit in bags:
         if delay >= limit:
             yield Likely('delay', f'the efforts are later than the positions by {limit:g} s or '
@@ -94,10 +94,10 @@ def of_delay(bags: Iterable[tuple[float, float]]) -> Iterator[Likely]:
 def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool,
                ) -> Iterator[Likely]:
     """
-    Yield likely mistakes of sign and unit of the efforts.
+    Yield likely mistakes in sign and unit of the efforts.
 
-    The scale of the efforts is found along with the platform from what the file knows of the
-    legs; without masses of legs, by the forces of the file's platform.
+    The scale of the efforts is estimated jointly with the platform from the file's leg parameters;
+    without leg masses, from the forces of the file's platform.
     """
     scale, error = _scale(sums, unknowns, platform_too=False)
     by_file, _ = _scale(sums, unknowns, platform_too=True)
@@ -105,11 +105,11 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
         yield Likely('scale', 'all efforts are zero')
         return
     if not (np.isfinite(scale) and error < 0.1 * abs(scale)) or (
-            # the file's legs may be wrong, not by so much
+            # the file's legs may be wrong, but not by this ratio
             not 0.1 < scale / by_file < 10.0):
         scale = by_file
     elif (scale > 0.0) == (by_file > 0.0) and 1.0 / _FAR < abs(by_file) < _FAR:
-        scale = by_file  # its weight says that the unit is right, whatever the legs do
+        scale = by_file  # the platform's weight shows that the unit is right
     if scale < 0.0:
         other = '' if p['geometry.platform_side'] != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
@@ -145,7 +145,7 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
 def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
            fit: Fit, lack: LackOfFit | None, residual: float) -> Iterator[Likely]:
     """
-    Yield a likely mistake where the residual is a large part of the efforts.
+    Yield a likely mistake if the residual is a large fraction of the efforts.
 
     Parameters
     ----------
@@ -156,13 +156,13 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     extraction : Extraction
         Extraction of the first window.
     window : Window
-        That window.
+        The first window.
     fit : Fit
-        The result.
+        Result of the fit.
     lack : LackOfFit or None
-        Its lack of fit.
+        Lack of fit of the result.
     residual : float
-        RMS of the residuals, as a part of that of the efforts.
+        RMS of the residuals divided by the RMS of the efforts.
 
     """
     first = None if lack is None else lack.causes[0]
@@ -207,7 +207,7 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
 
 def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, float]:
     """Return the scale of the efforts by least squares, and its standard error."""
-    many = len(unknowns.linear)  # a tilt changes no scale
+    many = len(unknowns.linear)  # a tilt does not change the scale
     theta = unknowns.theta(unknowns.start)
     known = len(theta)
     total = nothing(many + 1)
@@ -258,7 +258,7 @@ def most_motion(window: Window, extraction: Extraction) -> Window:
 
 
 def _tried(unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit) -> float:
-    """Return the RMS residual of a window by its own fit; infinite without poses [N]."""
+    """Return the RMS residual of a fit to a window [N]; infinite if no pose is found."""
     try:
         guess = pose_near(extraction.platform, window.positions[0]
                           + extraction.platform.parameters['geometry.zero_length'])
@@ -268,7 +268,7 @@ def _tried(unknowns: Unknowns, extraction: Extraction, window: Window, fit: Fit)
 
 
 def _fitted(unknowns: Unknowns, extract: Extract, fit: Fit) -> float:
-    """Return the RMS residual of an extract by its own fit [N]."""
+    """Return the RMS residual of a fit to an extract [N]."""
     shifts = residual_of(np.zeros(0), float(fit.delays[0]))[1:]
     efforts = extract.efforts @ shifts - extract.known
     samples = information(extract.regressor, efforts, extract.sound.astype(float))

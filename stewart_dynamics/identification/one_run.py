@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One identification with its files, which get their names only when all are complete."""
+"""One identification with its files, which are renamed only when all are complete."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from tqdm import tqdm
 
 PARAMETERS, RESULT, REPORT = 'identified.yaml', IDENTIFICATION, 'report.html'
 
-# The machine code that every identification needs.
+# Functions that every identification needs as machine code.
 FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
              *blocks.FUNCTIONS, mcap_scan.scan)
 
@@ -53,13 +53,13 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Opt
     Parameters
     ----------
     bags : sequence of Path
-        Of one hexapod.
+        Bags of one hexapod.
     parameters : Parameters
-        Of it, as far as they are known.
+        Known or estimated parameters of the hexapod.
     folder : Path
-        It gets its name when it is complete; it must not exist, unless ``options.force``.
+        Results folder, created when complete; must not exist, unless ``options.force`` is set.
     options : Options
-        What is identified, and how.
+        Options of the identification.
     warn : callable
         Called with likely mistakes that were accepted.
 
@@ -93,7 +93,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Opt
 
 
 def _rounded(found: Identified) -> Parameters:
-    """Return the parameters with digits that the intervals justify."""
+    """Return the parameters rounded to the digits that the intervals justify."""
     errors = np.sqrt(np.maximum(np.diag(found.errors.covariance), 0.0))
     values = found.fit.values.copy()
     for n, (value, error) in enumerate(zip(values, errors, strict=True)):
@@ -102,5 +102,5 @@ def _rounded(found: Identified) -> Parameters:
             values[n] = round(value, int(np.clip(2 - math.floor(math.log10(error)), 0, 15)))
     try:
         return found.unknowns.parameters(values)
-    except StewartError:  # a body at its bound has no digits to lose
+    except StewartError:  # a body at its bound may not be rounded
         return found.parameters

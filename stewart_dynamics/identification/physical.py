@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-The nearest values that a machine can have, by what the samples tell.
+Projection of fitted values onto physically consistent ones, in the metric of the information.
 
 Mass and friction are not negative, and the platform's pseudo-inertia is positive definite
-(``mechanics.dynamics.pseudo_inertia``). Where least squares break a bound, its ten parameters
-are found again in log-Cholesky parameters, which are a body whatever they are.
+(``mechanics.dynamics.pseudo_inertia``). If least squares violate this, the platform's ten
+parameters are fitted again in log-Cholesky parameters, which always describe a physical body.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from stewart_dynamics.mechanics.dynamics.pseudo_inertia import (
     from_log_cholesky, log_cholesky, log_cholesky_derivative, smallest_eigenvalue)
 from stewart_dynamics.mechanics.least_squares import Identifiability, Information
 
-# Nearer to the bound than this, by its size, a body is a point or a rod within rounding.
+# Relative distance to the bound below which a body is a point or a rod within rounding.
 SMALLEST = 1e-6
 _STEPS = 200
 
@@ -38,21 +38,21 @@ _STEPS = 200
 def consistent(unknowns: Unknowns, values: Array, information: Information,
                what: Identifiability) -> tuple[Array, tuple[str, ...]]:
     """
-    Return values within all bounds, and the names of those that were beyond one.
+    Return values within all bounds, and the names of those that violated one.
 
     Parameters
     ----------
     unknowns : Unknowns
-        What was asked for.
+        Unknowns of the fit.
     values : (k,)
-        Without bounds.
+        Values of a fit without bounds.
     information : Information
-        Of the samples about them.
+        Information of the samples on the unknowns.
     what : Identifiability
-        What they tell.
+        Identifiability of the unknowns.
 
     """
-    # What is not told is held as firmly as its scale; it decides where nothing else does.
+    # Unidentifiable parameters are held with a standard error of their scale.
     matrix = information.matrix + np.diag(unknowns.scales ** -2.0)
     beyond: list[str] = []
     free: Flags = np.ones(len(values), dtype=bool)
@@ -72,7 +72,7 @@ def consistent(unknowns: Unknowns, values: Array, information: Information,
 
 
 def _held(matrix: Array, values: Array, free: Flags) -> Array:
-    """Return the values with some at zero and the others where the information wants them."""
+    """Return the values with some at zero and the others at their conditional optimum."""
     at_zero = np.where(free, values, 0.0)
     change = at_zero - values
     shift = np.linalg.solve(matrix[np.ix_(free, free)], matrix[np.ix_(free, ~free)]
@@ -82,7 +82,7 @@ def _held(matrix: Array, values: Array, free: Flags) -> Array:
 
 
 def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
-    """Return the values of the nearest platform that is a body, in the metric of information."""
+    """Return the nearest values with a physical platform, in the metric of information."""
     def candidate(eta: Array) -> Array:
         return unknowns.with_inertial(values, from_log_cholesky(eta))
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The measured legs of a bag, in windows: positions, rates where they are, and efforts."""
+"""Measured legs of a bag in windows: positions, rates if recorded, and efforts."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, MISS
 from stewart_dynamics.messages.recorded import Messages
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-# Samples of a window at most: it and what is made of it fit into memory.
+# Maximum number of samples in a window, so that it and its extract fit into memory.
 _WINDOW = 1 << 16
-# Larger than any position [m] or force [N]: squares would overflow.
+# Upper bound of positions [m] and forces [N]; larger values would overflow when squared.
 _END = 1e100
 _LEGS, _EFFORTS = 'legs', 'efforts'
 
 
 class Topics(NamedTuple):
-    """Where positions and efforts are."""
+    """Topics of positions and efforts."""
 
     legs: str
     efforts: str
@@ -48,12 +48,12 @@ class Topics(NamedTuple):
 def find_topics(recording: Recording, node: str, measured: str | None, efforts: str | None,
                 ) -> Topics:
     """
-    Return the topics: as given, under the usual name, or the only one of its type.
+    Return the topics: the given one, the one with the usual name, or the only one of its type.
 
     Raises
     ------
     BagError
-        There is none, or there are several.
+        No such topic is found, or several.
 
     """
     usual, own = f'{node}/{MEASURED_LEGS}', f'{node}/leg_states'
@@ -85,22 +85,22 @@ class RecordedLegs:
     recording : Recording
         The bag.
     topics : Topics
-        In it.
+        Topics in the bag.
     joints : sequence of str
         Names of the legs.
     overlap : float
-        Time by which a window begins before the end of the last [s].
+        Overlap of consecutive windows [s].
 
     Attributes
     ----------
     rejected : Counter
-        Messages by reason.
+        Number of rejected messages by reason.
     samples : int
-        Of positions, used.
+        Number of positions used.
     rates : bool
-        There are rates.
+        Whether rates are recorded.
     period : float
-        Of the samples [s], from the first on.
+        Sampling period [s], known after the first window.
 
     """
 
@@ -117,7 +117,7 @@ class RecordedLegs:
         self._readers: dict[str, JointStateReader] = {}
 
     def windows(self, progress: Callable[[int], None] | None = None) -> Iterator[Window]:
-        """Yield the windows; reports the bytes read."""
+        """Yield the windows; report the bytes read to ``progress``."""
         keys = {self._topics.legs: _LEGS} | ({} if self._one else {
             self._topics.efforts: _EFFORTS})
         for messages, size in self._recording.messages(keys):
@@ -172,7 +172,7 @@ class RecordedLegs:
         return stamps[sound], values[sound]
 
     def _released(self, last: bool) -> Iterator[Window]:
-        """Yield windows of what is there, and keep what the next one needs."""
+        """Yield windows of the buffered samples, and keep those that the next one needs."""
         legs, efforts = self._legs.signal(), self._efforts.signal()
         if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
             self._legs.keep_from(int(legs.stamps[-1]) if len(legs.stamps) else 0)
@@ -195,7 +195,7 @@ class RecordedLegs:
 
 
 class _Buffer:
-    """Samples in the order of their stamps; those out of order are left out."""
+    """Samples in the order of their stamps; samples out of order are dropped."""
 
     def __init__(self) -> None:
         self._stamps: list[Stamps] = []
@@ -206,7 +206,7 @@ class _Buffer:
         return sum(map(len, self._stamps))
 
     def add(self, stamps: Stamps, values: Array, rejected: Counter[str]) -> None:
-        """Add samples; those that are older than one before are counted."""
+        """Add samples; drop and count samples that are not newer than all before."""
         if not len(stamps):
             return
         before = np.maximum.accumulate(np.concatenate([[self._newest], stamps[:-1]]))
@@ -228,7 +228,7 @@ class _Buffer:
         return Signal(self._stamps[0], self._values[0])
 
     def keep_from(self, stamp: int) -> None:
-        """Leave out samples before a stamp."""
+        """Drop samples before a stamp."""
         whole = self.signal()
         first = int(np.searchsorted(whole.stamps, stamp))
         self._stamps, self._values = [whole.stamps[first:]], [whole.values[first:]]

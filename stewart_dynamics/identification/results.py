@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What was identified as a document for identification.json, see docs/identification.md."""
+"""Content of identification.json, see docs/identification.md."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import combinations, TWO_SIDED
 from stewart_dynamics.replay.fingerprint import plain_parameters, software
 
-# Of identification.json; increased when the meaning of a key changes.
+# Version of identification.json; increased when the meaning of a key changes.
 VERSION = 1
 
 IDENTIFIED, IN_COMBINATION, NOT_TOLD = 'identified', 'in_combination', 'not_told'
@@ -107,7 +107,7 @@ def _states(found: Identified) -> list[str]:
 
 
 def _errors(found: Identified) -> Array:
-    """Return standard errors (k,), with what unknown directions and a lack of fit may add."""
+    """Return standard errors (k,), including unidentifiable directions and lack of fit."""
     what = found.fit.identifiability
     own = np.maximum(np.diag(found.errors.covariance), 0.0)
     errors: Array = np.sqrt(own + (what.shares * what.scales) ** 2)
@@ -131,7 +131,7 @@ def _combinations(found: Identified) -> list[dict[str, Any]]:
 
 
 def in_words(coefficients: Array, names: Sequence[str]) -> str:
-    """Return a combination as a sum."""
+    """Return a combination of parameters as a sum in text form."""
     text = ''
     for c, name in zip(coefficients, names, strict=True):
         sign = ' - ' if c < 0.0 else ' + '
@@ -158,7 +158,7 @@ def _plain(value: float) -> float | None:
 
 
 def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
-    """Return what identified.yaml says beside each value: intervals and date."""
+    """Return the comments of identified.yaml by parameter: intervals and date."""
     texts: dict[str, list[str]] = {}
     for each in result['parameters']:
         parts = each['name'].split('.')
@@ -167,7 +167,7 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
         if each['state'] == IDENTIFIED:
             text = (f'+-{TWO_SIDED * each["standard_error"]:.2g}' if each['interval'] else
                     'no interval: lack of fit')
-            if name == 'gravity':  # its value is not that of the file
+            if name == 'gravity':  # the identified angle is not a value of the file
                 text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
         else:
             text = 'kept' if each['state'] == NOT_TOLD else 'partly told'

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Sums of products of all columns of the extracts: all that least squares need of them.
+Normal-equation sums of all extracts.
 
-For each bag and leg the Gram matrix of ``[Y | known | f, f', f'', f''']``. A residual with a
-delay d of the efforts, ``r = f(t + d) - known - Y theta`` by Taylor's series, is a sum of these
-columns; so is its derivative by theta and by d.
+They are the Gram matrix of ``[Y | known | f, f', f'', f''']`` for each bag and leg. A residual
+with a delay d of the efforts, ``r = f(t + d) - known - Y theta`` as a Taylor series, is a linear
+combination of these columns; so are its derivatives by theta and by d.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class Sums(NamedTuple):
     Attributes
     ----------
     grams : (B, 6, q, q)
-        Of the columns.
+        Gram matrices of the columns.
     counts : (B, 6)
-        Of efforts that went into them.
+        Number of efforts in each sum.
 
     """
 
@@ -50,11 +50,11 @@ class Sums(NamedTuple):
     counts: Integers
 
     def plus(self, other: Sums) -> Sums:
-        """Return those of both."""
+        """Return the sums of both."""
         return Sums(self.grams + other.grams, self.counts + other.counts)
 
     def squares(self, theta: Array, delays: Array) -> Array:
-        """Return the sum of squared residuals (B, 6) of linear parameters and delays (B,)."""
+        """Return the sums of squared residuals (B, 6) for linear parameters and delays (B,)."""
         found: Array = np.empty(self.counts.shape)
         for bag, delay in enumerate(delays):
             c = residual_of(theta, delay)
@@ -79,12 +79,12 @@ def sums_of(extracts: Extracts, bags: int, chosen: Callable[[Block], Flags]) -> 
 
 
 def residual_of(theta: Array, delay: float) -> Array:
-    """Return the coefficients (q,) of the columns in a residual."""
+    """Return the coefficients (q,) of a residual by columns."""
     return np.concatenate([-theta, [-1.0], [
         delay ** order / math.factorial(order) for order in range(ORDERS)]])
 
 
 def delayed_by(theta: Array, delay: float) -> Array:
-    """Return those of its derivative by the delay."""
+    """Return the coefficients (q,) of the derivative of a residual by the delay."""
     return np.concatenate([np.zeros(len(theta) + 2), [
         delay ** order / math.factorial(order) for order in range(ORDERS - 1)]])

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The result of an identification for a terminal."""
+"""Terminal output of an identification."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from stewart_dynamics.replay.summary_text import plural
 
 def result_text(result: Mapping[str, Any]) -> str:
     """
-    Return the text, no wider than 100 columns but for long names.
+    Return the result as text, at most 100 columns wide except for long names.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _table(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def decimals(error: float) -> int:
-    """Return how many decimals a standard error justifies: two of its digits."""
+    """Return the number of decimals that show two digits of a standard error."""
     digits = 0
     while digits < 9 and error * 10 ** digits < 1.95:
         digits += 1
@@ -109,7 +109,7 @@ def _not_told(result: Mapping[str, Any]) -> list[str]:
 
 
 def grouped(names: Sequence[str]) -> list[str]:
-    """Return names, with those that differ in the last part alone in one line."""
+    """Return names; those that differ only in their last part share a line."""
     groups: dict[str, list[str]] = {}
     for name in names:
         begin, _, end = name.rpartition('.')

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-The tilt of the base: gravity turned about two base axes, its length as it is.
+Tilt of the base: gravity rotated about two base axes, with constant magnitude.
 
-Forces are linear in gravity, ``f = Y theta + sum_i d_i G_i theta`` with d its change and G_i the
-part of Y that one unit of gravity along axis i makes. So products of the change with what weighs
-are further linear parameters, exactly, however large the tilt is.
+Forces are linear in gravity, ``f = Y theta + sum_i d_i G_i theta`` with d the change of gravity
+and G_i the part of Y due to one unit of gravity along axis i. So products of the change with the
+gravity-dependent parameters are further linear parameters, exact for a tilt of any size.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from stewart_dynamics.mechanics.kinematics.home_pose import turns_about
 
 class Tilt:
     """
-    Gravity turned about two base axes.
+    Gravity rotated about two base axes.
 
     Parameters
     ----------
     gravity : (3,)
-        Of the parameter file, base axes [m/s^2].
+        Gravity of the parameter file, base axes [m/s^2].
 
     Attributes
     ----------
     axes : str
-        Two of x, y and z, those that are most across gravity: it turns about the first of them,
-        then about the second.
+        The two of x, y and z most perpendicular to gravity, which is rotated about the first
+        of them, then about the second.
 
     """
 
@@ -57,17 +57,17 @@ class Tilt:
         return tuple(f'gravity.tilt_{axis}' for axis in self.axes)
 
     def gravity(self, angles: Array) -> Array:
-        """Return the turned vector (3,) of angles (2,) [rad]."""
+        """Return gravity, shape (3,), rotated by angles (2,) [rad]."""
         first, second = self._turns(angles)
         turned: Array = second @ first @ self._gravity
         return turned
 
     def change(self, angles: Array) -> Array:
-        """Return by how much that differs from the file's, (3,)."""
+        """Return the difference (3,) of rotated gravity and the file's value."""
         return self.gravity(angles) - self._gravity
 
     def derivative(self, angles: Array) -> Array:
-        """Return the derivative of gravity by the angles, (3, 2)."""
+        """Return the derivative of gravity with respect to the angles, (3, 2)."""
         first, second = self._turns(angles)
         about = np.eye(3)[self._axes]
         turned = first @ self._gravity

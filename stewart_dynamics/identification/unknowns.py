@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-What is asked for: parameters by the names and in the terms of the parameter file.
+Parameters to be identified, with the names and definitions of the parameter file.
 
-The platform's are mass, center of mass and inertia about it, so that what a motion cannot tell
-keeps the value of the file. Of those the ten inertial parameters in which forces are linear are
-functions; of legs the parameters are linear themselves: of their parts mass, first and second
-moment. The tilt of gravity comes last; its change multiplies what weighs.
+The platform is described by mass, center of mass and inertia about it, so that unidentifiable
+parameters keep the values of the file. Forces are linear in ten inertial parameters that are
+functions of these. Leg parameters are linear themselves: mass, first and second moment of each
+part. The tilt of gravity comes last; its change multiplies the gravity-dependent parameters.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.parameters.table import Parameters
 
-# Of the platform, in the terms of the parameter file.
+# Platform parameters as defined in the parameter file.
 _PLATFORM = ('platform.mass', *(f'platform.center_of_mass.{axis}' for axis in 'xyz'),
              *(f'platform.inertia.{axes}' for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')))
 _PLATFORM_UNITS = ('kg', *3 * ['m'], *6 * ['kg m^2'])
@@ -53,48 +53,48 @@ _OF_LEGS = {'cylinder': (CYLINDER_FIRST, CYLINDER_SECOND),
             'friction': (VISCOUS_FRICTION, COULOMB_FRICTION), 'offset': (OFFSET,)}
 TILT = 'tilt'
 KINDS = (*_OF_PLATFORM, *_OF_LEGS, TILT)
-"""What can be asked for."""
+"""Values that --identify accepts."""
 DEFAULT = ('platform', 'viscous_friction', 'coulomb_friction')
 
-# Of the linear parameters, those in whose forces gravity is.
+# Indices of the linear parameters whose forces depend on gravity.
 _WEIGHING = np.concatenate([[0], *(np.arange(LINEAR)[part] for part in (
     FIRST_MOMENT, CYLINDER_FIRST, PISTON_MASS, PISTON_FIRST))])
 
-# A tilt that matters [rad].
+# Scale of a tilt [rad].
 _TILT = 0.1
-# Friction that matters is that which makes a leg's share of the weight at this rate [m/s].
+# Rate at which the scale of friction equals a leg's share of the weight [m/s].
 _RATE = 0.25
-# An effect of motion matters if it makes that share at this acceleration [m/s^2].
+# Acceleration at which the scale of inertial effects equals that share [m/s^2].
 _ACCELERATION = 10.0
 
 
 class Unknowns:
     """
-    The parameters that are asked for, k of them.
+    The k parameters to be identified.
 
     Parameters
     ----------
     parameters : Parameters
-        The file's: scales and the values of all that is not asked for.
+        Parameters of the file, for scales and for the values of all other parameters.
     kinds : sequence of str
-        Of KINDS.
+        Values from KINDS.
 
     Attributes
     ----------
     names, units : tuple of str
-        Of each parameter.
+        Name and unit of each parameter.
     start : (k,)
-        The values of the file.
+        Values from the file.
     scales : (k,)
-        For each the change that would matter.
+        Relevant change of each parameter.
     linear : (m,)
-        Which of the LINEAR parameters depend on them; the platform's ten come first.
+        Indices of the LINEAR parameters that depend on them; the platform's ten come first.
     weighing : (w,)
-        Those of ``linear`` in whose forces gravity is.
+        Elements of ``linear`` whose forces depend on gravity.
     legs : range
-        Which of the unknowns are those of legs: after the platform's, before the tilt.
+        Indices of the leg parameters: after the platform's, before the tilt.
     tilt : Tilt or None
-        How gravity turns; None: not asked for.
+        Rotation of gravity; None: not to be identified.
 
     """
 
@@ -134,11 +134,11 @@ class Unknowns:
 
     @property
     def many_of_platform(self) -> int:
-        """Return how many are the platform's; they come first."""
+        """Return the number of platform parameters; they come first."""
         return len(self._platform)
 
     def with_tilt(self) -> Unknowns:
-        """Return the same and the tilt of gravity."""
+        """Return the same unknowns with the tilt of gravity added."""
         return Unknowns(self._parameters, (*self._kinds, TILT))
 
     @property
@@ -150,10 +150,10 @@ class Unknowns:
 
     def theta(self, values: Array) -> Array:
         """
-        Return what forces are linear in (n,) of values (k,): the m parameters ``linear``.
+        Return the linear parameters (n,) for values (k,): the m parameters ``linear``.
 
-        With the tilt, for each axis the change of gravity times those that weigh, and times one:
-        for all that is fixed, n = m + 3 (w + 1).
+        With the tilt, the change of gravity along each axis times ``weighing``, and times 1 for
+        the fixed parameters, is appended: n = m + 3 (w + 1).
         """
         theta = self._level(values)
         if self.tilt is None:
@@ -162,7 +162,7 @@ class Unknowns:
         return np.concatenate([theta, np.outer(change, self._carried(theta)).ravel()])
 
     def derivative(self, values: Array) -> Array:
-        """Return the derivative of ``theta``, (n, k)."""
+        """Return the derivative of ``theta`` with respect to the values, (n, k)."""
         d: Array = np.zeros((len(self.linear), len(values)))
         d[:PLATFORM, :self.many_of_platform] = _inertial_derivative(
             self._whole(values))[:, self._platform]
@@ -183,11 +183,11 @@ class Unknowns:
         return theta
 
     def _carried(self, theta: Array) -> Array:
-        """Return what the change of gravity is multiplied by, (w + 1,)."""
+        """Return the factors (w + 1,) of the change of gravity."""
         return np.append(theta[np.isin(self.linear, self.weighing)], 1.0)
 
     def with_inertial(self, values: Array, ten: Array) -> Array:
-        """Return values whose platform has these inertial parameters (10,), as far as asked."""
+        """Return values with these inertial parameters (10,), as far as they are unknowns."""
         mass, center = ten[0], ten[1:4] / ten[0]
         inertia = ten[4:] - about_origin(mass, center, np.zeros(6))
         changed = values.copy()
@@ -196,17 +196,17 @@ class Unknowns:
         return changed
 
     def inertial(self, values: Array) -> Array:
-        """Return the platform's ten inertial parameters of values (k,)."""
+        """Return the platform's ten inertial parameters for values (k,)."""
         return _inertial(self._whole(values))
 
     def not_negative(self) -> Integers:
-        """Return which of the parameters cannot be negative, besides the platform's."""
+        """Return the indices of leg parameters that cannot be negative."""
         ends = ('.mass.', '.second_moment.', 'reflected_mass.', '_friction.')
         return np.array([n for n, name in enumerate(self.names) if n >= self.many_of_platform
                          and any(end in f'{name}.' for end in ends)], dtype=np.int64)
 
     def parameters(self, values: Array) -> Parameters:
-        """Return the parameter file's with these values (k,); ParameterError if none can have."""
+        """Return the parameters with these values (k,); raise ParameterError if invalid."""
         theta = self._theta.copy()
         theta[self.linear] = self._level(values)
         theta[CYLINDER_MASS] = self._masses_of_cylinders(theta)
@@ -224,7 +224,7 @@ class Unknowns:
         return self._parameters.replaced(changed, 'identified')
 
     def _masses_of_cylinders(self, theta: Array) -> Array:
-        """Return masses (6,) that bodies with their moments can have: they have no effect."""
+        """Return cylinder masses (6,) consistent with the moments; they do not affect forces."""
         first, second = theta[CYLINDER_FIRST], theta[CYLINDER_SECOND]
         least = np.divide(first ** 2, second, out=np.zeros(6), where=second > 0.0)
         return np.where(theta[CYLINDER_MASS] * second < first ** 2, 1.0001 * least,
@@ -241,7 +241,7 @@ def _alike(value: Any, other: Any) -> bool:
 
 
 def _inertial(platform: Array) -> Array:
-    """Return the ten inertial parameters of mass, center of mass and inertia about it."""
+    """Return the ten inertial parameters from mass, center of mass and inertia about it."""
     mass, center, inertia = platform[0], platform[CENTER], platform[INERTIA]
     ten: Array = np.concatenate([[mass], mass * center, about_origin(mass, center, inertia)])
     return ten
@@ -273,7 +273,7 @@ def _platform_scales(p: Parameters) -> Array:
 
 
 def _leg_scales(p: Parameters) -> Array:
-    """Return the scales of all linear parameters; only those of legs are right."""
+    """Return scales of the linear parameters; only the leg parameters are set."""
     mass, length = p['platform.mass'] / 6.0, 2.0 * _size(p)
     weight = _ACCELERATION * mass
     scales: Array = np.empty(LINEAR)

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Uniformly sampled windows of recorded legs: from stamps as they are, gaps and outliers left out.
+Windows of uniform samples from recorded legs, without gaps and outliers.
 
-Positions and efforts may have stamps and rates of their own. Between samples that are at most
-``GAP`` periods apart values are interpolated by cubics through four samples; a longer gap, or a
+Positions and efforts may have different stamps and sampling rates. Values are interpolated by
+cubics through four samples if the samples are at most ``GAP`` periods apart; a longer gap, or a
 jump of the stamps, ends a segment.
 """
 
@@ -30,12 +30,12 @@ from stewart_dynamics.arrays import Array, Flags, Stamps
 
 # A longer time between two samples, in periods, is a gap.
 GAP = 4.0
-# A sample is an outlier if it is so many deviations off the cubic through its neighbours, and
-# half as many off the median of the five around it.
+# A sample is an outlier if it deviates from the cubic through its neighbours by more than this
+# number of standard deviations, and by half as many from the median of five samples.
 _OUTLIER = 12.0
-# Efforts have kinks where a leg reverses: what is off by less is none.
+# Efforts jump when a leg reverses; smaller relative deviations are not outliers.
 _OF_EFFORTS = 2e-3
-# At most so many neighbours are replaced; more of them are no outlier but a step.
+# Longest run of samples that is replaced; a longer one is a step, not an outlier.
 _LONGEST = 3
 
 
@@ -46,7 +46,7 @@ class Signal(NamedTuple):
     values: Array
 
     def between(self, begin: int, end: int) -> Signal:
-        """Return the samples within two stamps."""
+        """Return the samples between two stamps, both included."""
         first, last = np.searchsorted(self.stamps, (begin, end + 1))
         return Signal(self.stamps[first:last], self.values[first:last])
 
@@ -55,9 +55,9 @@ class Window(NamedTuple):
     """Uniform samples of all legs."""
 
     begin: int
-    """Stamp of the first [ns]."""
+    """Stamp of the first sample [ns]."""
     period: float
-    """[s]"""
+    """Sampling period [s]."""
     positions: Array
     """(N, 6) [m]"""
     rates: Array | None
@@ -65,10 +65,10 @@ class Window(NamedTuple):
     efforts: Array
     """(N, 6) as recorded"""
     outliers: Flags
-    """(N, 6): an effort or a position of that leg was replaced."""
+    """(N, 6): an effort or a position of the leg was replaced."""
 
     def with_lag(self, lag: int) -> Window:
-        """Return the window with efforts that are recorded a number of samples later."""
+        """Return the window with efforts taken ``lag`` samples later."""
         if not lag:
             return self
         return self._replace(
@@ -78,7 +78,7 @@ class Window(NamedTuple):
 
 
 def period_of(stamps: Stamps) -> float:
-    """Return the usual time between samples [s]."""
+    """Return the median time between samples [s]."""
     return float(np.median(np.diff(stamps))) * 1e-9
 
 
@@ -92,18 +92,18 @@ def segments(stamps: Stamps, period: float) -> list[slice]:
 
 def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> Window | None:
     """
-    Return the window of samples without gaps; None if there are too few.
+    Return a window of samples without gaps; None if there are too few samples.
 
     Parameters
     ----------
     legs : Signal
         (N, 6) positions, or (N, 12) with rates.
     efforts : Signal
-        (M, 6), of their own stamps.
+        (M, 6) efforts with their own stamps.
     period : float
-        Of the window [s].
+        Sampling period of the window [s].
     many_rates : bool
-        There are rates.
+        Whether ``legs`` contains rates.
 
     """
     if len(legs.stamps) < 8 or len(efforts.stamps) < 8:
@@ -119,7 +119,7 @@ def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> W
     of_legs, of_efforts = (1e-9 * (each.stamps - begin).astype(float)
                            for each in (legs, efforts))
     outliers = _near(of_legs, replaced, at, period) | _near(of_efforts, replaced_too, at, period)
-    # Where efforts are missing there is nothing to fit.
+    # Samples within a gap of the efforts are not fitted.
     after = np.clip(np.searchsorted(of_efforts, at), 1, len(of_efforts) - 1)
     outliers |= (of_efforts[after] - of_efforts[after - 1] > GAP * max(
         period, period_of(efforts.stamps)))[:, None]
@@ -130,7 +130,7 @@ def uniform(legs: Signal, efforts: Signal, period: float, many_rates: bool) -> W
 
 
 def interpolated(times: Array, values: Array, at: Array) -> Array:
-    """Return values (N, k) at times within those given, by cubics through four samples."""
+    """Return values (N, k) at times ``at``, interpolated by cubics through four samples."""
     nearest = np.clip(np.searchsorted(times, at), 0, len(times) - 1)
     if len(at) == len(times) and np.abs(times - at).max() < 1e-7:
         return values
@@ -148,14 +148,14 @@ def interpolated(times: Array, values: Array, at: Array) -> Array:
 
 def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
     """
-    Return values (N, k) with single wild ones replaced by their neighbours, and which.
+    Return values (N, k) with single outliers replaced by their neighbours, and their flags.
 
     Parameters
     ----------
     values : (N, k)
-        At any times.
+        Samples, not necessarily uniform.
     floor : float
-        Deviations at least, by those of the values themselves: for signals with kinks.
+        Minimum deviation relative to the standard deviation of the values, for signals with jumps.
 
     """
     five = np.stack([np.roll(values, shift, axis=0) for shift in range(-2, 3)])
@@ -164,8 +164,8 @@ def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
              + 1e-9 * np.abs(values).max(axis=0))
     wild = (off > _OUTLIER * usual) & (
         np.abs(values - np.median(five, axis=0)) > 0.5 * _OUTLIER * usual) & (
-        np.abs(five[1] - five[3]) < off)  # not a step, as of friction at a reversal
-    # and none of the four around it is farther off
+        np.abs(five[1] - five[3]) < off)  # not a step, such as friction at a reversal
+    # and its four neighbours deviate less
     wild &= off >= np.stack([np.roll(off, shift, axis=0) for shift in (-2, -1, 1, 2)]).max(axis=0)
     wild[:2] = wild[-2:] = False
     if not wild.any():
@@ -183,7 +183,7 @@ def _without_outliers(values: Array, floor: float) -> tuple[Array, Flags]:
 
 
 def _near(times: Array, marked: Flags, at: Array, period: float) -> Flags:
-    """Return which of the uniform samples are next to a marked one (N, 6)."""
+    """Return flags (N, 6) of the uniform samples next to a marked one."""
     near = np.zeros((len(at), marked.shape[1]), dtype=bool)
     rows, columns = np.nonzero(marked)
     index = np.clip(np.round(times[rows] / period).astype(int), 0, len(at) - 1)
