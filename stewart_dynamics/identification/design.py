@@ -22,7 +22,7 @@ identification", IEEE Trans. Robotics and Automation 13, 1997, doi:10.1109/70.63
 coefficients is scaled up to the limits, so that only their ratios are searched, with an
 evolution strategy that adapts the spread of each coefficient (R. Ros, N. Hansen, "A simple
 modification in CMA-ES achieving linear time and space complexity", PPSN X, 2008,
-doi:10.1007/978-3-540-87700-4_30). The result depends on the seed only.
+doi:10.1007/978-3-540-87700-4_30). Equal seeds give equal results.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ _TIMES_NOISE = 10.0
 # Unknowns whose identifiable share is smaller are reported as not identifiable.
 LEAST_TOLD = 0.1
 _HELD = 1e-6
-# Lower bound of the variance of exact efforts [N^2].
+# Lower bound of the residual variance, reached with exact efforts [N^2].
 _SMALLEST_VARIANCE = 1e-12
 
 
