@@ -22,7 +22,7 @@ import pytest
 from referees import rng
 
 from stewart_dynamics.mechanics.least_squares import (
-    combinations, identifiability, Information, information, nothing, solve)
+    combinations, identifiability, Information, information, no_information, solve)
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def test_all_parameters_are_identified_with_the_reported_errors() -> None:
 def test_blocks_sum_to_the_whole() -> None:
     regressor, efforts = samples(1)
     whole = told(regressor, efforts)
-    parts = nothing(4)
+    parts = no_information(4)
     for first in range(0, 400, 7):
         parts = parts.plus(told(regressor[first:first + 7], efforts[first:first + 7]))
     assert parts.rows == whole.rows == 2400
@@ -135,7 +135,7 @@ def test_a_weak_direction_is_not_known() -> None:
 
 def test_without_samples_nothing_is_identifiable() -> None:
     start = np.array([1.0, 2.0, 3.0, 4.0])
-    solution = solve(nothing(4), start, SCALES)
+    solution = solve(no_information(4), start, SCALES)
     assert solution.identifiability.rank == 0
     np.testing.assert_array_equal(solution.values, start)
     assert combinations(solution.identifiability) == ()

@@ -32,7 +32,7 @@ from stewart_dynamics.identification.physical import consistent
 from stewart_dynamics.identification.sums import delayed_by, residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import (
-    Identifiability, Information, LARGEST_ERROR, nothing, solve)
+    Identifiability, Information, LARGEST_ERROR, no_information, solve)
 
 _STEPS = 30
 _DONE = 1e-10
@@ -179,7 +179,7 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
                  ) -> tuple[Information, list[tuple[float, Array, float]], Array | None]:
     """Return the information of the sums, each bag's delay step, and information due to noise."""
     theta, derivative = unknowns.theta(values), unknowns.derivative(values)
-    total, steps = nothing(len(values)), []
+    total, steps = no_information(len(values)), []
     for bag, delay in enumerate(delays):
         c = residual_of(theta, delay)
         gram = np.tensordot(1.0 / variances[bag], sums.grams[bag], axes=1)

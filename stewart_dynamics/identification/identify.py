@@ -41,7 +41,7 @@ from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
-    Likely, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
+    LikelyMistake, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
@@ -120,7 +120,7 @@ class Identified(NamedTuple):
     measured: Array
     """Measured efforts, RMS (6,) [N]."""
     validation: Validation | None
-    likely: tuple[Likely, ...]
+    likely: tuple[LikelyMistake, ...]
     lack_of_fit: LackOfFit | None
     """None if the residuals are noise."""
 

@@ -37,7 +37,8 @@ from stewart_dynamics.identification.lack_of_fit import LackOfFit
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.least_squares import Information, information, nothing, solve
+from stewart_dynamics.mechanics.least_squares import (
+    Information, information, no_information, solve)
 from stewart_dynamics.parameters.table import AUTO, Parameters
 
 # A scale of the efforts within this ratio of a known factor is attributed to that factor.
@@ -58,7 +59,7 @@ _FEWEST = 0.5
 _PIECE = 5.0
 
 
-class Likely(NamedTuple):
+class LikelyMistake(NamedTuple):
     """A likely mistake."""
 
     what: str
@@ -82,17 +83,18 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
     return f'{text}: likely geometry.zero_length or the geometry is wrong, or legs are swapped'
 
 
-def of_delay(bags: Iterable[tuple[float, float]]) -> Iterator[Likely]:
+def of_delay(bags: Iterable[tuple[float, float]]) -> Iterator[LikelyMistake]:
     """Yield a likely mistake for bags, given as delay and its upper limit [s]."""
     for delay, limit in bags:
         if delay >= limit:
-            yield Likely('delay', f'the efforts are later than the positions by {limit:g} s or '
-                                  'more: stamps of both must be of one clock')
+            yield LikelyMistake(
+                'delay', f'the efforts are later than the positions by {limit:g} s or '
+                'more: stamps of both must be of one clock')
             return
 
 
 def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool,
-               ) -> Iterator[Likely]:
+               ) -> Iterator[LikelyMistake]:
     """
     Yield likely mistakes in sign and unit of the efforts.
 
@@ -102,7 +104,7 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
     scale, error = _scale(sums, unknowns, platform_too=False)
     by_file, _ = _scale(sums, unknowns, platform_too=True)
     if not np.isfinite(by_file) or by_file == 0.0:
-        yield Likely('scale', 'all efforts are zero')
+        yield LikelyMistake('scale', 'all efforts are zero')
         return
     if not (np.isfinite(scale) and error < 0.1 * abs(scale)) or (
             # the file's legs may be wrong, but not by this ratio
@@ -113,29 +115,33 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
     if scale < 0.0:
         other = '' if p['geometry.platform_side'] != AUTO else (
             '; or the platform is on the other side of the base: geometry.platform_side')
-        yield Likely('sign', 'the efforts have the opposite sign: + must push, as the forces of '
-                             f'the node do (they are {scale:.3g} times what the model computes)'
-                             f'{other}')
+        yield LikelyMistake(
+            'sign', 'the efforts have the opposite sign: + must push, as the forces of '
+            f'the node do (they are {scale:.3g} times what the model computes)'
+            f'{other}')
         return
     if 1.0 / _FAR < scale < _FAR:
         return
     lead = p['actuator.screw_lead']
     if motor_torque:
-        yield Likely('scale', f'the efforts are {scale:.3g} times what the model computes: likely '
-                     f'actuator.screw_lead, {lead[0]:g} m, is wrong: about '
-                     f'{lead[0] * scale:.3g} m would fit')
+        yield LikelyMistake(
+            'scale', f'the efforts are {scale:.3g} times what the model computes: likely '
+            f'actuator.screw_lead, {lead[0]:g} m, is wrong: about '
+            f'{lead[0] * scale:.3g} m would fit')
         return
     torque = 1.0 if lead is None else lead.mean() / (2.0 * np.pi)
     if lead is not None and 1.0 / _NEAR < scale / torque < _NEAR:
-        yield Likely('torque', f'the efforts are {scale:.3g} times what the model computes: '
-                     'likely torques of the motors in place of forces: --motor-torque takes them')
+        yield LikelyMistake(
+            'torque', f'the efforts are {scale:.3g} times what the model computes: '
+            'likely torques of the motors in place of forces: --motor-torque takes them')
         return
     for factor, unit in _FACTORS:
         if 1.0 / _NEAR < scale / factor < _NEAR:
-            yield Likely('unit', f'the efforts are {scale:.3g} times what the model computes: '
-                                 f'likely {unit}')
+            yield LikelyMistake(
+                'unit', f'the efforts are {scale:.3g} times what the model computes: '
+                f'likely {unit}')
             return
-    yield Likely('torque' if scale < 0.05 else 'scale', (
+    yield LikelyMistake('torque' if scale < 0.05 else 'scale', (
         f'the efforts are {scale:.3g} times what the model computes: ' + (
             'likely torques of the motors in place of forces: --motor-torque takes them, with '
             f'actuator.screw_lead (a lead of {2.0 * np.pi * scale:.2g} m would fit)'
@@ -143,7 +149,7 @@ def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool
 
 
 def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Window,
-           fit: Fit, lack: LackOfFit | None, residual: float) -> Iterator[Likely]:
+           fit: Fit, lack: LackOfFit | None, residual: float) -> Iterator[LikelyMistake]:
     """
     Yield a likely mistake if the residual is a large fraction of the efforts.
 
@@ -168,8 +174,9 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
     first = None if lack is None else lack.causes[0]
     if lack is not None and first is not None and first.what == 'zero_length' and (
             lack.left < _BETTER):
-        yield Likely(first.what, f'geometry.zero_length looks wrong: {first.text}: the residual '
-                                 f'becomes {lack.left:.2f} times as large')
+        yield LikelyMistake(
+            first.what, f'geometry.zero_length looks wrong: {first.text}: the residual '
+            f'becomes {lack.left:.2f} times as large')
         return
     if residual < _SUSPICIOUS:
         return
@@ -200,9 +207,10 @@ def of_fit(p: Parameters, unknowns: Unknowns, extraction: Extraction, window: Wi
                                                  'look swapped'))
     misfit, what, text = min(found)
     if misfit < _BETTER * now:
-        yield Likely(what, f'{text}: the residual becomes {misfit / now:.2f} times as large')
+        yield LikelyMistake(
+            what, f'{text}: the residual becomes {misfit / now:.2f} times as large')
     elif residual > _UNEXPLAINED:
-        yield Likely(*found[0][1:])
+        yield LikelyMistake(*found[0][1:])
 
 
 def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, float]:
@@ -210,7 +218,7 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
     many = len(unknowns.linear)  # a tilt does not change the scale
     theta = unknowns.theta(unknowns.start)
     known = len(theta)
-    total = nothing(many + 1)
+    total = no_information(many + 1)
     for bag in range(len(sums.counts)):
         for leg in range(6):
             gram, count = sums.grams[bag, leg], sums.counts[bag, leg]

@@ -162,7 +162,7 @@ class Combination(NamedTuple):
     coefficients: Array
 
 
-def nothing(many: int) -> Information:
+def no_information(many: int) -> Information:
     """Return the information of no samples about some parameters."""
     return Information(np.zeros((many, many)), np.zeros(many), 0.0, 0)
 

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, FINE, Held, Level, LevelLog, LogLine, OK, Part)
+    ERROR, Held, Level, LevelLog, LogLine, OK, OK_LEVEL, Part)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
@@ -45,7 +45,7 @@ class _Limit:
             consequence: str, now: float) -> None:
         """Note the legs that exceed the limit at a setpoint."""
         if not exceeded:
-            self.held.see(FINE, now)
+            self.held.see(OK_LEVEL, now)
             return
         self.held.see(Level(ERROR, ', '.join(map(words, exceeded)) + consequence), now)
         self.setpoints += 1

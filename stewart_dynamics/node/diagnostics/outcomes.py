@@ -25,7 +25,7 @@ from collections import Counter
 from stewart_dynamics.external_wrench.payload import (
     NAMES, numbers_of, Outcome as PayloadOutcome, Payload, UNITS)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, FINE, Level, LogLine, OK, Part, WARN)
+    ERROR, Level, LogLine, OK, OK_LEVEL, Part, WARN)
 from stewart_dynamics.planned.messages import Outcome
 
 _LONG = 2.0  # [s]
@@ -36,7 +36,7 @@ class _LastOutcome(Part):
 
     def __init__(self) -> None:
         super().__init__()
-        self._last = FINE
+        self._last = OK_LEVEL
         self._values: list[tuple[str, str]] | None = None
         self._lines: list[LogLine] = []
 

@@ -51,7 +51,7 @@ class Level(NamedTuple):
     message: str
 
 
-FINE = Level(OK, '')
+OK_LEVEL = Level(OK, '')
 
 
 class Status(NamedTuple):
@@ -84,7 +84,7 @@ class Held:
     """A state that lasts, and those of a higher level for as long as they are held."""
 
     def __init__(self) -> None:
-        self._state = FINE
+        self._state = OK_LEVEL
         self._seen: dict[int, _Seen] = {}
 
     def see(self, state: Level, now: float) -> None:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, FINE, Held, Level, LogLine, OK, Part, PERIOD, WARN)
+    ERROR, Held, Level, LogLine, OK, OK_LEVEL, Part, PERIOD, WARN)
 from stewart_dynamics.node.diagnostics.setpoints import Answers
 from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
 from stewart_dynamics.setpoints.step import Output
@@ -37,7 +37,7 @@ def singularity_state(output: Output, parameters: Parameters) -> Level:
         return Level(ERROR, f'inside stop_condition{suppressed}: '
                      + _condition(output, parameters, 'stop_condition'))
     if not state.warning:
-        return FINE
+        return OK_LEVEL
     if state.cause is Cause.CROSSED:
         return Level(ERROR, 'det(J) crossed zero since the last setpoint')
     if state.cause is Cause.CONDITION:
@@ -96,7 +96,7 @@ class SingularityDiagnostics(Part):
         if output.singularity.cause is not Cause.CROSSED:
             self.held.see(state, now)
             if self._crossed:
-                self._crossing.see(FINE, now)
+                self._crossing.see(OK_LEVEL, now)
                 self._crossed = False
             return False
         self._crossed = self._crossing_held = True
@@ -104,7 +104,7 @@ class SingularityDiagnostics(Part):
         self._crossings.append(crossing.message)
         self._crossing.see(crossing, now)
         stopped = output.singularity.stopped or not output.solvable
-        self.held.see(state if stopped else FINE, now)
+        self.held.see(state if stopped else OK_LEVEL, now)
         return now - self._crossing_logged_at >= PERIOD
 
     def level(self, now: float) -> int:
