@@ -66,6 +66,7 @@ def test_an_approach_is_within_all_limits_and_ends_in_the_first_point(
     end = Motion.from_euler(START[:3], START[3:], [0.002, 0.0, -0.001], [0.0, 0.003, 0.0])
     times, motion = approach(platform, HOME, end)
     assert check_planned_trajectory(platform, times, motion).accepted
+    assert np.allclose(np.diff(times), 0.01, rtol=0.0, atol=1e-12)  # as a stream needs them
     assert np.array_equal(motion.rows[-1], end.rows)
     assert np.array_equal(motion.rows[0, :12], HOME.rows)
     assert not motion.rows[0, 12:].any()

@@ -27,9 +27,10 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.highlevel import AnyReader
 from running import (
-    assert_only_log_lines, DynamicsNode, executable, own_domain, Peer, PLATFORM, Program, ROOT)
+    assert_only_log_lines, DynamicsNode, executable, nanoseconds, own_domain, Peer, PLATFORM,
+    Program, ROOT)
 from sensor_msgs.msg import JointState
-from stewart_dynamics import Motion
+from stewart_dynamics import approach, Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
@@ -37,6 +38,8 @@ from stewart_dynamics.reference_motion.parameters import ReferenceMotionParamete
 from trajectory_msgs.msg import JointTrajectory
 
 EXAMPLES = ROOT / 'examples'
+sys.path.insert(0, str(EXAMPLES))
+from stream_setpoints import RATE, setpoint  # noqa: E402, I100, I202
 
 HOME = [0.0, 0.0, 1.1, 0.0, 0.0, 0.0]
 THERE = [0.1, -0.05, 1.2, 0.0, 0.1, 0.3]
@@ -132,6 +135,73 @@ def test_a_planned_motion_starts_from_the_measured_legs(
         '/stewart_dynamics/measured_legs within 1 s; give --from, or remap the topic\n')
 
 
+def test_a_stream_begins_with_an_approach_from_the_measured_legs(
+        start: Callable[..., DynamicsNode], run: Run) -> None:
+    node = start()
+    node.until_active()
+    platform = node.platform
+    lengths = platform.inverse_kinematics(Pose.from_euler(THERE[:3], THERE[3:]))
+    zero = platform.parameters['geometry.zero_length']
+    legs = node.peer.writer('/joint_states', JointState)
+    measured = serialize_message(JointState(
+        name=platform.parameters['joints'], position=(lengths - zero).tolist()))
+    before = approach(platform, platform.forward_kinematics(lengths), setpoint(0.0), rate=RATE)
+    expected = [platform.inverse_dynamics(motion) for motion in (
+        before.motion, *(setpoint(n / RATE) for n in range(1, 200)))]
+    rows = np.vstack([np.column_stack([
+        np.atleast_2d(each.lengths) - zero, np.atleast_2d(each.rates),
+        np.atleast_2d(each.forces)]) for each in expected])
+    assert np.abs(rows[0, :6] + zero - lengths).max() < 1e-9
+    program = run('stream_setpoints.py', node.domain, '--timeout', '60.0', '--ros-args', '-r',
+                  'stewart_dynamics/measured_legs:=/joint_states')
+    answers: list[tuple[int, int]] = []
+
+    def streamed() -> bool:
+        """Find each answer among those expected, and return whether the stream has begun."""
+        if not program.stdout:
+            legs.publish(measured)
+        states = node.received('leg_states')
+        if states and not node.fed:
+            stamp = nanoseconds(states[0].header.stamp)
+            node.fed.append(range(stamp, stamp + 10**12, 10_000_000))
+        for state in states[len(answers):]:
+            away = np.abs(rows - [*state.position, *state.velocity, *state.effort]).max(axis=1)
+            assert away.min() < 1e-6
+            answers.append((nanoseconds(state.header.stamp), int(np.argmin(away))))
+        return bool(answers) and answers[-1][1] > len(before.times) + 20
+
+    node.until(lambda: program.ended or streamed(), 'the stream has begun')
+    assert program.stop() == 0, program.stderr
+    assert program.stdout == f'approach over {before.times[-1]:g} s\n'
+    stamps, indices = np.array(answers).T
+    assert indices[0] == 0
+    # Where the motion has begun, stamps are the times of the motion.
+    moving = indices > 0
+    assert len(set((stamps - 10_000_000 * indices)[moving])) == 1
+
+
+def test_a_stream_without_an_approach_within_the_limits_does_not_begin(
+        domain: int, run: Run) -> None:
+    platform = StewartPlatform.from_yaml(PLATFORM)
+    lengths = platform.inverse_kinematics(Pose([0.0, 0.0, 1.6], np.eye(3)))
+    assert lengths.min() > platform.parameters['limits.length_max'].max()
+    peer = Peer(domain)
+    try:
+        legs = peer.writer('/stewart_dynamics/measured_legs', JointState)
+        poses = peer.listen('/stewart_dynamics/setpoint/pose', PoseStamped)
+        measured = JointState(
+            name=platform.parameters['joints'],
+            position=(lengths - platform.parameters['geometry.zero_length']).tolist())
+        program = run('stream_setpoints.py', domain, '--timeout', '60.0')
+        peer.until(lambda: legs.publish(measured) or program.ended, 'it ends')
+        assert program.wait() == 1
+        assert re.fullmatch(r'approach over .* s: rejected: .*limits\.length_max\n',
+                            program.stderr)
+        assert poses == []
+    finally:
+        peer.close()
+
+
 def test_topics_of_a_node_are_recorded_and_its_service_is_called(
         start: Callable[..., DynamicsNode], run: Run, tmp_path: Path) -> None:
     node = start()
@@ -159,7 +229,8 @@ def test_topics_of_a_node_are_recorded_and_its_service_is_called(
     assert len(again.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize('name', ['call_service.py', 'plan_motion.py', 'push_platform.py'])
+@pytest.mark.parametrize('name', [
+    'call_service.py', 'plan_motion.py', 'push_platform.py', 'stream_setpoints.py'])
 def test_without_a_node_it_ends_with_one_line(domain: int, run: Run, name: str) -> None:
     program = run(name, domain, '--timeout', '0.5')
     assert program.wait() == 1

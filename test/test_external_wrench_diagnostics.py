@@ -67,6 +67,15 @@ def test_there_is_none_before_a_measurement_has_come() -> None:
     assert diagnostics.status(6.0) is not None
 
 
+def test_the_age_is_that_of_the_last_measurement_in_use() -> None:
+    diagnostics = ExternalWrenchDiagnostics(HEXAPOD)
+    assert diagnostics.age(5.0) == np.inf
+    felt(diagnostics, 6.0, FIRST)  # without a wrench, but with a pose
+    diagnostics.heard(6.5)  # and rejected
+    assert diagnostics.silence(7.0) == 0.5
+    assert diagnostics.age(7.0) == 1.0
+
+
 def test_it_is_the_last_status() -> None:
     diagnostics = DynamicsDiagnostics(HEXAPOD, ('setpoint/pose',), (), 0.0)
     names = ['setpoints', 'singularity', 'limits', 'timing']

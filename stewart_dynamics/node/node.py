@@ -382,7 +382,7 @@ class DynamicsNode(LifecycleNode):
         # Parameters, load and gravity are those of now, whatever changes meanwhile.
         base = self._setpoints.base.at_rest(known=not self._diagnostics.base.stale(now))
         measured = (
-            self._measured_legs.motion if self._diagnostics.external_wrench.silence(now)
+            self._measured_legs.motion if self._diagnostics.external_wrench.age(now)
             <= self._settings['setpoint.timeout'] else None)
         self._planned.add(planned.answer(
             self._settings, self._setpoints.wrench, data, base, measured), now)

@@ -93,7 +93,8 @@ def approach(platform: StewartPlatform, start: Pose | Motion, end: Pose | Motion
     """
     Return a motion within all limits from rest in a pose to the first point of a motion.
 
-    It takes half of ``limits.velocity_max``, and longer where forces would exceed their limit.
+    It takes half of ``limits.velocity_max``, and longer where forces would exceed their limit. Its
+    points are 1 / rate apart, as a stream of setpoints needs them.
 
     Parameters
     ----------
@@ -137,6 +138,7 @@ def approach_in_pieces(platform: StewartPlatform, start: Array, end: Array, wren
     """
     duration, message = _first_duration(platform, start, end), ''
     for _ in range(_MOST_TRIALS):
+        duration = math.ceil(duration * rate - 1e-9) / rate
         found = _quintic(start, end, duration, rate)
         result = None
         for result in check_in_pieces(platform, np.rint(found.times * 1e9).astype(np.int64),

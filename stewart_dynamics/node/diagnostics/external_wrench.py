@@ -47,7 +47,7 @@ class ExternalWrenchDiagnostics(Part):
         super().__init__()
         self._joints = parameters['joints']
         self._timeout = parameters['setpoint.timeout']
-        self._begun = self._heard = self._estimated_at = NEVER
+        self._begun = self._heard = self._used_at = self._estimated_at = NEVER
         self._estimated = 0
         self._estimate: Estimate | None = None
         self._target: Sequence[float] | None = None
@@ -63,6 +63,10 @@ class ExternalWrenchDiagnostics(Part):
         """Return the time since the last message [s]."""
         return now - self._heard
 
+    def age(self, now: float) -> float:
+        """Return the age of the last measurement that was not rejected [s]."""
+        return now - self._used_at
+
     def estimated(self, estimate: Estimate, target: Sequence[float] | None, now: float) -> bool:
         """
         Note an estimate, and the row of motion of the last setpoint; None without a setpoint.
@@ -70,6 +74,7 @@ class ExternalWrenchDiagnostics(Part):
         Return whether the level has changed since the last report.
         """
         self._estimate, self._target = estimate, target
+        self._used_at = now
         if estimate.wrench is None:
             return False
         self._estimated += 1
