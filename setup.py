@@ -55,6 +55,7 @@ extras_require = {
     ],
     'mujoco': ['mujoco>=3.2'],
     'parquet': ['pyarrow>=14'],
+    'plot': ['matplotlib>=3.5'],
     'ros': [
         'ros-jazzy-common-interfaces~=5.3',
         'ros-rclpy[fastrtps]~=7.1.6',

@@ -85,7 +85,8 @@ def differentiated(differentiator: Differentiator, batches: Any) -> Batch:
     done.append(differentiator.finish())
     # nothing is done yet, or something with a row of the base for each
     some = [each for each in done if len(each.stamps)]
-    return Batch(*map(np.concatenate, zip(*some, strict=True))) if some else done[-1]
+    return Batch(*(None if parts[0] is None else np.concatenate(parts)
+                   for parts in zip(*some, strict=True))) if some else done[-1]
 
 
 def worst(a: Array, b: Array) -> float:

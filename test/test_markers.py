@@ -423,7 +423,7 @@ def test_markers_show_the_answer(node: DynamicsNode) -> None:
     seen = _seen(node)
     sample = Sample((0.1, -0.05, 1.15), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
                     (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
-    stamp = node.stamp()
+    stamp = node.stamp() + 10 * SECOND  # time for the legs to move there
     node.answer(sample, stamp=stamp)
     node.until(lambda: stamp in _stamps(seen), 'it is drawn')
     motion = tuple(sample.motion().rows.ravel().tolist())

@@ -55,8 +55,8 @@ KEYS = {
     'yaml': 'python3-yaml',
     'zstandard': ''}
 # Modules that are imported where an option asks for them, and the extra that brings them.
-OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'mujoco': 'mujoco',
-            'pyarrow': 'parquet', 'scipy': 'differentiate'}
+OPTIONAL = {'dask': 'cluster', 'distributed': 'cluster', 'matplotlib': 'plot',
+            'mujoco': 'mujoco', 'pyarrow': 'parquet', 'scipy': 'differentiate'}
 # Modules whose name on PyPI is not their own.
 PIP_NAMES = {'mcap_ros2': 'mcap-ros2-support', 'pinocchio': 'pin', 'yaml': 'pyyaml'}
 

@@ -476,15 +476,14 @@ def dipping(gap: float, depth: float, extra: float) -> Trajectory:
 def solved_rows(trajectory: Trajectory, monkeypatch: pytest.MonkeyPatch) -> tuple[bool, int]:
     """Return whether a trajectory is accepted, and for how many samples the legs are computed."""
     rows_solved: list[int] = []
-    solve = StewartPlatform.solve
+    solve = batch.solve
 
-    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None,
-                bases: Array | None = None) -> Array:
+    def counted(constants: Array, rows: Array, *loads: Array | None) -> Array:
         rows_solved.append(len(rows))
-        return solve(platform, rows, wrenches, bases)
+        return solve(constants, rows, *loads)
 
     with monkeypatch.context() as patch:
-        patch.setattr(StewartPlatform, 'solve', counted)
+        patch.setattr(batch, 'solve', counted)
         accepted = check(trajectory, UNBOUND).accepted
     return accepted, sum(rows_solved)
 

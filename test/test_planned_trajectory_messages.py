@@ -239,14 +239,13 @@ def test_within_warn_condition_it_is_accepted_with_a_warning() -> None:
 
 def test_no_piece_is_larger_than_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     solved: list[int] = []
-    solve = StewartPlatform.solve
+    solve = batch.solve
 
-    def counted(platform: StewartPlatform, rows: Array, wrenches: Array | None = None,
-                bases: Array | None = None) -> Array:
+    def counted(constants: Array, rows: Array, *loads: Array | None) -> Array:
         solved.append(len(rows))
-        return solve(platform, rows, wrenches, bases)
+        return solve(constants, rows, *loads)
 
-    monkeypatch.setattr(StewartPlatform, 'solve', counted)
+    monkeypatch.setattr(batch, 'solve', counted)
     for step in (SECOND, SECOND // 1000):
         times, rows = sampled('clear', step)
         total = 0

@@ -719,9 +719,11 @@ def check_many(given: Sequence[tuple[str, bytes]], cuts: Sequence[int], **option
         batch = many.setpoints.take_many(whole.chosen(slice(first, end)))
         assert batch.motions.shape == (len(batch.stamps), 24)
         assert batch.wrenches.shape == (len(batch.stamps), 6)
-        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart)
-                  for stamp, motion, wrench, restart in zip(
-                      *(part.tolist() for part in batch[:4]), strict=True)]
+        stamped = np.ones(len(batch.stamps), dtype=bool) if batch.stamped is None else (
+            batch.stamped)
+        found += [Setpoint(stamp, tuple(motion), tuple(wrench), restart, stamped=known)
+                  for stamp, motion, wrench, restart, known in zip(
+                      *(part.tolist() for part in (*batch[:4], stamped)), strict=True)]
         found_times += batch.times.tolist()
     # repr: the very same bits
     assert list(map(repr, found)) == list(map(repr, expected))

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator
 from pathlib import Path
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -87,7 +88,8 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
         given.center and tuple(given.center), given.noise, given.rate, given.generations,
         given.seed)
     print(f'designing a motion of {asked.duration:g} s in {asked.generations} generations: takes '
-          'about half a minute on an idle computer, minutes on a loaded one', flush=True)
+          'about half a minute on an idle computer, minutes on a loaded one',
+          file=sys.stderr, flush=True)
     tenth = max(1, asked.generations // 10)
     begun = time.monotonic()
 
@@ -96,7 +98,8 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
         if bar.disable and done % tenth == 0:  # no terminal
             elapsed = time.monotonic() - begun
             print(f'designed {100 * done // asked.generations} %, about '
-                  f'{elapsed * (asked.generations / done - 1.0):.0f} s left', flush=True)
+                  f'{elapsed * (asked.generations / done - 1.0):.0f} s left',
+                  file=sys.stderr, flush=True)
 
     with tqdm(total=asked.generations, disable=None, leave=False, dynamic_ncols=True,
               bar_format='{percentage:3.0f}%|{bar}| designing, {remaining} left') as bar:
