@@ -184,8 +184,8 @@ def test_the_file_is_for_stewart_trajectory(
 def test_a_motion_may_be_designed_for_the_tilt_as_well(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / 'designed'
-    code, out, err = run(capsys, *QUICK[:-1], 'platform,friction,tilt', '--output', folder)
-    assert (code, err) == (0, '')
+    code, out, _ = run(capsys, *QUICK[:-1], 'platform,friction,tilt', '--output', folder)
+    assert code == 0
     half_widths = {words[0]: (float(words[2]), words[3]) for words in (
         line.split() for line in out.splitlines()[1:15])}
     for axis in 'xy':
@@ -203,8 +203,9 @@ def test_a_failed_design_is_reported_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: Any, said: str) -> None:
     code, out, err = run(capsys, *arguments, '--output', tmp_path / 'designed')
     assert (code, out) == (2, '')
-    assert len(err.splitlines()) == 1
-    assert said in err
+    *progress, line = err.splitlines()
+    assert all(each.startswith('design') for each in progress)
+    assert said in line
     assert not list(tmp_path.iterdir())
 
 

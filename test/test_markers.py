@@ -32,6 +32,7 @@ from referees import (  # noqa: E402
     QUARTER_TURN, random_motion, random_parameters, rng, size_of, symmetric_parameters)
 from running import DynamicsNode, nanoseconds, NODE, PLATFORM, Sample  # noqa: E402
 from stewart_dynamics import Parameters, Pose, StewartPlatform  # noqa: E402
+from stewart_dynamics.arrays import SECOND  # noqa: E402
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion  # noqa: E402
 from stewart_dynamics.node import markers as module  # noqa: E402
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, WARN  # noqa: E402

@@ -28,6 +28,7 @@ from scipy.interpolate import CubicHermiteSpline
 from simulated import simulated, UNLIMITED
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import MotionError, ParameterError
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)

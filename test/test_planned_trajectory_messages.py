@@ -30,6 +30,7 @@ from scipy.spatial.transform import Rotation
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, Motion, MotionError, Parameters, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.planned.messages import Outcome
 from stewart_dynamics.planned.trajectory import NOT_INCREASING, PIECE, TOO_FAR

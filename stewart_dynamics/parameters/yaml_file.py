@@ -350,7 +350,7 @@ def write_yaml(path: str | Path, values: Mapping[str, Any], comments: Mapping[st
         write_files({Path(path): (head + '\n'.join([*lines, ''])).encode('utf-8')})
     except (OSError, TypeError, ValueError) as exc:
         reason = exc.strerror if isinstance(exc, OSError) else exc
-        raise ParameterError(f'{shown_name(path)}: cannot be written: {reason}') from exc
+        raise ParameterError(f'{one_line(path)}: cannot be written: {reason}') from exc
 
 
 def _lines(tree: Mapping[str, Any], indent: str) -> Iterator[str]:
