@@ -57,6 +57,9 @@ _SUSPICIOUS = 4.0
 # its minimum in frequencies.
 _BAND, _SMOOTHING, _FEWEST = 0.9, 0.5, 8
 _COLLINEAR = 1e-7
+# The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
+# are widened by this multiple of the change of each unknown.
+_WIDENING = 1.5
 # Penalty on the statistic for each column of a cause.
 _PENALTY = 4.0
 
@@ -82,7 +85,7 @@ class LackOfFit(NamedTuple):
     others: tuple[Found, ...]
     """Causes that explain the residuals nearly as well as the first."""
     shifts: Array
-    """(k,) change of each unknown if the causes are added to the model"""
+    """(k,) amount by which the interval of each unknown is widened on both sides"""
     left: float
     """Fraction of the residual RMS that remains with the first cause."""
     unexplained: bool
@@ -205,7 +208,7 @@ def _lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknow
         return None
     amounts = scores.amounts(taken)
     first = squares.statistic(found[0].places)[0] / squares.squares
-    return LackOfFit(tuple(found), others, np.abs(follow[:, taken] @ amounts),
+    return LackOfFit(tuple(found), others, _WIDENING * np.abs(follow[:, taken] @ amounts),
                      math.sqrt(max(0.0, 1.0 - first)), bool(ranked) or found[0].what == UNKNOWN)
 
 
