@@ -159,7 +159,8 @@ def test_libraries_to_install_by_pip_or_rosdep_are_those_of_the_package() -> Non
     setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
     needed = set(re.findall(
         r"^    '(\w+)", setup.partition('install_requires = [')[2].partition(']\n')[0], re.M))
-    by_pip = set(re.findall(r'^    pip install (\w[\w ]+)$', README, re.M)[0].split())
+    command, = re.findall(r'^    pip install (\w.+ rosbags .+)$', README, re.M)
+    by_pip = set(re.findall(r"(?:^| )'?(\w+)", command))
     packages = (ROOT / 'package.xml').read_text(encoding='utf-8').replace('python3-yaml', 'pyyaml')
     assert by_pip <= needed
     assert all(name in by_pip or f'>{name}<' in packages or f'>python3-{name}<' in packages
