@@ -367,6 +367,10 @@ def test_when_commands_stop_the_brakes_engage_until_the_next(begin: Start) -> No
                         'it rises')
         simulator.until(lambda: not any([*simulator.last().velocity, *simulator.last().effort]),
                         'it is at rest')
+        # the pose of that time comes on a topic of its own
+        rest = nanoseconds(simulator.last().header.stamp)
+        simulator.until(lambda rest=rest: nanoseconds(simulator.last('pose').header.stamp) >= rest,
+                        'its pose has come')
         height = simulator.last('pose').pose.position.z
         many = len(simulator.raw['twist'])
         simulator.until(lambda many=many: len(simulator.raw['accel']) > many + 50, 'it goes on')
