@@ -37,7 +37,7 @@ from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.pose import Pose
 from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
 from stewart_dynamics.mechanics.platform_arguments import copies, motion_rows
-from stewart_dynamics.mechanics.rows import ACCELERATION, POSE, TWIST
+from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Names of the codes of ``travel``.
@@ -234,7 +234,7 @@ class Capability:
         Parameters
         ----------
         motion : Motion
-            Samples of the motion, (...). Only these are looked at: see ``dense``.
+            Samples of the motion, (...); the motion between them is not checked.
         wrench : (..., 6), optional
             External wrench, which does not depend on the speed.
         base : BaseMotion, optional
@@ -296,14 +296,14 @@ class Capability:
     def _at_rest(self, pose: Pose | Motion, base: BaseMotion | None,
                  motion: Motion | None = None) -> Array:
         """Return the leg forces (..., 6) at a pose without acceleration."""
-        rows = np.zeros((*pose.shape, 24))
-        if motion is not None:
-            if not isinstance(motion, Motion):
-                raise wrong_type('motion', motion, 'a Motion')
-            rows = np.zeros((*common_shape(pose=pose.shape, motion=motion.shape), 24))
-            rows[..., TWIST] = motion.rows[..., TWIST]
+        if motion is not None and not isinstance(motion, Motion):
+            raise wrong_type('motion', motion, 'a Motion')
+        shape = pose.shape if motion is None else common_shape(
+            pose=pose.shape, motion=motion.shape)
+        rows = np.zeros((*shape, MOTION))
         rows[..., POSE] = pose.rows[..., POSE]
-        rows[..., ACCELERATION] = 0.0
+        if motion is not None:
+            rows[..., TWIST] = motion.rows[..., TWIST]
         return self.platform.inverse_dynamics(Motion.of_rows(rows), base=base).forces
 
     def _per_wrench(self, pose: Pose | Motion, wrenches: Array) -> Array:
