@@ -64,6 +64,8 @@ class Task(NamedTuple):
     options: Options
 
 
+At = Callable[[int, int, int], None]
+"""Called with the number of a bag, its bytes read and its setpoints answered so far."""
 Results = Generator[tuple[int, Ended], None, None]
 """Number and outcome of each bag, as they end; closing the generator stops the run."""
 
@@ -138,9 +140,8 @@ def failed(task: Task, why: str) -> Ended:
                  error=why if why.startswith(f'{task.bag}') else f'{task.bag}: {why}')
 
 
-def counted(number: int, report: Callable[[int, int, int], None],
-            every: float) -> Callable[[int, int], None]:
-    """Return a function that sums up the progress of a bag and reports it at an interval."""
+def counted(report: Callable[[int, int], None], every: float) -> Callable[[int, int], None]:
+    """Return a function that sums up bytes and setpoints, and reports the sums at an interval."""
     read = setpoints = 0
     reported = time.monotonic()
 
@@ -150,6 +151,6 @@ def counted(number: int, report: Callable[[int, int, int], None],
         now = time.monotonic()
         if now - reported >= every:
             reported = now
-            report(number, read, setpoints)
+            report(read, setpoints)
 
     return progress

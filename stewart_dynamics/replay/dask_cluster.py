@@ -27,10 +27,8 @@ from typing import Any
 
 from stewart_dynamics.errors import one_line, StewartError
 from stewart_dynamics.replay.bag_task import (
-    Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Results, Task)
-from stewart_dynamics.replay.progress_bar import ProgressBar
+    At, Cancelled, CLUSTER_INTERVAL, counted, Ended, failed, finished, replay_task, Results, Task)
 
-_TRIES = 2
 # How long workers may take to remove partial results of a cancelled run [s].
 _PATIENCE = 20.0
 
@@ -39,53 +37,50 @@ _cancelled: set[str] = set()
 _in_work: set[tuple[str, int]] = set()
 
 
-def replay_on_cluster(
-        tasks: Sequence[Task], address: str, bar: ProgressBar) -> Results:
-    """Replay on a cluster; Dask starts a bag again whose worker died."""
-    run = tasks[0].options.run if tasks else ''
+def replay_on_cluster(tasks: Sequence[Task], address: str, at: At) -> Results:
+    """Replay on a cluster; ``at`` is called with the progress."""
+    run = tasks[0].options.run
     dask = _dask()
-    with _silent('distributed', 'distributed.client'), _connected(dask, address) as client:
-        client.subscribe_topic(run, lambda event: bar.at(*event[1]))
+    with _connected(dask, address) as client:
+        client.subscribe_topic(run, lambda event: at(*event[1]))
         try:
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (TimeoutError, asyncio.TimeoutError) as exc:
             raise StewartError(
                 f'{address}: this scheduler had no worker within {_PATIENCE:g} s') from exc
-        futures: dict[Any, Task] = {}
+
+        def submit(task: Task, attempt: int) -> Any:
+            task = task._replace(bag=task.bag.absolute(), folder=task.folder.absolute())
+            return client.submit(_on_worker, task, pure=False,
+                                 key=f'stewart_replay-{run}-{task.number}-{attempt}')
+
+        # A result is released at once: if the worker that holds it died, the bag would be
+        # replayed again.
+        pending = {submit(task, 1): task for task in tasks}
         suspects: list[Task] = []
-
-        def submit(task: Task, key: str) -> Any:
-            future = client.submit(
-                _on_worker, task._replace(bag=task.bag.absolute(), folder=task.folder.absolute()),
-                key=f'stewart_replay-{run}-{key}', pure=False)
-            futures[future] = task
-            return future
-
         try:
-            for future in dask.as_completed(
-                    [submit(task, f'{task.number}') for task in tasks], loop=client.loop):
-                # Release it, or it would be replayed again if the worker that holds its
-                # result died.
-                task = futures.pop(future)
+            for future in dask.as_completed(list(pending), loop=client.loop):
+                task = pending.pop(future)
                 try:
                     yield task.number, _result(dask, future, task)
                 except dask.KilledWorker:
                     suspects.append(task)
-            # Dask blames bags that only waited for a dead worker as well: each is replayed
+            # Dask also blames bags that only waited for a worker that died: each is replayed
             # alone now.
             for task in suspects:
-                future = submit(task, f'{task.number}-alone')
+                future = submit(task, 2)
+                pending[future] = task
                 try:
                     ended = _result(dask, future, task)
                 except dask.KilledWorker as exc:
                     ended = failed(
                         task, 'the worker that replayed it died '
-                        f'{_TRIES * (exc.allowed_failures + 1)} times, the last one at '
+                        f'{2 * (exc.allowed_failures + 1)} times, the last one at '
                         f'{exc.last_worker.address} (out of memory?)')
-                del futures[future]
+                del pending[future]
                 yield task.number, ended
         except BaseException:
-            client.cancel(list(futures))
+            client.cancel(list(pending))
             with suppress(Exception):  # a worker that died has nothing to remove
                 client.run(_stop, run)
             raise
@@ -113,30 +108,25 @@ def _dask() -> Any:
 
 
 @contextmanager
-def _silent(*names: str) -> Iterator[None]:
-    """Silence loggers: errors are reported for each bag, without tracebacks."""
-    loggers = [logging.getLogger(name) for name in names]
+def _connected(dask: Any, address: str) -> Iterator[Any]:
+    """Yield a client whose loggers are silent: errors are reported for each bag in one line."""
+    loggers = [logging.getLogger(name) for name in ('distributed', 'distributed.client')]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)
     try:
-        yield
+        try:
+            # Tried first: a client that does not find the scheduler prints a traceback.
+            asyncio.run(_answer(dask, address))
+            client = dask.Client(address, timeout=_PATIENCE, set_as_default=False)
+        except Exception as exc:
+            raise StewartError(
+                f'{address}: no Dask scheduler answers there: {one_line(exc)}') from exc
+        with client:
+            yield client
     finally:
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
-
-
-@contextmanager
-def _connected(dask: Any, address: str) -> Iterator[Any]:
-    try:
-        # Tried first: a client that does not find the scheduler prints a traceback.
-        asyncio.run(_answer(dask, address))
-        client = dask.Client(address, timeout=_PATIENCE, set_as_default=False)
-    except Exception as exc:
-        why = one_line(exc)
-        raise StewartError(f'{address}: no Dask scheduler answers there: {why}') from exc
-    with client:
-        yield client
 
 
 async def _answer(dask: Any, address: str) -> None:
@@ -149,14 +139,13 @@ async def _answer(dask: Any, address: str) -> None:
 def _on_worker(task: Task) -> Ended:
     """Replay a bag in a thread of a worker."""
     worker, run = _dask().get_worker(), task.options.run
-
-    tell = counted(
-        task.number, lambda *how_far: worker.log_event(run, how_far), CLUSTER_INTERVAL)
+    report = counted(lambda *how_far: worker.log_event(run, (task.number, *how_far)),
+                     CLUSTER_INTERVAL)
 
     def progress(read: int, setpoints: int) -> None:
         if run in _cancelled:
             raise Cancelled
-        tell(read, setpoints)
+        report(read, setpoints)
 
     _in_work.add((run, task.number))
     try:

@@ -26,9 +26,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from functools import partial
 import os
 from pathlib import Path
-import shutil
+import sys
+import threading
 from typing import NamedTuple
 import uuid
 
@@ -37,11 +39,11 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.bag_task import (
-    counted, Ended, kept, LOCAL_INTERVAL, replay_task, Results, Task)
+    At, counted, Ended, kept, LOCAL_INTERVAL, replay_task, Results, Task)
 from stewart_dynamics.replay.index import Cell, listed_results, SEVERITY, write_fleet
-from stewart_dynamics.replay.progress_bar import ProgressBar
 from stewart_dynamics.replay.replay_options import LIMIT_MET, Options
-from stewart_dynamics.reporting.results_folder import partial_name, remove_abandoned
+from stewart_dynamics.reporting.results_folder import remove_abandoned
+from tqdm import tqdm
 
 _SEVERITY = (DONE, LIMIT_MET, PARTLY_READ, BAD_INPUT).index
 
@@ -115,8 +117,8 @@ def replay_fleet(
     order = sorted((task for task in tasks if task.number not in ended),
                    key=lambda task: -sizes[task.number])
     try:
-        with closing(ProgressBar(sizes, show_progress, len(ended))) as bar, closing(
-                _results(order, jobs, scheduler, bar)) as results:
+        with closing(_ProgressBar(sizes, show_progress, len(ended))) as bar, closing(
+                _results(order, jobs, scheduler, bar.at)) as results:
             for number, result in results:
                 bag, folder = bags[number]
                 ended[number] = result._replace(bag=bag, folder=folder)
@@ -125,24 +127,25 @@ def replay_fleet(
         raise KeyboardInterrupt(f'{len(ended)} of {len(tasks)} bags are done; the same command '
                                 'continues with the others') from None
     finally:
-        _remove_partial(tasks, options.run)
+        remove_abandoned(task.folder for task in tasks)  # of processes that died
     fleet = Fleet(tuple(ended[number] for number in range(len(tasks))))
     write_fleet(output, [_row(each, output) for each in fleet.ended])
     return fleet
 
 
-def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, bar: ProgressBar) -> Results:
+def _results(tasks: Sequence[Task], jobs: int, scheduler: str | None, at: At) -> Results:
     if not tasks:
         return
     if scheduler is not None:
         from stewart_dynamics.replay.dask_cluster import replay_on_cluster
-        yield from replay_on_cluster(tasks, scheduler, bar)
+        yield from replay_on_cluster(tasks, scheduler, at)
     elif jobs > 1:
         from stewart_dynamics.replay.local_processes import replay_in_processes
-        yield from replay_in_processes(tasks, min(jobs, len(tasks)), bar)
+        yield from replay_in_processes(tasks, jobs, at)
     else:
         for task in tasks:
-            yield task.number, replay_task(task, counted(task.number, bar.at, LOCAL_INTERVAL))
+            yield task.number, replay_task(
+                task, counted(partial(at, task.number), LOCAL_INTERVAL))
 
 
 def _check_replaceable(tasks: Sequence[Task], done: Mapping[int, Ended], output: Path,
@@ -177,22 +180,56 @@ def _row(ended: Ended, output: Path) -> dict[str, Cell]:
     return {**ended.row, 'bag': str(ended.bag), 'results': results}
 
 
-def _remove_partial(tasks: Sequence[Task], run: str) -> None:
-    """Remove partial results of processes that died or were stopped."""
-    begun: dict[Path, dict[str, Path]] = {}
-    for task in tasks:
-        begun.setdefault(task.folder.parent, {})[partial_name(task.folder, run)] = task.folder
-    for parent, beginnings in begun.items():
-        try:
-            left = [path for path in parent.iterdir() if f'.{run}.' in path.name]
-        except OSError:  # was not created
-            continue
-        for path in left:
-            folder = next((folder for beginning, folder in beginnings.items()
-                           if path.name.startswith(beginning)), None)
-            if folder is None:
-                continue
-            if path.name.endswith('.replaced') and not folder.exists():
-                path.rename(folder)  # its replacement was not completed
-            else:
-                shutil.rmtree(path, ignore_errors=True)
+class _ProgressBar:
+    """
+    A line on stderr: bags, setpoints, their rate and the time left.
+
+    The time left is estimated from bytes, since bags differ in size.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Size of each bag [bytes]; zero if it need not be replayed.
+    show : bool, optional
+        None: only if stderr is a terminal.
+    ended : int
+        Number of bags that are done already.
+
+    """
+
+    def __init__(self, sizes: Sequence[int], show: bool | None, ended: int) -> None:
+        self._sizes, self._ended = sizes, ended
+        self._read, self._setpoints = [0] * len(sizes), [0] * len(sizes)
+        self._lock = threading.Lock()  # Dask reports progress in another thread
+        self._line = tqdm(
+            total=sum(sizes), file=sys.stderr, dynamic_ncols=True, smoothing=0.1,
+            disable=True if not sum(sizes) else None if show is None else not show,
+            bar_format='{percentage:3.0f}%|{bar}| {desc}, {remaining} left')
+
+    def at(self, number: int, read: int, setpoints: int) -> None:
+        """Show that these bytes and setpoints of a bag are done."""
+        with self._lock:
+            # Part of a bag may be read twice.
+            read = min(read, self._sizes[number])
+            more = read - self._read[number]
+            self._read[number], self._setpoints[number] = read, setpoints
+            total = sum(self._setpoints)
+            passed = self._line.format_dict['elapsed']
+            self._line.set_description_str(
+                f'{self._ended}/{len(self._sizes)} bags, {_short(total)} setpoints, '
+                f'{_short(total / passed) if total and passed else "?"}/s', refresh=False)
+            self._line.update(more)
+
+    def end(self, number: int, ended: Ended) -> None:
+        """Show that a bag is done."""
+        self._ended += 1
+        self.at(number, self._sizes[number], int(ended.row.get('setpoints') or 0))
+
+    def close(self) -> None:
+        """End the line."""
+        self._line.refresh()
+        self._line.close()
+
+
+def _short(number: float) -> str:
+    return f'{number:.0f}' if number < 1000 else tqdm.format_sizeof(number)

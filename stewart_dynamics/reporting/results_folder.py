@@ -89,7 +89,7 @@ def _new_folder(final: Path, run: str) -> tuple[Path, int]:
     """Return a folder for partial results, and the descriptor that locks it."""
     while True:
         partial = Path(tempfile.mkdtemp(
-            prefix=f'{partial_name(final, run)}partial.', dir=final.parent))
+            prefix=f'{_beginning(final)}{run or "one"}.partial.', dir=final.parent))
         try:
             lock = os.open(partial, os.O_RDONLY)
         except FileNotFoundError:  # another run has removed it before it was locked
@@ -138,11 +138,6 @@ def _remove_if_abandoned(path: Path, final: Path) -> None:
             shutil.rmtree(path, ignore_errors=True)
     finally:
         os.close(descriptor)
-
-
-def partial_name(final: Path, run: str) -> str:
-    """Return the prefix of the names of partial results, of a folder in a run."""
-    return f'{_beginning(final)}{run or "one"}.'
 
 
 def _beginning(final: Path) -> str:
