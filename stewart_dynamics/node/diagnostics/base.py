@@ -21,14 +21,16 @@ from collections.abc import Sequence
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, last_heard, Level, LogLine, NEVER, OK, Part, silent_topics)
+    ERROR, last_heard, Level, LogLine, NEVER, OK, Part, silent_topics)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Setpoint
 
 _QUANTITIES = (('gravity', 'm/s^2', GRAVITY), ('acceleration', 'm/s^2', BASE_ACCELERATION),
                ('angular velocity', 'rad/s', BASE_ANGULAR_VELOCITY),
                ('angular acceleration', 'rad/s^2', BASE_ANGULAR_ACCELERATION))
+_REJECTED, _UNKNOWN = 'rejected', 'unknown'
 
 
 class BaseDiagnostics(Part):
@@ -47,14 +49,13 @@ class BaseDiagnostics(Part):
     name = 'base'
 
     def __init__(self, parameters: Parameters, topics: Sequence[str]) -> None:
-        super().__init__()
+        super().__init__(_REJECTED, _UNKNOWN)
         self._timeout: float = parameters['base.timeout']
         self._heard = dict.fromkeys(topics, NEVER)
         self._samples = 0
         self._sampled_at = NEVER
         self._row: Sequence[float] = ()
         self._unknown = 0
-        self._unknown_held = Held()
 
     def heard(self, topic: str, now: float) -> None:
         """Note that a message has arrived."""
@@ -67,6 +68,11 @@ class BaseDiagnostics(Part):
         if base.last:
             self._row = base.last[1]
 
+    def rejected(self, rejection: Rejection, details: str, now: float,
+                 cause: str = _REJECTED) -> None:
+        """Note a rejection."""
+        super().rejected(rejection, details, now, cause)
+
     def stale(self, now: float) -> bool:
         """Return whether no recent sample is available."""
         return now - self._sampled_at > self._timeout
@@ -75,7 +81,7 @@ class BaseDiagnostics(Part):
         """Note a setpoint that was answered."""
         if not setpoint.base_known:
             self._unknown += 1
-            self._unknown_held.happened(Level(ERROR, self._why(now)), now)
+            self.held.happened(Level(ERROR, self._why(now)), now, _UNKNOWN)
 
     def level(self, now: float) -> int:
         """Return the present level."""
@@ -83,7 +89,7 @@ class BaseDiagnostics(Part):
 
     def state(self, now: float) -> Level:
         """Return the present level and its cause."""
-        lack, held = self._lack(now), self.held.at(now)
+        lack, held = self._lack(now), self.held.of(_REJECTED, now)
         return held if held.level > lack.level else lack
 
     def values(self, now: float) -> list[tuple[str, str]] | None:
@@ -102,13 +108,13 @@ class BaseDiagnostics(Part):
     def log_lines(self, now: float) -> list[LogLine]:
         """Return that there are no forces, and that there are again; rejections are logged."""
         # Where nothing has begun, nothing is wrong.
-        return self._log.lines(self._lack(now)) if self._samples or self._unknown else []
+        return self._changed(self._lack(now)) if self._samples or self._unknown else []
 
     def _lack(self, now: float) -> Level:
         """Return whether the base's motion is missing."""
         if self.stale(now):
             return Level(ERROR, f'no forces: {self._why(now)}')
-        unknown = self._unknown_held.at(now)
+        unknown = self.held.of(_UNKNOWN, now)
         return (Level(unknown.level, f'no forces: {unknown.message}') if unknown.level
                 else Level(OK, 'its motion is known'))
 
@@ -116,7 +122,7 @@ class BaseDiagnostics(Part):
         """Return why the base's motion is unknown."""
         silent = silent_topics(self._heard, self._timeout, now)
         if silent or self.stale(now):
-            return silent or self.held.at(now).message or (
+            return silent or self.held.of(_REJECTED, now).message or (
                 'its topics arrive, but are not joined: their stamps differ')
         return ('the stamps of the base and of setpoints differ by more than base.timeout, '
                 f'{self._timeout:g} s')

@@ -24,10 +24,9 @@ from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiag
 from stewart_dynamics.node.diagnostics.limits import LimitsDiagnostics
 from stewart_dynamics.node.diagnostics.outcomes import (
     PayloadDiagnostics, PlannedTrajectoryDiagnostics)
-from stewart_dynamics.node.diagnostics.periodic_report import Report, TICK
-from stewart_dynamics.node.diagnostics.setpoints import Answers, SetpointDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import Answers, Report, TICK
+from stewart_dynamics.node.diagnostics.setpoints import SetpointDiagnostics, TimingDiagnostics
 from stewart_dynamics.node.diagnostics.singularity import SingularityDiagnostics
-from stewart_dynamics.node.diagnostics.timing import TimingDiagnostics
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.rejections import Rejection
 from stewart_dynamics.setpoints.step import Output

@@ -16,41 +16,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
 
 from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, Level, LevelLog, LogLine, OK, OK_LEVEL, Part)
-from stewart_dynamics.node.diagnostics.setpoints import Answers
+    Answers, ERROR, Level, LogLine, OK_LEVEL, Part)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
 
-
 # Factor by which legs exceed their maximum length if positions are in mm instead of m.
 _MILLIMETRES = 1000.0
-
-
-class _Limit:
-    """State of one kind of limit."""
-
-    def __init__(self) -> None:
-        self.held = Held()
-        self.log = LevelLog(LimitsDiagnostics.name)
-        self.setpoints = 0
-        """Number of setpoints that have exceeded it."""
-        self.worst: Exceedance | None = None
-
-    def see(self, exceeded: Sequence[Exceedance], words: Callable[[Exceedance], str],
-            consequence: str, now: float) -> None:
-        """Note the legs that exceed the limit at a setpoint."""
-        if not exceeded:
-            self.held.see(OK_LEVEL, now)
-            return
-        self.held.see(Level(ERROR, ', '.join(map(words, exceeded)) + consequence), now)
-        self.setpoints += 1
-        worst = self.worst
-        self.worst = max([*exceeded, worst] if worst else exceeded, key=_amount)
 
 
 class LimitsDiagnostics(Part):
@@ -69,15 +45,15 @@ class LimitsDiagnostics(Part):
     name = 'limits'
 
     def __init__(self, parameters: Parameters, answers: Answers) -> None:
-        super().__init__()
+        super().__init__(*LIMITS, JUMP)
         self._joints: tuple[str, ...] = parameters['joints']
         self.parameters = parameters
         self._answers = answers
         self._output: Output | None = None
-        self._limits = {name: _Limit() for name in (*LIMITS, JUMP)}
+        self._setpoints = Counter[str]()  # that exceed each limit
+        self._worst: dict[str, Exceedance] = {}
         self._suppressed = 0
         self._exceeding = False
-        self._any_held = False  # one of them may be held
         self._largest_force, self._its_leg = 0.0, 0
 
     def answered(self, output: Output, now: float) -> None:
@@ -91,34 +67,29 @@ class LimitsDiagnostics(Part):
                 self._largest_force = max(forces, key=abs)
                 self._its_leg = forces.index(self._largest_force)
         if output.exceedances or self._exceeding:
-            self._any_held = True
             self._exceeding = bool(output.exceedances)
             suppressed = output.forces is None and output.demanded_forces is not None and (
                 self.parameters['limits.action'] == 'suppress_forces')
             self._suppressed += suppressed
             mistake = self._mistake(output)
-            for name, limit in self._limits.items():
-                consequence = mistake if name in (LENGTH_MAX, JUMP) else ''
+            for name in (*LIMITS, JUMP):
+                exceeded = [each for each in output.exceedances if each.limit == name]
+                if not exceeded:
+                    self.held.see(OK_LEVEL, now, name)
+                    continue
+                words = ', '.join(map(self._words, exceeded))
                 if suppressed and name != FORCE_MAX:
-                    consequence = f'; forces suppressed{consequence}'
-                limit.see([each for each in output.exceedances if each.limit == name],
-                          self._words, consequence, now)
-
-    def level(self, now: float) -> int:
-        """Return the present level."""
-        if not self._any_held:
-            return OK
-        level = max([limit.held.level(now) for limit in self._limits.values()])
-        self._any_held = level > OK
-        return level
+                    words += '; forces suppressed'
+                if name in (LENGTH_MAX, JUMP):
+                    words += mistake
+                self.held.see(Level(ERROR, words), now, name)
+                self._setpoints[name] += 1
+                known = [self._worst[name]] if name in self._worst else []
+                self._worst[name] = max(exceeded + known, key=_amount)
 
     def state(self, now: float) -> Level:
         """Return the present level and all causes."""
-        if self._output is None:
-            return Level(OK, 'no setpoint yet')
-        found = [limit.held.at(now).message for limit in self._limits.values()]
-        message = '; '.join(filter(None, found)) or 'all held'
-        return Level(self.level(now), message + self._answers.age(now))
+        return self._answers.state(self.held.at(now), 'all held', now)
 
     def values(self, now: float) -> list[tuple[str, str]]:
         """Return keys and values."""
@@ -142,26 +113,25 @@ class LimitsDiagnostics(Part):
             values += [
                 ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
                 ('leg of the largest force demanded', self._joints[self._its_leg])]
-        for name, limit in self._limits.items():
-            if limit.worst is not None:
-                values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
-                            str(limit.setpoints)),
-                           (f'worst since activation, {name}', self._words(limit.worst))]
+        for name in (each for each in (*LIMITS, JUMP) if each in self._worst):
+            values += [('jumps' if name == JUMP else f'setpoints that exceed {name}',
+                        str(self._setpoints[name])),
+                       (f'worst since activation, {name}', self._words(self._worst[name]))]
         if self._suppressed:
             values.append(('setpoints without forces, by limits.action', str(self._suppressed)))
         return values
 
     def log_lines(self, now: float) -> list[LogLine]:
         """Return the changes of each kind of limit."""
-        return [line for name, limit in self._limits.items()
-                for line in limit.log.lines(self._of_kind(name, limit, now))]
-
-    def _of_kind(self, name: str, limit: _Limit, now: float) -> Level:
-        state = limit.held.at(now)
-        if state.message or limit.worst is None:
-            return state
-        return Level(state.level, f'{name}: no longer exceeded; {limit.setpoints} setpoints since '
-                     f'activation, worst: {self._words(limit.worst)}')
+        lines = []
+        for name, worst in self._worst.items():
+            state = self.held.of(name, now)
+            if not state.message:
+                state = Level(state.level, f'{name}: no longer exceeded; '
+                              f'{self._setpoints[name]} setpoints since activation, worst: '
+                              + self._words(worst))
+            lines += self._changed(state, name)
+        return lines
 
     def _mistake(self, output: Output) -> str:
         """Return the likely mistake where legs are too long, as words to append."""

@@ -79,7 +79,7 @@ class PlannedTrajectoryDiagnostics(_LastOutcome):
             *((reason, str(n)) for reason, n in sorted(counts.items()) if reason != 'accepted'),
             *outcome.values, ('time it took (s)', f'{seconds:.3f}')]
         message = outcome.message + (f' (took {seconds:.1f} s)' if seconds > _LONG else '')
-        lines = self._log.lines(Level(level, message))
+        lines = self._changed(Level(level, message))
         if outcome.reason:  # each one is logged
             lines = [LogLine(ERROR, f'{self.name} {message}', outcome.reason)]
         elif seconds > _LONG:
@@ -99,7 +99,7 @@ class PayloadDiagnostics(_LastOutcome):
             Level(WARN, f'not identified: {outcome.message}'))
         self._values = [*(_values_of(payload) if payload else ()),
                         ('time it took (s)', f'{seconds:.3f}')]
-        self._lines += self._log.lines(self._last)
+        self._lines += self._changed(self._last)
 
 
 def _values_of(payload: Payload) -> list[tuple[str, str]]:

@@ -73,75 +73,66 @@ class LogLine(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """A state, and when it was last active."""
+    """A level that was noted: when, why, and whether it lasts until the next note."""
 
     at: float
-    state: Level
+    message: str
     lasts: bool
 
 
 class Held:
-    """A state that lasts, and those of a higher level for as long as they are held."""
+    """
+    Levels by their causes, each held for a second after it was last noted.
 
-    def __init__(self) -> None:
-        self._state = OK_LEVEL
-        self._seen: dict[int, _Seen] = {}
+    Parameters
+    ----------
+    causes : str
+        In the order of their messages; a single one by default.
 
-    def see(self, state: Level, now: float) -> None:
-        """Note a state that lasts until the next one is noted."""
-        self._state = state
+    """
+
+    def __init__(self, *causes: str) -> None:
+        self._present = dict.fromkeys(causes or ('',), OK)
+        self._seen: dict[tuple[str, int], _Seen] = {}
+
+    def see(self, state: Level, now: float, cause: str = '') -> None:
+        """Note a state that lasts until the next one of its cause is noted."""
+        self._present[cause] = state.level
         if state.level > OK:
-            self._seen[state.level] = _Seen(now, state, lasts=True)
+            self._seen[cause, state.level] = _Seen(now, state.message, lasts=True)
 
-    def happened(self, state: Level, now: float) -> None:
+    def happened(self, state: Level, now: float, cause: str = '') -> None:
         """Note an instantaneous event."""
-        self._seen[state.level] = _Seen(now, state, lasts=False)
+        self._seen[cause, state.level] = _Seen(now, state.message, lasts=False)
 
     def level(self, now: float) -> int:
         """Return the highest level that is held."""
         if not self._seen:
-            return self._state.level
+            return OK
         self._forget(now)
-        return max(self._state.level, *self._seen) if self._seen else self._state.level
+        return max((level for _, level in self._seen), default=OK)
+
+    def of(self, cause: str, now: float) -> Level:
+        """Return the highest level of a cause; the message of a past state contains its age."""
+        self._forget(now)
+        level = max((level for each, level in self._seen if each == cause), default=OK)
+        if level == OK:
+            return OK_LEVEL
+        at, message, lasts = self._seen[cause, level]
+        past = lasts and level != self._present[cause]
+        return Level(level, f'{message} ({now - at:.1f} s ago)' if past else message)
 
     def at(self, now: float) -> Level:
-        """Return the state of the highest level; the message of a past state contains its age."""
-        self._forget(now)
-        worst = max(self._seen, default=OK)
-        if worst <= self._state.level:
-            return self._state
-        at, state, lasts = self._seen[worst]
-        if not lasts:
-            return state
-        return Level(state.level, f'{state.message} ({now - at:.1f} s ago)')
+        """Return the highest level, and the messages of all causes."""
+        found = [self.of(cause, now) for cause in self._present]
+        return Level(max(each.level for each in found),
+                     '; '.join(each.message for each in found if each.message))
 
     def _forget(self, now: float) -> None:
-        for level in [level for level, seen in self._seen.items()
-                      if now - seen.at >= _HOLD_SECONDS]:
-            del self._seen[level]
-
-
-class LevelLog:
-    """
-    Log lines for the changes of a level.
-
-    Parameters
-    ----------
-    name : str
-        Prefix of the lines.
-
-    """
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._level = OK
-
-    def lines(self, state: Level) -> list[LogLine]:
-        """Return the line for a state; empty if the level has not changed."""
-        if state.level == self._level:
-            return []
-        self._level = state.level
-        return [LogLine(state.level, f'{self._name}: {state.message}')]
+        for cause, level in [
+                key for key, seen in self._seen.items() if now - seen.at >= _HOLD_SECONDS
+                and not (seen.lasts and self._present[key[0]] == key[1])]:
+            del self._seen[cause, level]
 
 
 class Part:
@@ -150,18 +141,26 @@ class Part:
 
     Subclasses have a ``name`` and define ``values``, and ``state`` and ``level`` where these are
     not those of ``held``.
+
+    Parameters
+    ----------
+    causes : str
+        The causes of its levels.
+
     """
 
     name = ''
 
-    def __init__(self) -> None:
-        self.held = Held()
-        self._log = LevelLog(self.name)
+    def __init__(self, *causes: str) -> None:
+        self.held = Held(*causes)
+        self._logged: dict[str, int] = {}
         self._rejections: Counter[Rejection] = Counter()
 
-    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
+    def rejected(self, rejection: Rejection, details: str, now: float, cause: str = '') -> None:
         """Note a rejection: it is counted, and a warning while it is held."""
-        self._count(self.held, rejection, details, now)
+        self._rejections[rejection] += 1
+        self.held.happened(
+            Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now, cause)
 
     def level(self, now: float) -> int:
         """Return the present level; must be fast, because it is called after every answer."""
@@ -182,16 +181,54 @@ class Part:
 
     def log_lines(self, now: float) -> list[LogLine]:
         """Return log lines for changes of level since the last report."""
-        return self._log.lines(self.state(now))
+        return self._changed(self.state(now))
 
-    def _count(self, held: Held, rejection: Rejection, details: str, now: float) -> None:
-        self._rejections[rejection] += 1
-        held.happened(Level(WARN, f'{rejection.topic}: {rejection.reason} ({details})'), now)
+    def _changed(self, state: Level, cause: str = '') -> list[LogLine]:
+        """Return the log line for a state of a cause; empty if its level has not changed."""
+        if state.level == self._logged.get(cause, OK):
+            return []
+        self._logged[cause] = state.level
+        return [LogLine(state.level, f'{self.name}: {state.message}')]
 
     def rejections(self) -> list[tuple[str, str]]:
         """Return the number of rejections by topic and reason, as keys and values."""
         return [(f'rejected, {topic}: {reason}', str(n))
                 for (topic, reason), n in sorted(self._rejections.items())]
+
+
+class Answers:
+    """
+    Number of answered setpoints, and time of the last one.
+
+    Parameters
+    ----------
+    timeout : float
+        Age from which the last answer counts as old [s].
+    now : float
+        Start time of the count.
+
+    """
+
+    def __init__(self, timeout: float, now: float) -> None:
+        self.number = 0
+        self.at = now
+        self._timeout = timeout
+
+    def add(self, now: float) -> None:
+        """Note an answer."""
+        self.number += 1
+        self.at = now
+
+    def stale(self, now: float) -> bool:
+        """Return whether there is no recent answer."""
+        return not self.number or now - self.at > self._timeout
+
+    def state(self, state: Level, otherwise: str, now: float) -> Level:
+        """Return a state of the answers: with another message if empty, with the age if stale."""
+        if not self.number:
+            return Level(state.level, state.message or 'no setpoint yet')
+        age = f' (of the last setpoint, {now - self.at:.1f} s ago)' if self.stale(now) else ''
+        return Level(state.level, (state.message or otherwise) + age)
 
 
 def silent_topics(heard: Mapping[str, float], timeout: float, now: float) -> str:

@@ -12,55 +12,32 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``setpoints``: silent topics, rejections, other publishers of setpoints."""
+"""
+The statuses ``setpoints`` and ``timing``.
+
+Silent topics, rejections and other publishers of setpoints; processing times, and setpoints
+dropped for lack of time.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 import math
+from statistics import median
 
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, last_heard, Level, LogLine, NEVER, Part, silent_topics, STALE, WARN)
+    Answers, ERROR, last_heard, Level, LogLine, NEVER, Part, silent_topics, STALE, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_events import SECONDS
-from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejection
+from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
+
+_REJECTED, _INCOMPLETE = 'rejected', 'incomplete'
+# Reasons of rejection that the status timing counts.
+_COUNTED = {DROPPED: 'dropped', NOT_JOINED: _INCOMPLETE}
 
 # Time after which arriving messages that complete no setpoint are logged [s].
 _PATIENCE = 0.9
-
-
-class Answers:
-    """
-    Number of answered setpoints, and time of the last one.
-
-    Parameters
-    ----------
-    timeout : float
-        Age from which the last answer counts as old [s].
-    now : float
-        Start time of the count.
-
-    """
-
-    def __init__(self, timeout: float, now: float) -> None:
-        self.number = 0
-        self.at = now
-        self._timeout = timeout
-
-    def add(self, now: float) -> None:
-        """Note an answer."""
-        self.number += 1
-        self.at = now
-
-    def stale(self, now: float) -> bool:
-        """Return whether there is no recent answer."""
-        return not self.number or now - self.at > self._timeout
-
-    def age(self, now: float) -> str:
-        """Return the age of the last answer as a text to append; empty if it is recent."""
-        if not self.number or not self.stale(now):
-            return ''
-        return f' (of the last setpoint, {now - self.at:.1f} s ago)'
 
 
 class SetpointDiagnostics(Part):
@@ -84,7 +61,7 @@ class SetpointDiagnostics(Part):
 
     def __init__(self, parameters: Parameters, topics: Sequence[str], answers: Answers,
                  now: float) -> None:
-        super().__init__()
+        super().__init__(_REJECTED, _INCOMPLETE)
         self._timeout: float = parameters['setpoint.timeout']
         self._tolerance: float = parameters['setpoint.sync_tolerance']
         self._answers = answers
@@ -95,7 +72,6 @@ class SetpointDiagnostics(Part):
         self._namesakes = '', 1
         self._lines: list[LogLine] = []
         self._trouble: list[str] = []  # unexpected publishers and namesakes
-        self._incomplete = Held()
         # Start of the time in which messages complete no setpoint, as seen by reports.
         self._incomplete_since = math.inf
         self._warned_at = NEVER
@@ -134,22 +110,26 @@ class SetpointDiagnostics(Part):
         if writers != self._writers.get(topic):
             self.found({topic: writers}, {}, *self._namesakes)
 
-    def rejected(self, rejection: Rejection, details: str, now: float) -> None:
+    def rejected(self, rejection: Rejection, details: str, now: float, cause: str = '') -> None:
         """Note a rejection."""
-        incomplete = rejection.reason == NOT_JOINED
-        self._count(self._incomplete if incomplete else self.held, rejection, details, now)
+        super().rejected(rejection, details, now,
+                         _INCOMPLETE if rejection.reason == NOT_JOINED else _REJECTED)
 
     def level(self, now: float) -> int:
         """Return the present level."""
         if self._trouble:
             return ERROR
-        if self._answers.stale(now):
-            return STALE
-        return max(self.held.level(now), self._incomplete.level(now))
+        return STALE if self._answers.stale(now) else self.held.level(now)
 
     def state(self, now: float) -> Level:
         """Return the present level and its causes."""
-        return Level(self.level(now), self._message(now))
+        found = list(self._trouble)
+        if self._answers.stale(now):
+            found.append(self._no_setpoint(now))
+        if not found:
+            found = [self.held.of(_REJECTED, now).message
+                     or self.held.of(_INCOMPLETE, now).message or 'answered']
+        return Level(self.level(now), ', '.join(found))
 
     def values(self, now: float) -> list[tuple[str, str]]:
         """Return keys and values; the rate is that of the last one or two seconds."""
@@ -182,23 +162,67 @@ class SetpointDiagnostics(Part):
             return lines
         self._incomplete_since = min(self._incomplete_since, now)
         if (last - self._incomplete_since < _PATIENCE or last <= self._warned_at
-                or now - self._warned_at < SECONDS or self.held.level(now)):
+                or now - self._warned_at < SECONDS
+                or self.held.of(_REJECTED, now).level):
             return lines
         self._warned_at = now
         return [*lines, LogLine(WARN, f'setpoints: {self._no_setpoint(now)}')]
 
-    def _message(self, now: float) -> str:
-        found = list(self._trouble)
-        if self._answers.stale(now):
-            found.append(self._no_setpoint(now))
-        if found:
-            return ', '.join(found)
-        rejected, incomplete = self.held.at(now), self._incomplete.at(now)
-        return rejected.message or incomplete.message or 'answered'
-
     def _no_setpoint(self, now: float) -> str:
         """Return why there is no setpoint: silence, rejections or stamps."""
         silent = silent_topics(self.heard, self._timeout, now)
-        return 'no setpoint: ' + (silent or self.held.at(now).message or (
+        return 'no setpoint: ' + (silent or self.held.of(_REJECTED, now).message or (
             'all topics arrive, but none is joined: their stamps differ by more than '
             f'setpoint.sync_tolerance, {self._tolerance:g} s'))
+
+
+class TimingDiagnostics(Part):
+    """
+    Notes processing times and dropped setpoints.
+
+    Parameters
+    ----------
+    answers : Answers
+        The setpoints that were answered.
+    now : float
+        The time.
+
+    """
+
+    name = 'timing'
+
+    def __init__(self, answers: Answers, now: float) -> None:
+        super().__init__()
+        self._answers = answers
+        self._counts = Counter(dict.fromkeys(_COUNTED, 0))
+        # Processing times [s] of the present and of the previous second.
+        self._begin = now
+        self._times: list[float] = []
+        self._times_before: list[float] = []
+
+    def answered(self, seconds: float) -> None:
+        """Note the processing time of a setpoint, from its last message on."""
+        self._times.append(seconds)
+
+    def rejected(self, rejection: Rejection, details: str, now: float, cause: str = '') -> None:
+        """Note a rejection; only dropped setpoints are a warning here."""
+        if rejection.reason in _COUNTED:
+            self._counts[rejection.reason] += 1
+        if rejection.reason == DROPPED:
+            super().rejected(rejection, details, now)
+
+    def values(self, now: float) -> list[tuple[str, str]]:
+        """Return keys and values; processing times are those of the last one or two seconds."""
+        times = self._times_before + self._times
+        if now - self._begin >= 1.0:
+            self._begin, self._times_before, self._times = now, self._times, []
+        values = []
+        if times:
+            values = [('processing time, median (us)', f'{median(times) * 1e6:.0f}'),
+                      ('processing time, largest (us)', f'{max(times) * 1e6:.0f}')]
+        values += [(key, str(self._counts[reason])) for reason, key in _COUNTED.items()]
+        return values
+
+    def state(self, now: float) -> Level:
+        """Return the present level and its cause."""
+        return self._answers.state(self.held.at(now), 'on time', now)

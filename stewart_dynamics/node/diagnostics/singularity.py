@@ -19,10 +19,11 @@ from __future__ import annotations
 from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Held, Level, LogLine, OK, OK_LEVEL, Part, PERIOD, WARN)
-from stewart_dynamics.node.diagnostics.setpoints import Answers
+    Answers, ERROR, Level, LogLine, OK_LEVEL, Part, PERIOD, WARN)
 from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
 from stewart_dynamics.setpoints.step import Output
+
+_CROSSING, _NEARNESS = 'crossing', 'nearness'
 
 
 def singularity_state(output: Output, parameters: Parameters) -> Level:
@@ -74,13 +75,11 @@ class SingularityDiagnostics(Part):
     name = 'singularity'
 
     def __init__(self, parameters: Parameters, answers: Answers, now: float) -> None:
-        super().__init__()
+        super().__init__(_CROSSING, _NEARNESS)
         self.parameters = parameters
         self._answers = answers
         self._output: Output | None = None
-        self._crossing = Held()
         self._crossed = False  # with the last setpoint
-        self._crossing_held = False  # it may be
         self._crossings: list[str] = []  # since the last report
         self._crossing_logged_at = -PERIOD
         self._largest = self._second_largest = self._second_before_largest = 1.0
@@ -94,31 +93,22 @@ class SingularityDiagnostics(Part):
             self._largest = max(self._largest, output.condition)
         state = singularity_state(output, self.parameters)
         if output.singularity.cause is not Cause.CROSSED:
-            self.held.see(state, now)
+            self.held.see(state, now, _NEARNESS)
             if self._crossed:
-                self._crossing.see(OK_LEVEL, now)
+                self.held.see(OK_LEVEL, now, _CROSSING)
                 self._crossed = False
             return False
-        self._crossed = self._crossing_held = True
+        self._crossed = True
         crossing = Level(ERROR, _crossing(before, output))
         self._crossings.append(crossing.message)
-        self._crossing.see(crossing, now)
+        self.held.see(crossing, now, _CROSSING)
         stopped = output.singularity.stopped or not output.solvable
-        self.held.see(state if stopped else OK_LEVEL, now)
+        self.held.see(state if stopped else OK_LEVEL, now, _NEARNESS)
         return now - self._crossing_logged_at >= PERIOD
-
-    def level(self, now: float) -> int:
-        """Return the present level."""
-        level = self.held.level(now)
-        return max(level, self._crossing.level(now)) if self._crossing_held else level
 
     def state(self, now: float) -> Level:
         """Return the present level and its causes."""
-        if self._output is None:
-            return Level(OK, 'no setpoint yet')
-        found = [held.at(now).message for held in (self._crossing, self.held)]
-        message = '; '.join(filter(None, found)) or 'clear'
-        return Level(self.level(now), message + self._answers.age(now))
+        return self._answers.state(self.held.at(now), 'clear', now)
 
     def values(self, now: float) -> list[tuple[str, str]]:
         """Return keys and values."""
@@ -153,8 +143,8 @@ class SingularityDiagnostics(Part):
             lines = [LogLine(ERROR, f'{self.name}: {self._crossings[-1]}{how_many}')]
             self._crossings = []
             self._crossing_logged_at = now
-        state = self.held.at(now)
-        return lines + self._log.lines(Level(state.level, state.message or 'clear'))
+        state = self.held.of(_NEARNESS, now)
+        return lines + self._changed(Level(state.level, state.message or 'clear'))
 
 
 def _crossing(before: Output | None, output: Output) -> str:
