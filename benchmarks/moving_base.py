@@ -34,8 +34,8 @@ from stewart_dynamics.mechanics.dynamics import forward_dynamics, inverse_dynami
 from stewart_dynamics.mechanics.rows import FORCES, RESULT
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import Rejections
-from stewart_dynamics.setpoints.topics import BASE_ACCEL, BASE_POSE, BASE_TWIST
 
 BEGIN, END = '<!-- moving base: begin -->', '<!-- moving base: end -->'
 

@@ -37,7 +37,7 @@ import numpy as np
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import Estimate
-from stewart_dynamics.external_wrench.history import LegHistory
+from stewart_dynamics.external_wrench.measured_legs import LegHistory
 from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, Outcome
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters

@@ -94,7 +94,7 @@ from pathlib import Path
 import sys
 from stewart_dynamics import Parameters
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.setpoints.topics import SOURCES
+from stewart_dynamics.setpoints.inputs import SOURCES
 from stewart_dynamics.setpoints.joining import Setpoints
 
 many = 0

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters.table import Parameters
     from stewart_dynamics.planned.approach import approach, rest_to_rest, TimedMotion
-    from stewart_dynamics.planned.result import PlannedTrajectory
-    from stewart_dynamics.planned.trajectory import check_planned_trajectory
+    from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
 
 __version__ = '0.1.0'
 

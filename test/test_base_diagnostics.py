@@ -24,9 +24,9 @@ from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, OK, Status, WARN
 from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.inputs import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 from stewart_dynamics.setpoints.rejections import NOT_MEASURED, Rejection, Rejections
 from stewart_dynamics.setpoints.step import Setpoint
-from stewart_dynamics.setpoints.topics import BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST
 
 PARAMETERS = symmetric_parameters().replaced({'base.source': 'imu', 'base.timeout': 0.1})
 BEGIN = 1000.0

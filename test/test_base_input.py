@@ -36,13 +36,13 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import imu, layout_of
 from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.inputs import (
+    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
     MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, Rejection, Rejections,
     TOO_OLD, TWICE, WRONG_FRAME)
 from stewart_dynamics.setpoints.step import Setpoint
-from stewart_dynamics.setpoints.topics import (
-    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
 
 MS = 1_000_000
 SECOND = 1000 * MS

@@ -28,7 +28,7 @@ from referees import (
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.dynamics import base_wrench
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
-from stewart_dynamics.mechanics.tile import LANES
+from stewart_dynamics.mechanics.dynamics.inverse_dynamics import LANES
 
 MACHINES = 8
 STATES = 10

@@ -29,10 +29,10 @@ from running import DynamicsNode, nanoseconds, NODE, Sample
 from sensor_msgs.msg import Imu, JointState
 from stewart_dynamics import BaseMotion, StewartPlatform
 from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.inputs import (
+    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST)
 from stewart_dynamics.setpoints.rejections import (
     MALFORMED, NOT_EXCLUSIVE, NOT_FINITE, NOT_MEASURED, NOT_UNIT, Rejections, WRONG_FRAME)
-from stewart_dynamics.setpoints.topics import (
-    BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST)
 from test_base_input import BAD, sample
 
 Start = Callable[..., DynamicsNode]

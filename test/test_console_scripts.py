@@ -26,8 +26,7 @@ from referees import ROOT
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.ros.arguments import check_arguments
-from stewart_dynamics.ros.console_scripts import usage
+from stewart_dynamics.ros.console_scripts import check_arguments, usage
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 PROGRAMS = {'dynamics': Parameters, 'simulator': SimulatorParameters,

@@ -28,9 +28,9 @@ from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, LogLine, OK, STALE, Status, WARN)
+from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
-from stewart_dynamics.setpoints.topics import ACCEL, POSE, TWIST
 from test_step import FLAT, HOME, QUARTER, rotations, sizes, UPRIGHT
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})

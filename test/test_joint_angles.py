@@ -27,7 +27,7 @@ from referees import (
 
 from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.mechanics.kinematics.joint_axes import (
+from stewart_dynamics.mechanics.kinematics.joint_angles import (
     AXES, BASE_AXES, JointAngles, PLATFORM_AXES)
 from stewart_dynamics.mechanics.limits import BASE_ANGLE_MAX, OF_JOINTS, PLATFORM_ANGLE_MAX
 from stewart_dynamics.mechanics.plausibility import likely_mistakes

@@ -32,8 +32,8 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, Pose, StewartPlatfo
 from stewart_dynamics.mechanics.rows import BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION
 from stewart_dynamics.parameters.yaml_file import flat, read_document
 from stewart_dynamics.setpoints.base import BaseInput
+from stewart_dynamics.setpoints.inputs import BASE_IMU, BASE_SOURCES
 from stewart_dynamics.setpoints.rejections import Rejections
-from stewart_dynamics.setpoints.topics import BASE_IMU, BASE_SOURCES
 import yaml
 
 PAGE = (ROOT / 'docs' / 'moving_base.md').read_text(encoding='utf-8')

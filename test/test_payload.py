@@ -28,7 +28,7 @@ from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.body_fit import about
 from stewart_dynamics.external_wrench.estimate import Estimate
-from stewart_dynamics.external_wrench.history import HIGHEST_RATE, LegHistory
+from stewart_dynamics.external_wrench.measured_legs import HIGHEST_RATE, LegHistory
 from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, Outcome, Payload
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin
 from stewart_dynamics.mechanics.rows import NO_BASE

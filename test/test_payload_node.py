@@ -29,8 +29,7 @@ from std_srvs.srv import Trigger
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import ExternalWrench
-from stewart_dynamics.external_wrench.history import LegHistory
-from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
+from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
 from stewart_dynamics.external_wrench.payload import identify, numbers_of, Outcome
 from test_external_wrench import BEGIN, measured, resting, six
 from test_external_wrench import HOME as AT_HOME

@@ -34,8 +34,7 @@ from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES)
 from stewart_dynamics.planned.checks import LIMIT, SINGULAR
 from stewart_dynamics.planned.interpolation import Interpolation
-from stewart_dynamics.planned.result import PlannedTrajectory
-from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.planned.trajectory import check_planned_trajectory, PlannedTrajectory
 from stewart_dynamics.setpoints.step import Setpoint, Step
 from stewart_dynamics.simulator.plant import Plant
 from trajectories import (

@@ -29,7 +29,7 @@ from stewart_dynamics import Parameters, StewartError, StewartPlatform
 from stewart_dynamics.description import read_mjcf as loading
 from stewart_dynamics.description.hexapod import Hexapod
 from stewart_dynamics.description.mjcf import mjcf
-from stewart_dynamics.description.reading import read_hexapod
+from stewart_dynamics.description.recognition import read_hexapod
 from stewart_dynamics.description.sdf import sdf
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.frames.rotation import to_euler

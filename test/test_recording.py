@@ -56,7 +56,7 @@ from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay as replay_one
 from stewart_dynamics.replay.replay_options import NODE, Options
-from stewart_dynamics.setpoints.topics import ACCEL, INPUT_TYPES, POSE, TWIST
+from stewart_dynamics.setpoints.inputs import ACCEL, INPUT_TYPES, POSE, TWIST
 import zstandard
 
 PARAMS = ROOT / 'config' / 'platform.yaml'

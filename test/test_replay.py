@@ -63,9 +63,9 @@ from stewart_dynamics.replay.recorded_model import (
     MODEL_TYPES, RecordedModel, ROBOT_DESCRIPTION, TF_STATIC)
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.replay.summary import Summary
+from stewart_dynamics.setpoints.inputs import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, NOT_JOINED, TOO_OLD, TWICE
-from stewart_dynamics.setpoints.topics import ACCEL, COMBINED, INPUT_TYPES, POSE, TWIST, WRENCH
 
 PARAMS = ROOT / 'config' / 'platform.yaml'
 PARAMETERS = Parameters.from_yaml(PARAMS)

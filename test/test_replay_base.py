@@ -34,11 +34,11 @@ from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.replay_command_line import main
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
+from stewart_dynamics.setpoints.inputs import (
+    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
-from stewart_dynamics.setpoints.topics import (
-    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, INPUT_TYPES, POSE, TWIST)
 from test_replay import (
     joint_state, motion, MS, nanoseconds, Outputs, outputs_of, PARAMETERS, RECORDED, Recorded,
     six_of, write_bag)

@@ -45,8 +45,7 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics import BaseMotion, Motion, Pose, StewartError, StewartPlatform
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.yaml_file import read_yaml
-from stewart_dynamics.simulator.base import GeneratedBase
-from stewart_dynamics.simulator.base_motion import GeneratedBaseMotion
+from stewart_dynamics.simulator.base import GeneratedBase, GeneratedBaseMotion
 from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, OUTPUT_TYPES, StateMessages)
 from stewart_dynamics.simulator.node import SimulatorNode

@@ -32,7 +32,7 @@ from pathlib import Path
 import re
 from typing import Any
 
-from stewart_dynamics.node.topic_table import PUBLISHED, SUBSCRIBED, Topic
+from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.rules import Parameter
 from stewart_dynamics.parameters.table import Parameters

@@ -35,7 +35,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, 
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.pose import Pose
-from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.platform_arguments import copies, motion_rows
 from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform

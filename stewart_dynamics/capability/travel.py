@@ -386,7 +386,7 @@ def travels(constants: Array, axes: Array, bounds: Array, stop: float, poses: Ar
     constants : (CONSTANTS,)
         Constants of the hexapod, see ``hexapod_constants``.
     axes : (12, 3)
-        Axes of the joints, see ``joint_axes``; not read where an angle has no bound.
+        Axes of the joints, see ``joint_angles``; not read where an angle has no bound.
     bounds : (4, 6)
         Bounds of each leg by code: shortest and longest length [m], largest angles of base and
         platform joint [rad]; 0 and infinity where there is no bound.

@@ -32,8 +32,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import Body, Hexapod, Leg
-from stewart_dynamics.description.shapes import COLORS, Shape, shapes
+from stewart_dynamics.description.hexapod import Body, COLORS, Hexapod, Leg, Shape, shapes
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion

@@ -12,9 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The parameters of the hexapod in a mechanism, with one remark for each assumption.
+The parameters of the hexapod in a file of another tool, with one remark for each assumption.
 
 A leg is made of two slender bodies here: all bodies on one side of its slide become one, its
 center of mass and its inertia are taken along the line between the joints.
@@ -25,19 +24,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 import math
+from pathlib import Path
 from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
     BALL, DescriptionError, HERE, HINGE, Mechanism, Part, Placement, UNIVERSAL)
+from stewart_dynamics.description.read_mjcf import read_mjcf
+from stewart_dynamics.description.read_sdf import read_sdf
+from stewart_dynamics.description.read_urdf import read_urdf
 from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
 from stewart_dynamics.description.xml_text import LIMITS, NOT_CHECKED
-from stewart_dynamics.errors import shown
+from stewart_dynamics.errors import one_line, shown
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
 from stewart_dynamics.parameters.table import (
     NEGATIVE, PARAMETERS, Parameters, POSITIVE, STANDARD_GRAVITY)
+from stewart_dynamics.whole_file import read_text
 
 # Smaller parts of the length of a leg, or smaller angles [rad], are rounding errors.
 _SMALL = 1e-6
@@ -314,3 +319,44 @@ def _grouped(names: list[str], of_legs: list[list[str]]) -> list[str]:
         for remark in dict.fromkeys(said):
             lines.append(f'{"each leg" if counts[remark] == len(names) else name}: {remark}')
     return lines
+
+
+_LARGEST = 20_000_000  # bytes
+_XACRO = 'http://www.ros.org/wiki/xacro'
+
+
+def read_hexapod(path: Path) -> Recognized:
+    """
+    Return the parameters of the hexapod in a file, with remarks on all assumptions.
+
+    Raises
+    ------
+    StewartError
+        The file cannot be read, or there is no hexapod in it; in one line.
+
+    """
+    try:
+        return recognized(read_mechanism(path))
+    except np.linalg.LinAlgError as exc:
+        raise DescriptionError(f'{path}: out of range: numbers overflow') from exc
+
+
+def read_mechanism(path: Path) -> Mechanism:
+    """Return the mechanism that a file describes."""
+    text = read_text(path, _LARGEST, DescriptionError)
+    if '<!ENTITY' in text:  # which may grow without bound
+        raise DescriptionError(f'{path}: has entities of its own: write their text out')
+    try:
+        root = ET.fromstring(text)
+    except (ET.ParseError, ValueError) as exc:
+        raise DescriptionError(f'{path}: not XML: {one_line(exc)}') from exc
+    if _XACRO in text and root.tag == 'robot':
+        raise DescriptionError(f'{path}: is xacro: convert it with xacro first')
+    if root.tag == 'mujoco':
+        return read_mjcf(path)
+    readers = {'robot': read_urdf, 'sdf': read_sdf, 'gazebo': read_sdf}
+    if root.tag not in readers:
+        raise DescriptionError(
+            f'{path}: begins with {root.tag!r}: must be URDF (robot), SDFormat (sdf) or MJCF '
+            '(mujoco)')
+    return readers[root.tag](root, path)

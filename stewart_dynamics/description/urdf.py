@@ -33,8 +33,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import Body, Hexapod, Leg, PASSIVE_RATE, UNLIMITED
-from stewart_dynamics.description.shapes import COLORS, Shape, shapes, solids
+from stewart_dynamics.description.hexapod import (
+    Body, COLORS, Hexapod, Leg, PASSIVE_RATE, Shape, shapes, solids, UNLIMITED)
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler

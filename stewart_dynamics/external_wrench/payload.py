@@ -37,7 +37,7 @@ from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.external_wrench.body_fit import (
     about, Body, BodyFit, FittedBody, FRICTION, LAGS, ROUNDS, Samples, TEN)
-from stewart_dynamics.external_wrench.history import (
+from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (

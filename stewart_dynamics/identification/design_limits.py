@@ -24,7 +24,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import (
     ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS, OF_RESULTS, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (

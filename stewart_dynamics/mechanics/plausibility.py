@@ -31,7 +31,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics import lagrange
-from stewart_dynamics.mechanics.kinematics import joint_axes
+from stewart_dynamics.mechanics.kinematics import joint_angles
 from stewart_dynamics.mechanics.kinematics.home_pose import (
     HEIGHTS, home_of, is_too_long, poses_of, Reach, reach_of, Shape, shape_of, turns_about)
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
@@ -133,7 +133,7 @@ def likely_mistakes(parameters: Parameters, geometry: bool = True) -> tuple[str,
             elif not sizes:  # else what follows from a wrong unit
                 found += (tuple(_singular(parameters, shape, reach)) or odd
                           or _order(parameters, shape, reach))
-                found += joint_axes.likely_mistakes(parameters)
+                found += joint_angles.likely_mistakes(parameters)
     return tuple(found)
 
 

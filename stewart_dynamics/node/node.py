@@ -34,9 +34,8 @@ from stewart_dynamics.description.joint_states import JOINT_STATES, ModelMessage
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import estimate as external_wrench, payload
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH, ExternalWrench
-from stewart_dynamics.external_wrench.history import LegHistory
 from stewart_dynamics.external_wrench.measured_legs import (
-    MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
+    LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node import parameter_changes
@@ -46,8 +45,7 @@ from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
 from stewart_dynamics.node.payload_service import inertia_message, PayloadService
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
 from stewart_dynamics.node.repeated_log import RepeatedLog
-from stewart_dynamics.node.topic_table import MARKERS, PAYLOAD
-from stewart_dynamics.node.topics import Topics
+from stewart_dynamics.node.topics import MARKERS, PAYLOAD, Topics
 from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
@@ -59,12 +57,12 @@ from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints import base_wrench
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH, BaseWrench
+from stewart_dynamics.setpoints.inputs import WRENCH
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, NOT_EXCLUSIVE, OUT_OF_RANGE, Rejection)
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
-from stewart_dynamics.setpoints.topics import WRENCH
 
 
 # If more setpoints wait, the node has fallen behind, and only the newest is answered.

@@ -12,14 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Publishers and subscriptions of the node, while it is configured; see ``topic_table``."""
+"""
+The node's topics: their table, and publishers and subscriptions while it is configured.
+
+The tables of the README and of docs/node.md, and the topics of the node in security/policy.xml are
+made from the table as well (``make docs``).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
@@ -29,9 +34,111 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from stewart_dynamics.description.joint_states import JOINT_STATES, TF
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.node.topic_table import MARKERS, PUBLISHED, SUBSCRIBED, Topic
+from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
+from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.node.planned_queue import LENGTH
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.topics import BASE_SOURCES, SOURCES
+from stewart_dynamics.planned import messages as planned
+from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
+from stewart_dynamics.setpoints.batch_joining import WAITING
+from stewart_dynamics.setpoints.inputs import (
+    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
+    SOURCES, TWIST, WRENCH)
+from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
+
+DIAGNOSTICS, MARKERS, PAYLOAD = '/diagnostics', 'markers', 'payload'
+
+
+class Topic(NamedTuple):
+    """One topic."""
+
+    name: str
+    """Under the node's name, or whole."""
+    kind: str
+    meaning: str
+    """For the README."""
+    details: str = ''
+    """Follow the meaning in docs/node.md."""
+    parameter: str = ''
+    """Parameter and value with which the topic is there; empty: always."""
+    depth: int = 10
+    """Messages that may wait in the middleware."""
+    latched: bool = False
+    """A later subscriber gets the last message."""
+
+    @property
+    def ros_name(self) -> str:
+        """Return the name as ROS takes it."""
+        return self.name if self.name.startswith('/') else f'~/{self.name}'
+
+
+def _input(name: str, meaning: str, details: str = '', parameter: str = '', kind: str = '',
+           depth: int = WAITING) -> Topic:
+    return Topic(name, kind or INPUT_TYPES[name], meaning, details, parameter, depth)
+
+
+SUBSCRIBED = (
+    _input(POSE, 'platform pose in the base frame'),
+    _input(TWIST, "velocity of the platform's origin and angular velocity", ', base axes'),
+    _input(ACCEL, 'their time derivatives', ', base axes'),
+    _input(COMBINED, 'the same three in one message of one point',
+           parameter='setpoint.source: combined'),
+    _input(planned.INPUT, 'a [planned trajectory](planned_trajectories.md)',
+           ': points with transform, velocity and acceleration', kind=planned.INPUT_TYPE,
+           depth=LENGTH),
+    _input(WRENCH, 'load that the surroundings put on the platform, at its origin, base axes',
+           '; held until the next one'),
+    _input(MEASURED_LEGS, 'measured position, velocity and effort of the legs',
+           ', for the [external wrench](external_wrench.md) and the [payload](payload.md); names '
+           'in any order, other joints are ignored', kind='sensor_msgs/msg/JointState'),
+    _input(BASE_POSE, 'base frame in `world_frame`', ': see [Moving base](moving_base.md)',
+           'base.source: pose or motion'),
+    _input(BASE_TWIST, "velocity of the base frame's origin and angular velocity",
+           ', axes of the world', 'base.source: motion'),
+    _input(BASE_ACCEL, 'their time derivatives', ', axes of the world', 'base.source: motion'),
+    _input(BASE_IMU, 'specific force and angular velocity of an IMU on the base',
+           parameter='base.source: imu'),
+)
+
+
+def _output(name: str, meaning: str, details: str = '', latched: bool = False) -> Topic:
+    return Topic(name, OUTPUT_TYPES[name], meaning, details, latched=latched,
+                 depth=1 if latched else 10)
+
+
+PUBLISHED = (
+    _output('leg_states', 'name, position (length - `geometry.zero_length`), velocity and effort '
+            '(force) of the six legs'),
+    _output('leg_lengths', 'six lengths, m'),
+    _output('leg_forces', 'six forces, N, + pushes; remap it to the `commands` of an effort '
+            'controller'),
+    _output('jacobian_determinant', 'det(J), m^3'),
+    _output('singularity_warning', 'true near and at a [singularity](theory.md#singularity)',
+            '; with the first setpoint and on every change, latched (transient local)', True),
+    Topic(planned.OUTPUT, planned.OUTPUT_TYPE,
+          'answer to `~/platform_trajectory`', ', with its stamp and times: positions, velocities '
+          'and effort of the legs; nothing when it is rejected', depth=LENGTH),
+    Topic(EXTERNAL_WRENCH, 'geometry_msgs/msg/WrenchStamped',
+          'estimated [external wrench](external_wrench.md)',
+          ', for each message of `~/measured_legs`, with its stamp'),
+    _output(BASE_WRENCH, '[what the hexapod puts on its base]'
+            '(moving_base.md#what-the-base-must-carry)', ", at the base's origin, base axes; "
+            'computed while somebody subscribes'),
+    Topic(PAYLOAD, 'geometry_msgs/msg/InertiaStamped',
+          'platform and [payload](payload.md) as one body', ', when the service '
+          '`~/identify_payload` (std_srvs/Trigger) has identified it; latched (transient local)',
+          depth=1, latched=True),
+    Topic(JOINT_STATES, 'sensor_msgs/msg/JointState', 'positions of all joints of the URDF',
+          ', for [robot_state_publisher](visualization.md#as-a-model); at most '
+          '`visualization_rate`, while somebody subscribes'),
+    Topic(TF, 'tf2_msgs/msg/TFMessage', '`base_frame` to `platform_frame`',
+          parameter='publish_tf: true', depth=100),
+    Topic(MARKERS, 'visualization_msgs/msg/MarkerArray',
+          '[visualization](visualization.md) for RViz and Foxglove',
+          '; at most `visualization_rate`, while somebody subscribes', depth=1),
+    Topic(DIAGNOSTICS, 'diagnostic_msgs/msg/DiagnosticArray',
+          'state of the node, one status for each part', ', see below'),
+)
 
 _INPUTS = {topic.name: topic for topic in SUBSCRIBED}
 

@@ -27,14 +27,14 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.dynamics import friction
-from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.planned.cubics import Cubics
+from stewart_dynamics.planned.interpolation import Cubics
 from stewart_dynamics.planned.sampling import TOLERANCE
 from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 

@@ -40,9 +40,8 @@ from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
 from stewart_dynamics.planned.approach import approach_in_pieces
-from stewart_dynamics.planned.result import PlannedTrajectory
 from stewart_dynamics.planned.trajectory import (
-    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE)
+    check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
 from stewart_dynamics.setpoints.inputs import unit_quaternions
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)

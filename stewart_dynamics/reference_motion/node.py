@@ -35,7 +35,7 @@ from stewart_dynamics.reference_motion.motion import motion_at, sample_count, sa
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.run import run
-from stewart_dynamics.setpoints import topics as inputs
+from stewart_dynamics.setpoints import inputs
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 # Number of samples computed at once: one by one they cost more than publishing.

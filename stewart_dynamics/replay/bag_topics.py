@@ -24,7 +24,7 @@ from stewart_dynamics.description.joint_states import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
-from stewart_dynamics.setpoints import topics as inputs
+from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 
 MEASURED = 'measured'

@@ -53,7 +53,7 @@ from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import measured_headline, summary_text
 from stewart_dynamics.replay.writer_thread import WriterThread
 from stewart_dynamics.reporting.results_folder import check_free, whole_folder
-from stewart_dynamics.setpoints import base_wrench, step, topics as inputs
+from stewart_dynamics.setpoints import base_wrench, inputs, step
 from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.output_messages import OutputMessages

@@ -20,17 +20,55 @@ The console scripts of the nodes; whatever needs no ROS is answered before rclpy
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 import sys
 from typing import Any, NoReturn, TYPE_CHECKING
 
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read_document
 from stewart_dynamics.ros.signals import SIGNALS
 
 if TYPE_CHECKING:
     from stewart_dynamics.parameters.parameter_set import ParameterSet
     from stewart_dynamics.parameters.rules import Parameter
+
+
+def parameter_files(arguments: Sequence[str]) -> list[str]:
+    """Return the parameter files that a command line names."""
+    return [value for option, value in zip(arguments, arguments[1:], strict=False)
+            if option == '--params-file']
+
+
+def check_arguments(arguments: Sequence[str], kind: type[ParameterSet]) -> None:
+    """Raise ParameterError for arguments that the parser of ROS rejects in its own words."""
+    for option, argument in zip(arguments, [*arguments[1:], ''], strict=True):
+        if option in ('-p', '--param') and ':=' not in argument:
+            raise ParameterError(f'command line: {option} {argument}: must be NAME:=VALUE')
+    for path in parameter_files(arguments):
+        kind.check_file(path)
+
+
+def given_parameters(arguments: Sequence[str], node: str, kind: type[ParameterSet],
+                     ) -> dict[str, Any]:
+    """
+    Return the values that a command line gives a node, in files and by ``-p``: the last of each.
+
+    ROS may use another one. rcl keeps both a number and a list that ``-p`` sets in its place, and
+    rclpy takes the number; values for ``/**`` and those for the node's name are applied in the
+    order in which these two first appear; a ``-p`` of another type than in a file is dropped.
+    """
+    values: dict[str, Any] = {}
+    for option, argument in zip(arguments, arguments[1:], strict=False):
+        if option == '--params-file':
+            values.update(parameters_of(read_document(argument), node, argument))
+        elif option in ('-p', '--param'):
+            target, _, text = argument.partition(':=')
+            section, _, name = target.rpartition(':')
+            if section in ('', node.lstrip('/')):
+                values[name] = kind.read_value(name, text, 'command line')
+    return {name: value for name, value in values.items()
+            if value is not None and not is_of_ros(name)}
 
 
 def dynamics() -> int:
@@ -79,7 +117,6 @@ def _described(parameter: Parameter) -> str:
 def _run(module: str, name: str, node: str) -> int:
     """Run the node of a module, with the parameters of another one; return its exit code."""
     SIGNALS.watch(end_at_once=True)  # until it is imported: run has its own way
-    check_arguments = _imported('ros.arguments').check_arguments
     kind: type[ParameterSet] = getattr(_imported(module), name)
     if {'-h', '--help'} & set(sys.argv[1:]):
         print(usage(kind))

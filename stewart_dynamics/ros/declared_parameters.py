@@ -34,7 +34,7 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.parameters.parameter_set import ParameterSet
 from stewart_dynamics.parameters.rules import Parameter
 from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value
-from stewart_dynamics.ros.arguments import given_parameters, parameter_files
+from stewart_dynamics.ros.console_scripts import given_parameters, parameter_files
 
 _TYPES = {
     'string': (ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_STRING_ARRAY),

@@ -33,7 +33,7 @@ from rclpy.utilities import remove_ros_args
 from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.parameters.parameter_set import ParameterSet
-from stewart_dynamics.ros.arguments import parameter_files
+from stewart_dynamics.ros.console_scripts import parameter_files
 from stewart_dynamics.ros.rclpy_workarounds import (
     make_executor, reject_impossible_times, shut_down, spin)
 from stewart_dynamics.ros.security import check_environment, without_security_libraries

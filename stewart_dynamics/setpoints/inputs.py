@@ -26,16 +26,45 @@ import math
 
 import numpy as np
 
-from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, Stamps
+from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, NO_WRENCH, Six, Stamps
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, is_unit, quaternion_length
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.batch_joining import Samples
 from stewart_dynamics.setpoints.rejections import (
     frame_details, length_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)
-from stewart_dynamics.setpoints.topics import (
-    ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_TWIST, COMBINED, POSE, TWIST, WRENCH)
+
+# Topics, relative to the node's name.
+POSE = 'setpoint/pose'
+TWIST = 'setpoint/twist'
+ACCEL = 'setpoint/accel'
+COMBINED = 'setpoint/combined'
+BASE_POSE = 'base/pose'
+BASE_TWIST = 'base/twist'
+BASE_ACCEL = 'base/accel'
+BASE_IMU = 'base/imu'
+WRENCH = 'wrench'
+
+INPUT_TYPES = {
+    POSE: 'geometry_msgs/msg/PoseStamped',
+    TWIST: 'geometry_msgs/msg/TwistStamped',
+    ACCEL: 'geometry_msgs/msg/AccelStamped',
+    COMBINED: 'trajectory_msgs/msg/MultiDOFJointTrajectory',
+    BASE_POSE: 'geometry_msgs/msg/PoseStamped',
+    BASE_TWIST: 'geometry_msgs/msg/TwistStamped',
+    BASE_ACCEL: 'geometry_msgs/msg/AccelStamped',
+    BASE_IMU: 'sensor_msgs/msg/Imu',
+    WRENCH: 'geometry_msgs/msg/WrenchStamped',
+}
+
+# Topics that are joined, for each value of setpoint.source.
+SOURCES = {'separate': (POSE, TWIST, ACCEL), 'combined': (COMBINED,), 'pose': (POSE,)}
+# Topics that are joined, for each value of base.source.
+BASE_SOURCES = {'fixed': (), 'pose': (BASE_POSE,), 'motion': (BASE_POSE, BASE_TWIST, BASE_ACCEL),
+                'imu': (BASE_IMU,)}
 
 _READERS: dict[str, Callable[[bytes], Stamped]] = {
     POSE: pose, TWIST: twist, ACCEL: twist, COMBINED: combined, WRENCH: wrench,
@@ -203,3 +232,54 @@ def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
         lengths = quaternion_length(x, y, z, w)
         return (np.stack([x / lengths, y / lengths, z / lengths, w / lengths]), lengths,
                 is_unit(lengths))
+
+
+class WrenchInput:
+    """
+    Follows ``~/wrench``.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        ``base_frame`` is used.
+    rejections : Rejections
+        Counts rejected messages.
+
+    """
+
+    def __init__(self, parameters: Parameters, rejections: Rejections) -> None:
+        self.wrench: Six = NO_WRENCH
+        """Force and moment at the platform's origin, base axes [N, N m]."""
+        self.reader = SampleReader(WRENCH, parameters['base_frame'], rejections)
+
+    def take(self, data: bytes) -> None:
+        """Use the wrench of this geometry_msgs/WrenchStamped from now on, if it is valid."""
+        sample = self.reader.read(data)
+        if sample is not None:
+            fx, fy, fz, tx, ty, tz = sample[1]
+            self.wrench = fx, fy, fz, tx, ty, tz
+
+    def at(self, samples: Samples, places: Integers) -> Array:
+        """
+        Use new wrenches in order, and return the one that is valid at each of the given indices.
+
+        Parameters
+        ----------
+        samples : Samples
+            Read by ``reader``.
+        places : (K,)
+            Indices in the order of all messages.
+
+        Returns
+        -------
+        (K, 6) [N, N m]
+
+        """
+        wrenches = np.empty((len(places), 6))
+        wrenches[:] = self.wrench
+        if len(samples.values):
+            latest = np.searchsorted(samples.places, places) - 1
+            wrenches[latest >= 0] = samples.values[latest[latest >= 0]]
+            fx, fy, fz, tx, ty, tz = samples.values[-1].tolist()
+            self.wrench = fx, fy, fz, tx, ty, tz
+        return wrenches

@@ -35,11 +35,10 @@ from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base import BaseInput
 from stewart_dynamics.setpoints.batch_joining import Samples
+from stewart_dynamics.setpoints.inputs import SOURCES, WRENCH, WrenchInput
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
 from stewart_dynamics.setpoints.step import Batch, Setpoint
-from stewart_dynamics.setpoints.topics import SOURCES, WRENCH
-from stewart_dynamics.setpoints.wrench import WrenchInput
 
 _STANDSTILL = (0.0,) * 6
 

@@ -31,7 +31,7 @@ from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
 from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
-from stewart_dynamics.mechanics.kinematics.joint_axes import angles_to_check
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.limits import (
     ANGLES, any_exceeded, Exceedance, JITTER, jumps, Limits, OF_RESULTS)
 from stewart_dynamics.mechanics.rows import (

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from stewart_dynamics.arrays import Array
@@ -24,6 +26,7 @@ from stewart_dynamics.mechanics.frames.pose import matrix_of_quaternion
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.mechanics.vectors import add, subtract, Vector3
+from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 
@@ -72,3 +75,37 @@ class SimulatedImu:
 def _vector(three: Array) -> Vector3:
     x, y, z = three.tolist()
     return x, y, z
+
+
+_NUMBERS = 37
+# By convention of the message: the orientation is not measured.
+_NOT_MEASURED = (0.0, 0.0, 0.0, 1.0, -1.0, *(0.0,) * 8)
+
+
+class ImuWriter:
+    """
+    Writes sensor_msgs/Imu of an IMU that does not measure its orientation.
+
+    Parameters
+    ----------
+    frame : str
+        Frame of the IMU.
+    angular_velocity, specific_force : float
+        Standard deviations of the readings [rad/s, m/s^2]; the covariances are made of them.
+
+    """
+
+    def __init__(self, frame: str, angular_velocity: float, specific_force: float) -> None:
+        self._writer = StampedWriter(frame, _NUMBERS)
+        self._covariances = [_diagonal(angular_velocity ** 2), _diagonal(specific_force ** 2)]
+
+    def write(self, stamp: int, angular_velocity: Sequence[float],
+              specific_force: Sequence[float]) -> bytes:
+        """Return the message of readings in IMU axes at a time [ns]."""
+        of_gyro, of_accelerometer = self._covariances
+        return self._writer.write(stamp, (
+            *_NOT_MEASURED, *angular_velocity, *of_gyro, *specific_force, *of_accelerometer))
+
+
+def _diagonal(variance: float) -> tuple[float, ...]:
+    return variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance

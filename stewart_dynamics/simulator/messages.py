@@ -22,10 +22,9 @@ from operator import sub
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints import topics as inputs
+from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.simulator.base import BasePeriod
-from stewart_dynamics.simulator.imu import SimulatedImu
-from stewart_dynamics.simulator.imu_message import ImuWriter
+from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import State
 

@@ -41,8 +41,8 @@ from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.repeated_events import Series
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
+from stewart_dynamics.setpoints.inputs import WrenchInput
 from stewart_dynamics.setpoints.rejections import MALFORMED, NOT_FINITE, Rejection, Rejections
-from stewart_dynamics.setpoints.wrench import WrenchInput
 from stewart_dynamics.simulator.base import BaseOfTopics, BasePeriod, GeneratedBase
 from stewart_dynamics.simulator.messages import (
     BASE_TYPES, BaseMessages, IMU, IMU_TYPE, INPUT_TYPES, OUTPUT_TYPES, StateMessages)

@@ -27,8 +27,9 @@ each sample's bits are the same in either case. Numbers in brackets are the pape
 5. ``_tile_eigenvalues``: the condition number, from the largest eigenvalues of J J^T and of its
    inverse.
 
-``solve`` computes ``LANES`` samples side by side in each of these steps, so that one vector
-instruction computes several; hence tuples instead of arrays, no branches, and inlined functions.
+``solve`` computes a tile of ``LANES`` samples side by side in each of these steps, so that one
+vector instruction computes several; hence tuples instead of arrays, no branches, and inlined
+functions. In a tile entry n of lane k is at n * LANES + k.
 ``solve_one`` computes a single sample in the first lane.
 """
 
@@ -50,8 +51,37 @@ from stewart_dynamics.mechanics.rows import (
     LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSITION, RATES, RESULT, ROTATION,
     UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.mechanics.tile import LANES, matrix3, put6, vector3
-from stewart_dynamics.mechanics.vectors import add, dot6, scale, subtract
+from stewart_dynamics.mechanics.vectors import add, dot6, Matrix3, scale, subtract, Vector3
+
+LANES = 32
+
+
+@inlined
+def put6(
+        tile: Array, at: int, a: float, b: float, c: float, d: float, e: float, f: float,
+) -> None:
+    """Write six numbers of a lane from a place on."""
+    tile[at] = a
+    tile[at + LANES] = b
+    tile[at + 2 * LANES] = c
+    tile[at + 3 * LANES] = d
+    tile[at + 4 * LANES] = e
+    tile[at + 5 * LANES] = f
+
+
+@inlined
+def vector3(tile: Array, at: int) -> Vector3:
+    """Return three numbers of a lane from a place on."""
+    return tile[at], tile[at + LANES], tile[at + 2 * LANES]
+
+
+@inlined
+def matrix3(tile: Array, at: int) -> Matrix3:
+    """Return nine numbers of a lane from a place on."""
+    return (tile[at], tile[at + LANES], tile[at + 2 * LANES], tile[at + 3 * LANES],
+            tile[at + 4 * LANES], tile[at + 5 * LANES], tile[at + 6 * LANES],
+            tile[at + 7 * LANES], tile[at + 8 * LANES])
+
 
 # The tile: motion, wrench, base motion, result, and scratch memory of the condition number.
 _WRENCH = MOTION * LANES

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The angles of the joints at both ends of the legs; compiled.
+The angles of the joints at both ends of the legs, and the axes from which they are measured.
 
 A joint's angle is the one between the leg's direction s, from base joint to platform joint, and
 the joint's axis u: how far the joint is deflected, whichever way. The axis of a base joint is
@@ -28,16 +28,27 @@ derivative at angle zero, too, and loses no digits there.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 import math
+
+import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.kinematics.home_pose import home_pose
+from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, HomeDirections
+from stewart_dynamics.mechanics.limits import ANGLES, OF_JOINTS
 from stewart_dynamics.mechanics.rows import (
-    ANGULAR_VELOCITY, BASE_JOINT_ANGLES, LINEAR_VELOCITY, PLATFORM_JOINT_ANGLES, POSITION,
-    ROTATION)
+    ANGULAR_VELOCITY, BASE_JOINT_ANGLES, JOINT_ANGLES, LINEAR_VELOCITY, PLATFORM_JOINT_ANGLES,
+    POSITION, ROTATION)
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, read3, read9, rotate_back, scale, subtract, Vector3)
+from stewart_dynamics.parameters.table import Parameters
 
 
 @inlined
@@ -100,3 +111,130 @@ def joint_haversines(constants: Array, axes: Array, motions: Array, values: Arra
             values[row, 6 + leg] = known * 0.25 * dot(half, half)
             rates[row, 6 + leg] = -0.5 * dot(
                 axis, rotate_back(rotation, subtract(s_rate, cross(omega, s))))
+
+
+BASE_AXES, PLATFORM_AXES = AXES = 'geometry.base_joint_axes', 'geometry.platform_joint_axes'
+
+# No ball joint or universal joint reaches this angle, 92 degrees [rad].
+_WIDEST = 1.6
+# A larger angle between a leg and its axis at home is a likely mistake [rad].
+_AWAY = 0.5 * math.pi
+
+
+class JointAngles:
+    """
+    The angles of a hexapod's joints.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Parameters of the hexapod.
+    needed : sequence of str
+        Names in AXES; the other angles are nan.
+
+    Attributes
+    ----------
+    axes : (12, 3)
+        Unit vectors from which the angles are measured: of the base joints in base axes, of the
+        platform joints in platform axes; nan for axes that are not needed.
+
+    Raises
+    ------
+    ParameterError
+        Axes that are needed are not given, and there is no home pose.
+
+    """
+
+    def __init__(self, parameters: Parameters, needed: Sequence[str] = AXES) -> None:
+        self._constants = hexapod_constants(parameters)
+        self.axes = np.concatenate([
+            axes if name in needed else np.full((6, 3), np.nan)
+            for name, axes in zip(AXES, _axes(parameters, needed), strict=True)])
+
+    def __call__(self, motions: Array) -> Array:
+        """Return the angles (N, JOINT_ANGLES) [rad] in motions (N, MOTION)."""
+        angles = np.empty((len(motions), JOINT_ANGLES))
+        batch.in_parts(self._angles, self._constants, batch.compact(motions), angles)
+        return angles
+
+    def of_one(self, motion: Array) -> Callable[[], tuple[float, ...]]:
+        """Return a function that gives the angles (JOINT_ANGLES,) of a row's current values."""
+        angles = np.empty((1, JOINT_ANGLES))
+        compute = joint_angles.bound(
+            self._constants, self.axes, motion.reshape(1, len(motion)), angles)
+
+        def of_row() -> tuple[float, ...]:
+            compute()
+            return tuple(angles[0].tolist())
+
+        return of_row
+
+    def haversines(self, motions: Array) -> tuple[Array, Array]:
+        """Return sin^2(angle / 2) and its rate [1/s], both (N, JOINT_ANGLES), in motions."""
+        values, rates = (np.empty((len(motions), JOINT_ANGLES)) for _ in range(2))
+        joint_haversines(self._constants, self.axes, batch.compact(motions), values, rates)
+        return values, rates
+
+    def _angles(self, constants: Array, motions: Array, angles: Array) -> None:
+        joint_angles(constants, self.axes, motions, angles)
+
+
+def angles_to_check(parameters: Parameters, limits: Sequence[str]) -> JointAngles | None:
+    """Return the angles that the given joint limits need; None without joint limits."""
+    needed = [axes for axes, limit in zip(AXES, OF_JOINTS, strict=True) if limit in limits]
+    return JointAngles(parameters, needed) if needed else None
+
+
+def likely_mistakes(parameters: Parameters) -> Iterator[str]:
+    """Yield likely mistakes in the joints' limits and axes, each in one line."""
+    for name in OF_JOINTS:
+        bounds = parameters[name]
+        if bounds is not None and bounds.max() > _WIDEST:
+            yield (f'{name}: {bounds.max():.3g} rad, {math.degrees(bounds.max()):.0f} degrees: '
+                   'more than any joint of a leg: in degrees?')
+    given = [axes for axes in AXES if parameters[axes] is not None]
+    if not given:
+        return  # the angles at home are zero; no machine code is loaded for that
+    try:
+        home = Motion.from_pose(home_pose(parameters)).rows
+    except ParameterError:
+        return  # without a home pose
+    angles = JointAngles(parameters, given)(home[None])[0]
+    for axes, (limit, where) in zip(AXES, ANGLES.items(), strict=True):
+        if axes not in given:
+            continue
+        at_home, bounds = angles[where], parameters[limit]
+        leg = int(np.argmax(at_home if bounds is None else at_home - bounds))
+        joint, angle = parameters['joints'][leg], at_home[leg]
+        if angle > _AWAY:
+            yield (f'{axes}: at home {joint} is {angle:.3g} rad from it: does it point from the '
+                   'platform to the base, is the platform on the other side of the base '
+                   '(geometry.platform_side), or are the legs in another order?')
+        elif bounds is not None and angle > bounds[leg]:
+            yield (f'{limit}: {bounds[leg]:.3g} rad, but at home {joint} is {angle:.3g} rad from '
+                   f'its axis in {axes}')
+
+
+def _axes(p: Parameters, needed: Sequence[str]) -> list[Array]:
+    """Return the unit vectors of base joints and platform joints, (6, 3) each."""
+    with np.errstate(all='ignore'):
+        directions = _at_home(p, [name for name in needed if p[name] is None])
+        found = [at_home if p[name] is None else _unit(p[name])
+                 for name, at_home in zip(AXES, directions, strict=True)]
+    return found
+
+
+def _at_home(p: Parameters, missing: Sequence[str]) -> HomeDirections:
+    if missing:
+        try:
+            home_pose(p)
+        except ParameterError as exc:
+            raise ParameterError(f'{missing[0]}: missing, and {exc}') from exc
+    return home_directions(p)
+
+
+def _unit(vectors: Array) -> Array:
+    # Scaled first: the squares of very large or small numbers are out of range.
+    vectors = vectors / np.abs(vectors).max(axis=1, keepdims=True)
+    units: Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return units

@@ -26,8 +26,7 @@ from std_msgs.msg import Header
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import OK, Status
 from stewart_dynamics.node.repeated_log import RepeatedLog
-from stewart_dynamics.node.topic_table import DIAGNOSTICS
-from stewart_dynamics.node.topics import Topics
+from stewart_dynamics.node.topics import DIAGNOSTICS, Topics
 
 # The topics for controllers; diagnostics give the number of their subscribers.
 _READ = ('leg_states', 'leg_forces')
