@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdown
     from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
     from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-    from stewart_dynamics.mechanics.frames.motion import Motion
-    from stewart_dynamics.mechanics.frames.pose import Pose
+    from stewart_dynamics.mechanics.frames.motion import Motion, Pose
     from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
     from stewart_dynamics.mechanics.stiffness import NaturalModes
     from stewart_dynamics.parameters.table import Parameters
@@ -51,14 +50,12 @@ _MODULES = {
     'mechanics.frames.base_motion': ('BaseMotion',),
     'mechanics.dynamics.force_breakdown': ('ForceBreakdown',),
     'mechanics.dynamics.result': ('InverseDynamics',),
-    'mechanics.frames.motion': ('Motion',),
-    'mechanics.frames.pose': ('Pose',),
+    'mechanics.frames.motion': ('Motion', 'Pose'),
     'mechanics.stewart_platform': ('StewartPlatform',),
     'mechanics.stiffness': ('NaturalModes',),
     'parameters.table': ('Parameters',),
     'planned.approach': ('TimedMotion', 'approach', 'rest_to_rest'),
-    'planned.trajectory': ('check_planned_trajectory',),
-    'planned.result': ('PlannedTrajectory',),
+    'planned.trajectory': ('PlannedTrajectory', 'check_planned_trajectory'),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

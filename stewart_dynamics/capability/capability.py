@@ -33,8 +33,7 @@ from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_t
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.platform_arguments import copies, motion_rows
 from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST

@@ -39,7 +39,7 @@ from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_SECOND, linear_parameters, PISTON_FIRST,
     PISTON_MASS, PISTON_SECOND, REFLECTED_MASS, VISCOUS_FRICTION)
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Times at which a payload may change, as fractions of all samples.

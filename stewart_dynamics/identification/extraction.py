@@ -36,7 +36,7 @@ from stewart_dynamics.identification.filters import convolved, decimated, LowPas
 from stewart_dynamics.identification.kinematics import motions, poses
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 

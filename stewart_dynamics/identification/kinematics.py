@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 

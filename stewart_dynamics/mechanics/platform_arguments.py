@@ -24,8 +24,7 @@ from stewart_dynamics.errors import MotionError, SingularityError
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.rows import CONDITION, MOTION, NO_BASE, POSE, POSITION, WRENCH
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 

@@ -33,8 +33,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import EntryPoint
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, inverse_dynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
-from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, BASE, MOTION, NO_BASE, POSE, RESULT, WRENCH)

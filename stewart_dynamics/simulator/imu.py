@@ -22,7 +22,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.base_load import carried
-from stewart_dynamics.mechanics.frames.pose import matrix_of_quaternion
+from stewart_dynamics.mechanics.frames.motion import matrix_of_quaternion
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.mechanics.vectors import add, subtract, Vector3

@@ -25,9 +25,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.dynamics.base_load import carried
-from stewart_dynamics.mechanics.frames.fields import listed, rows_of, Samples
-from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.frames.pose import as_rotation, Pose, row_by_row
+from stewart_dynamics.mechanics.frames.motion import (
+    as_rotation, Field, listed, Motion, Pose, row_by_row, Samples)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
     BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, ROTATION)
@@ -68,19 +67,21 @@ class BaseMotion(Samples):
 
     """
 
+    gravity = Field(
+        GRAVITY, 'Acceleration of free fall, base axes, (..., 3) [m/s^2].', required=True)
+    linear_acceleration = Field(
+        BASE_ACCELERATION, "Acceleration of the base's origin, base axes, (..., 3) [m/s^2].")
+    angular_velocity = Field(
+        BASE_ANGULAR_VELOCITY, 'Angular velocity, base axes, (..., 3) [rad/s].')
+    angular_acceleration = Field(
+        BASE_ANGULAR_ACCELERATION, 'Angular acceleration, base axes, (..., 3) [rad/s^2].')
+
     def __init__(
             self, gravity: ArrayLike, linear_acceleration: ArrayLike | None = None,
             angular_velocity: ArrayLike | None = None,
             angular_acceleration: ArrayLike | None = None) -> None:
-        parts = {'gravity': (GRAVITY, as_array('gravity', gravity, (3,)))}
-        for name, where, part in (
-                ('linear_acceleration', BASE_ACCELERATION, linear_acceleration),
-                ('angular_velocity', BASE_ANGULAR_VELOCITY, angular_velocity),
-                ('angular_acceleration', BASE_ANGULAR_ACCELERATION, angular_acceleration)):
-            if part is not None:
-                parts[name] = where, as_array(name, part, (3,))
-        self.rows = rows_of(BASE, parts)
-        self.shape = self.rows.shape[:-1]
+        self._fill(BASE, gravity=gravity, linear_acceleration=linear_acceleration,
+                   angular_velocity=angular_velocity, angular_acceleration=angular_acceleration)
 
     @classmethod
     def from_pose(cls, pose: Pose | Motion, gravity: ArrayLike = STANDARD_GRAVITY) -> BaseMotion:
@@ -166,26 +167,6 @@ class BaseMotion(Samples):
             return cls.of_rows(_stacked(row_of_imu(
                 _columns(force), _columns(spin), _columns(spin_rate), _columns(arm),
                 _columns(row_by_row(turn)))))
-
-    @property
-    def gravity(self) -> Array:
-        """Acceleration of free fall, base axes, (..., 3) [m/s^2]."""
-        return self._part(GRAVITY)
-
-    @property
-    def linear_acceleration(self) -> Array:
-        """Acceleration of the base's origin, base axes, (..., 3) [m/s^2]."""
-        return self._part(BASE_ACCELERATION)
-
-    @property
-    def angular_velocity(self) -> Array:
-        """Angular velocity, base axes, (..., 3) [rad/s]."""
-        return self._part(BASE_ANGULAR_VELOCITY)
-
-    @property
-    def angular_acceleration(self) -> Array:
-        """Angular acceleration, base axes, (..., 3) [rad/s^2]."""
-        return self._part(BASE_ANGULAR_ACCELERATION)
 
     def _in_words(self) -> str:
         return (f'gravity {listed(self.gravity)} m/s^2, acceleration '

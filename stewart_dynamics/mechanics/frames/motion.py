@@ -12,22 +12,303 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A motion: pose, twist and acceleration of the platform, one sample or many."""
+"""Poses and motions of the platform, one sample or any leading shape of samples as rows."""
 
 from __future__ import annotations
+
+import math
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, optional_array, wrong_type
 from stewart_dynamics.mechanics.frames import rotation as rotations
-from stewart_dynamics.mechanics.frames.fields import rows_of
-from stewart_dynamics.mechanics.frames.pose import (
-    as_rotation, matrix_of_quaternion, Pose, Posed, row_by_row, row_of_one)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
+
+Self = TypeVar('Self', bound='Samples')
+
+
+class Field:
+    """
+    A quantity in each sample's row, as an attribute: a read-only view (..., 3) or (..., 3, 3).
+
+    Parameters
+    ----------
+    where : slice
+        Its numbers in a row, three, or the nine of a rotation.
+    text : str
+        Docstring of the attribute.
+    required : bool
+        Whether it must be given; others are zero by default.
+
+    """
+
+    def __init__(self, where: slice, text: str, *, required: bool = False) -> None:
+        self.where, self.__doc__, self.required = where, text, required
+        self._is_rotation = where.stop - where.start == 9
+
+    def __get__(self, samples: Samples | None, kind: type[Samples]) -> Array:
+        """Return the view; of a class the field itself."""
+        if samples is None:
+            return self  # type: ignore[return-value]
+        view = samples.rows[..., self.where]
+        view.setflags(write=False)
+        return view.reshape(*samples.shape, 3, 3) if self._is_rotation else view
+
+    def checked(self, name: str, value: Any) -> Array:
+        """Return a given value as parts of rows (..., n); MotionError if it is wrong."""
+        return row_by_row(as_rotation(value)) if self._is_rotation else as_array(name, value, (3,))
+
+
+class Samples:
+    """
+    Samples of any leading shape.
+
+    Attributes
+    ----------
+    rows : (..., n)
+        All numbers of each sample in a row, SI units, base axes.
+    shape : tuple of int
+        The leading shape; () for one sample.
+
+    """
+
+    rows: Array
+    shape: tuple[int, ...]
+
+    @classmethod
+    def of_rows(cls: type[Self], rows: Array) -> Self:
+        """Return the samples of rows (..., n), which are neither checked nor copied."""
+        samples = cls.__new__(cls)
+        samples.rows, samples.shape = rows, rows.shape[:-1]
+        return samples
+
+    def _fill(self, size: int, **given: Any) -> None:
+        """
+        Make the rows (..., size) from values by the names of their fields.
+
+        MotionError names a wrong value, and values whose shapes do not fit.
+        """
+        fields = {name: getattr(type(self), name) for name in given}
+        parts = {name: fields[name].checked(name, value) for name, value in given.items()
+                 if value is not None or fields[name].required}
+        self.shape = common_shape(**{name: part.shape[:-1] for name, part in parts.items()})
+        self.rows = np.zeros((*self.shape, size))
+        for name, part in parts.items():
+            self.rows[..., fields[name].where] = part
+
+    def __len__(self) -> int:
+        """Return the number of samples along the first axis; TypeError for a single sample."""
+        if not self.shape:
+            raise TypeError(f'one {type(self).__name__} has no length')
+        return self.shape[0]
+
+    def __getitem__(self: Self, index: Any) -> Self:
+        """Return some of the samples: an index, a slice or a mask, as of an array."""
+        where = index if isinstance(index, tuple) else (index,)
+        try:
+            return self.of_rows(self.rows[(*where, slice(None))] if any(
+                each is Ellipsis for each in where) else self.rows[(*where, ..., slice(None))])
+        except IndexError as exc:
+            raise IndexError(f'{type(self).__name__} of shape {self.shape}: {exc}') from exc
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether shape and all numbers are equal."""
+        return type(other) is type(self) and np.array_equal(self.rows, other.rows)
+
+    # The arrays are mutable.
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        """Return the shape, or the numbers of a single sample."""
+        name = type(self).__name__
+        return (f'<{name} of shape {self.shape}>' if self.shape
+                else f'<{name}: {self._in_words()}>')
+
+    def _in_words(self) -> str:
+        """Return the numbers of a single sample, as text."""
+        raise NotImplementedError
+
+
+def listed(numbers: Array) -> str:
+    """Return a vector as text."""
+    return '[' + ', '.join(f'{number + 0.0:.6g}' for number in numbers) + ']'
+
+
+# A rotation matrix further from orthogonal than this is rejected.
+ORTHOGONALITY = 1e-6
+# Rounding cannot make one that is nearer than this exceed it.
+_WELL = 0.9 * ORTHOGONALITY
+
+
+class Posed(Samples):
+    """The pose that is part of each sample of a Pose or a Motion."""
+
+    position = Field(
+        POSITION, 'Origin of the platform frame in the base frame, (..., 3) [m].', required=True)
+    rotation = Field(ROTATION, 'Platform axes to base axes, (..., 3, 3).', required=True)
+
+    @property
+    def quaternion(self) -> Array:
+        """Return the rotation as unit quaternions x y z w, (..., 4), w >= 0."""
+        return rotations.to_quaternion(self.rotation)
+
+    def _in_words(self) -> str:
+        return f'position {listed(self.position)} m, quaternion {listed(self.quaternion)}'
+
+
+class Pose(Posed):
+    """
+    Pose of the platform in the base frame, one sample or any leading shape of samples.
+
+    Leading shapes broadcast against each other. The arrays are copied; ``pose[3]``,
+    ``pose[::10]`` and ``len(pose)`` work as for an array of samples.
+
+    Parameters
+    ----------
+    position : (..., 3)
+        Origin of the platform frame in the base frame [m].
+    rotation : (..., 3, 3)
+        Platform axes to base axes.
+
+    Attributes
+    ----------
+    position, rotation, quaternion : (..., 3), (..., 3, 3), (..., 4)
+        Read-only; the quaternion is x y z w.
+    rows : (..., 12)
+        Position and rotation, row by row.
+    shape : tuple of int
+        The leading shape; () for one sample.
+
+    Raises
+    ------
+    MotionError
+        The shapes do not fit, a number is not finite, or a matrix is not a rotation.
+
+    """
+
+    def __init__(self, position: ArrayLike, rotation: ArrayLike) -> None:
+        row = row_of_one(POSE.stop, position, rotation)
+        if row is not None:
+            self.rows, self.shape = row, ()
+            return
+        self._fill(POSE.stop, position=position, rotation=rotation)
+
+    @classmethod
+    def from_euler(cls, position: ArrayLike, angles: ArrayLike, *, degrees: bool = False) -> Pose:
+        """
+        Return the pose of the paper's angles.
+
+        Parameters
+        ----------
+        position : (..., 3)
+            [m]
+        angles : (..., 3)
+            alpha, beta, gamma of R = Rz(gamma) Ry(beta) Rx(alpha) [rad].
+        degrees : bool
+            Angles are in degrees.
+
+        """
+        given = as_array('angles', angles, (3,))
+        return cls(position, rotations.from_euler(np.radians(given) if degrees else given))
+
+    @classmethod
+    def from_quaternion(cls, position: ArrayLike, quaternion: ArrayLike) -> Pose:
+        """
+        Return the pose of a quaternion.
+
+        Parameters
+        ----------
+        position : (..., 3)
+            [m]
+        quaternion : (..., 4)
+            x y z w, its length 1 within 1e-3; it is normalized.
+
+        """
+        return cls(position, matrix_of_quaternion(quaternion))
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Pose:
+        """Return the pose of homogeneous transforms (..., 4, 4), platform frame to base frame."""
+        given = as_array('matrix', matrix, (4, 4))
+        last = given[..., 3, :]
+        off = np.abs(last - [0.0, 0.0, 0.0, 1.0]).max(axis=-1) > ORTHOGONALITY
+        if off.any():
+            at = tuple(map(int, np.argwhere(off)[0]))
+            raise MotionError(f'matrix{list(at) if at else ""}: its last row is '
+                              f'{last[at].tolist()}: must be [0, 0, 0, 1]')
+        return cls(given[..., :3, 3], given[..., :3, :3])
+
+
+def row_of_one(size: int, position: Any, rotation: Any, *parts: tuple[slice, Any],
+               ) -> Array | None:
+    """
+    Return the row of one sample whose arguments are arrays of floats and well within the rules.
+
+    This takes a tenth of the time that arguments of any kind and shape take; for these, and for
+    wrong ones, it returns None. Parts of the row that are None are zero.
+    """
+    row = np.zeros(size)
+    numbers = row.data
+    try:
+        numbers[POSITION] = position
+        numbers[ROTATION] = rotation.reshape(9)
+        for where, part in parts:
+            if part is not None:
+                numbers[where] = part
+    except Exception:  # an arbitrary object may raise any; the check of all kinds names it
+        return None
+    values = row.tolist()
+    a, b, c, d, e, f, g, h, i = values[ROTATION]
+    if (abs(a * a + d * d + g * g - 1.0) < _WELL and abs(b * b + e * e + h * h - 1.0) < _WELL
+            and abs(c * c + f * f + i * i - 1.0) < _WELL and abs(a * b + d * e + g * h) < _WELL
+            and abs(a * c + d * f + g * i) < _WELL and abs(b * c + e * f + h * i) < _WELL
+            and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0.0
+            and math.isfinite(sum(values)) and rotation.shape == (3, 3)):
+        return row
+    return None
+
+
+def as_rotation(rotation: ArrayLike) -> Array:
+    """Return rotation matrices (..., 3, 3); MotionError for other ones."""
+    r = as_array('rotation', rotation, (3, 3))
+    with np.errstate(over='ignore', invalid='ignore'):
+        error = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-2, -1))
+        orthogonal, determinant = error <= ORTHOGONALITY, np.linalg.det(r)
+        good = orthogonal & (determinant > 0.0)
+    if not good.all():
+        at = tuple(map(int, np.argwhere(~good)[0]))
+        what = ('is a reflection: its determinant is -1, must be +1 (is an axis mirrored, or are '
+                'two columns exchanged?)' if orthogonal[at] else
+                f'is not a rotation: R^T R is {error[at]:.3g} off the identity, must be at most '
+                f'{ORTHOGONALITY:g}')
+        raise MotionError(f'rotation{list(at) if at else ""}: {r[at].tolist()} {what}')
+    return r
+
+
+def row_by_row(matrix: Array) -> Array:
+    """Return matrices (..., 3, 3) as rows (..., 9)."""
+    return matrix.reshape(*matrix.shape[:-2], 9)
+
+
+def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions x y z w (..., 4)."""
+    q = as_array('quaternion', quaternion, (4,))
+    with np.errstate(over='ignore'):
+        length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
+    off = ~np.asarray(rotations.is_unit(length))
+    if off.any():
+        at = tuple(map(int, np.argwhere(off)[0]))
+        raise MotionError(
+            f'quaternion{list(at) if at else ""}: {q[at].tolist()}: length {length[at]:.6g}, must '
+            f'be within {rotations.QUATERNION_TOLERANCE:g} of 1')
+    x, y, z, w = np.moveaxis(q / length[..., None], -1, 0)
+    return np.stack(rotations.from_quaternion(x, y, z, w), axis=-1).reshape(*q.shape[:-1], 3, 3)
 
 
 class Motion(Posed):
@@ -70,6 +351,14 @@ class Motion(Posed):
 
     """
 
+    linear_velocity = Field(
+        LINEAR_VELOCITY, "Velocity of the platform's origin, base axes, (..., 3) [m/s].")
+    angular_velocity = Field(ANGULAR_VELOCITY, 'Angular velocity, base axes, (..., 3) [rad/s].')
+    linear_acceleration = Field(
+        LINEAR_ACCELERATION, "Acceleration of the platform's origin, base axes, (..., 3) [m/s^2].")
+    angular_acceleration = Field(
+        ANGULAR_ACCELERATION, 'Angular acceleration, base axes, (..., 3) [rad/s^2].')
+
     def __init__(
             self, position: ArrayLike, rotation: ArrayLike,
             linear_velocity: ArrayLike | None = None,
@@ -84,17 +373,10 @@ class Motion(Posed):
         if row is not None:
             self.rows, self.shape = row, ()
             return
-        parts = {'rotation': (ROTATION, row_by_row(as_rotation(rotation))),
-                 'position': (POSITION, as_array('position', position, (3,)))}
-        for name, where, part in (
-                ('linear_velocity', LINEAR_VELOCITY, linear_velocity),
-                ('angular_velocity', ANGULAR_VELOCITY, angular_velocity),
-                ('linear_acceleration', LINEAR_ACCELERATION, linear_acceleration),
-                ('angular_acceleration', ANGULAR_ACCELERATION, angular_acceleration)):
-            if part is not None:
-                parts[name] = where, as_array(name, part, (3,))
-        self.rows = rows_of(MOTION, parts)
-        self.shape = self.rows.shape[:-1]
+        self._fill(
+            MOTION, position=position, rotation=rotation, linear_velocity=linear_velocity,
+            angular_velocity=angular_velocity, linear_acceleration=linear_acceleration,
+            angular_acceleration=angular_acceleration)
 
     @classmethod
     def from_pose(
@@ -161,26 +443,6 @@ class Motion(Posed):
     def pose(self) -> Pose:
         """Return the pose alone; it shares the motion's memory."""
         return Pose.of_rows(self.rows[..., POSE])
-
-    @property
-    def linear_velocity(self) -> Array:
-        """Velocity of the platform's origin, base axes, (..., 3) [m/s]."""
-        return self._part(LINEAR_VELOCITY)
-
-    @property
-    def angular_velocity(self) -> Array:
-        """Angular velocity, base axes, (..., 3) [rad/s]."""
-        return self._part(ANGULAR_VELOCITY)
-
-    @property
-    def linear_acceleration(self) -> Array:
-        """Acceleration of the platform's origin, base axes, (..., 3) [m/s^2]."""
-        return self._part(LINEAR_ACCELERATION)
-
-    @property
-    def angular_acceleration(self) -> Array:
-        """Angular acceleration, base axes, (..., 3) [rad/s^2]."""
-        return self._part(ANGULAR_ACCELERATION)
 
 
 def _apply(matrix: Array, vector: Array) -> Array:
