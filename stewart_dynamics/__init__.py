@@ -23,6 +23,7 @@ from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from stewart_dynamics.capability.capability import Capability, Extent
+    from stewart_dynamics.capability.reachable import Reachable
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
     from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdown
@@ -40,11 +41,12 @@ __version__ = '0.1.0'
 __all__ = [
     'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics',
     'Motion', 'MotionError', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
-    'Pose', 'PoseError', 'SingularityError', 'StewartError', 'StewartPlatform', 'TimedMotion',
-    '__version__', 'approach', 'check_planned_trajectory', 'rest_to_rest']
+    'Pose', 'PoseError', 'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform',
+    'TimedMotion', '__version__', 'approach', 'check_planned_trajectory', 'rest_to_rest']
 
 _MODULES = {
     'capability.capability': ('Capability', 'Extent'),
+    'capability.reachable': ('Reachable',),
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
     'mechanics.frames.base_motion': ('BaseMotion',),

@@ -27,6 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
+from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
@@ -143,6 +144,53 @@ class Capability:
         in_parts(solve, self.platform.constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs, scratch=(6, travel.LEG))
         return _extent(values.reshape(shape), _ENDS[codes].reshape(shape), legs.reshape(shape))
+
+    def reachable(self, box: ArrayLike, pose: Pose | Motion | None = None,
+                  pivot: ArrayLike | None = None) -> Reachable:
+        """
+        Return whether all poses of a box of ranges are within the limits: proven, not sampled.
+
+        Lengths, joint angles, the condition number up to ``singularity.stop_condition``, and the
+        sign of det(J), by branch and bound (``capability.box``). The work is bounded: a box that
+        is within the limits but too near to a singularity may be answered with ``certain`` False
+        and a worst pose whose excess is negative.
+
+        Parameters
+        ----------
+        box : (6, 2)
+            Ranges of the translation of the pivot [m] and of the rotation vector [rad] from the
+            pose, base axes, all at once.
+        pose : Pose or Motion of one sample, optional
+            By default the home pose.
+        pivot : (3,), optional
+            Point that the platform turns about, platform frame [m]; by default its origin.
+
+        """
+        ranges = checked_ranges(box)
+        return self._boxes(pose, pivot).reachable(ranges)
+
+    def reachable_factor(self, box: ArrayLike, pose: Pose | Motion | None = None,
+                         pivot: ArrayLike | None = None) -> Extent:
+        """
+        Return the largest factor by which a box of ranges can be scaled and still is reachable.
+
+        Arguments are those of ``reachable``; each range includes zero. The box of the answer is
+        proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
+        near a singularity the factor may be too small.
+        """
+        ranges = checked_ranges(box)
+        if (ranges[:, 0] > 0.0).any() or (ranges[:, 1] < 0.0).any():
+            raise MotionError('box: a range without zero cannot be scaled')
+        factor, worst = self._boxes(pose, pivot).factor(ranges)
+        return Extent(factor, worst.limit, worst.leg)
+
+    def _boxes(self, pose: Pose | Motion | None, pivot: ArrayLike | None) -> Boxes:
+        pose = self.platform.home_pose() if pose is None else pose
+        center = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
+        for name, shape in (('pose', pose.shape), ('pivot', center.shape[:-1])):
+            if shape:
+                raise MotionError(f'{name}: shape {shape}: must be a single one')
+        return Boxes(self.platform, self._axes, self._bounds, motion_rows(pose)[0], center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
                ) -> Extent:

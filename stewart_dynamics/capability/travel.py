@@ -211,7 +211,8 @@ def _end_of_angle(leg: Array, velocity: Vector3, rate: float, bound: float, at_p
 
 
 @compiled
-def _largest_eigenvalue(g: Symmetric) -> float:
+def largest_eigenvalue(g: Symmetric) -> float:
+    """Return the largest eigenvalue of a Gram matrix."""
     trace = g[0][0] + g[1][0] + g[2][0] + g[3][0] + g[4][0] + g[5][0]
     k = 1.0 / trace
     t = tridiagonal(g)
@@ -277,8 +278,8 @@ def _margin(constants: Array, legs: Array, velocity: Vector3, rate: float, stop:
         else:
             r5 = row
     inverse, determinant = inverse_and_determinant(r0, r1, r2, r3, r4, r5)
-    largest = math.sqrt(_largest_eigenvalue(gram(r0, r1, r2, r3, r4, r5)))
-    smallest = 1.0 / math.sqrt(_largest_eigenvalue(gram(
+    largest = math.sqrt(largest_eigenvalue(gram(r0, r1, r2, r3, r4, r5)))
+    smallest = 1.0 / math.sqrt(largest_eigenvalue(gram(
         inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5])))
     for n in range(6):
         legs[0, _INVERSE + n] = inverse[0][n]

@@ -1,0 +1,202 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Boxes of ranges: whether all of a box is reachable, and by which factor it can grow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability import box as boxes
+from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.arguments import as_array
+from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.limits import TOLERANCE
+from stewart_dynamics.mechanics.rows import POSE
+from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# Largest numbers of cells: for each limit of each leg, and for the condition number.
+_MOST_OF_LEGS, _MOST_OF_CONDITION = 20_000, 100_000
+_CODES = ('length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max')
+# Factors of a box are found to this part.
+_EXACT = 1e-9
+# For a box that reaches a singularity the factor is found to this part: each proof takes longer.
+_EXACT_OF_CONDITION = 0.05
+# A larger factor is infinite.
+_LARGEST = 1e6
+
+
+class Worst(NamedTuple):
+    """The pose of a box that exceeds a limit most, or that is nearest to one."""
+
+    pose: Pose
+    leg: int
+    """Index of the leg; -1 at a singularity."""
+    limit: str
+    """Name of the limit without ``limits.``, or ``singularity``."""
+    excess: float
+    """
+    Past the limit [m, rad, or condition number]; negative where the limit is kept.
+
+    Infinite where det(J) has changed its sign: a singularity is between this pose and the others.
+    """
+
+
+class Reachable(NamedTuple):
+    """Whether all poses of a box are within the limits."""
+
+    certain: bool
+    """All poses of the box are proven to be within the limits."""
+    worst: Worst
+    """
+    The worst pose by excess relative to the limit.
+
+    Where ``certain`` is false and the excess is not above zero, no pose was found that exceeds a
+    limit, but the proof did not end within a bounded number of steps.
+    """
+
+
+class _Proof(NamedTuple):
+    worst: Worst
+    certain: bool
+    part: float
+    """Excess relative to the limit."""
+
+
+class Boxes:
+    """
+    Boxes of ranges around a pose.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        The hexapod.
+    axes, bounds : (12, 3), (4, 6)
+        As in ``travel.travels``.
+    row, pivot : (MOTION,), (3,)
+        Pose from which boxes are measured, and center of rotation in the platform frame [m].
+
+    """
+
+    def __init__(self, platform: StewartPlatform, axes: Array, bounds: Array, row: Array,
+                 pivot: Array) -> None:
+        self._platform, self._axes, self._bounds = platform, axes, bounds
+        self._row, self._pivot = row, pivot
+        self._stop = min(platform.parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
+        self._legs = np.empty((6, boxes.LEG))
+        self._cells = np.empty((boxes.DEPTH + 1, boxes.CELL))
+        self._rows = np.empty((7, boxes.ROWS))
+
+    def reachable(self, ranges: Array) -> Reachable:
+        """Return whether a box (6, 2) is within the limits."""
+        box = _box(ranges)
+        worst, certain, part = self._worst_of_legs(box)
+        if not certain:
+            return Reachable(False, worst)
+        singular, certain, part_of_condition = self._worst_condition(box)
+        return Reachable(
+            certain, singular if not certain or part_of_condition > part else worst)
+
+    def factor(self, ranges: Array) -> tuple[float, Worst]:
+        """Return the largest factor by which a box can be scaled, and what limits it."""
+        # rotation vectors of more than a turn add nothing
+        turned = float(np.abs(ranges[3:]).max())
+        most = 2.0 * math.pi / turned if turned > 0.0 else math.inf
+        factor, worst = _largest(
+            lambda factor: self._worst_of_legs(_box(factor * ranges)), most, _EXACT)
+        if factor == 0.0:
+            return factor, worst
+        return _largest(
+            lambda factor: self._worst_condition(_box(factor * ranges)), factor,
+            _EXACT_OF_CONDITION, worst)
+
+    def _worst_of_legs(self, box: Array) -> _Proof:
+        """Return the worst pose of lengths and joint angles, and whether limits are kept."""
+        found = np.zeros((24, boxes.FOUND))
+        boxes.legs_in_box(
+            self._platform.constants, self._axes, self._bounds, self._row, self._pivot, box,
+            _MOST_OF_LEGS, self._legs, self._cells, found)
+        limited = np.isfinite(found[:, boxes.EXCESS])
+        sizes = np.where(limited, self._bounds.ravel(), 1.0)
+        parts = np.where(limited, found[:, boxes.EXCESS] / sizes, -math.inf)
+        at = int(parts.argmax())
+        certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * sizes))
+        return _Proof(Worst(self._pose(found[at, boxes.POINT]), at % 6, _CODES[at // 6],
+                            float(found[at, boxes.EXCESS])), certain, float(parts[at]))
+
+    def _worst_condition(self, box: Array) -> _Proof:
+        """Return the worst pose by condition number, and whether it stays below its limit."""
+        found, count = np.empty(boxes.FOUND), np.empty(1, dtype=np.int64)
+        boxes.condition_in_box(
+            self._platform.constants, self._axes, self._row, self._pivot, box, self._stop,
+            _MOST_OF_CONDITION, self._legs, self._cells, self._rows, found, count)
+        excess = float(found[boxes.EXCESS])
+        return _Proof(Worst(self._pose(found[boxes.POINT]), -1, 'singularity', excess),
+                      bool(found[boxes.UPPER] == 0.0), excess / self._stop)
+
+    def _pose(self, point: Array) -> Pose:
+        """Return the pose of translation and rotation vector (6,)."""
+        start = Pose.of_rows(self._row[POSE].copy())
+        angle = float(np.linalg.norm(point[3:]))
+        turn = Pose.from_quaternion(np.zeros(3), np.append(
+            0.5 * np.sinc(angle / (2.0 * math.pi)) * point[3:], math.cos(0.5 * angle)))
+        rotation = turn.rotation @ start.rotation
+        return Pose(start.position + start.rotation @ self._pivot + point[:3]
+                    - rotation @ self._pivot, rotation)
+
+
+def checked_ranges(value: ArrayLike) -> Array:
+    """Return a box (6, 2); MotionError where it is no box, or has no size."""
+    ranges = as_array('box', value, (6, 2))
+    if ranges.ndim != 2:
+        raise MotionError(f'box: shape {ranges.shape}: must be (6, 2)')
+    for name, (low, high) in zip(('x', 'y', 'z', 'rx', 'ry', 'rz'), ranges.tolist(), strict=True):
+        if low > high:
+            raise MotionError(f'box: {name}: {low:g} to {high:g}: must not decrease')
+    if float(np.abs(ranges[3:]).max()) > 2.0 * math.pi:
+        raise MotionError('box: rotations: must be within a turn, 2 pi rad')
+    if not np.ptp(ranges, axis=1).any():
+        raise MotionError('box: all six ranges are of zero size')
+    return ranges
+
+
+def _box(ranges: Array) -> Array:
+    """Return middle and half widths (12,) of ranges (6, 2)."""
+    return np.concatenate([ranges.mean(axis=1), 0.5 * np.ptp(ranges, axis=1)])
+
+
+def _largest(prove: Callable[[float], _Proof], most: float, exact: float,
+             worst: Worst | None = None) -> tuple[float, Worst]:
+    """Return the largest factor, up to ``most``, that is proven, and the worst pose above it."""
+    begin = prove(0.0)
+    if not begin.certain:
+        return 0.0, begin.worst
+    low, high, trial = 0.0, math.inf, min(most, 1.0 if worst is None else most, _LARGEST)
+    while high - low > exact * high or high == math.inf:
+        proof = prove(trial)
+        if proof.certain:
+            low = trial
+            if trial >= min(most, _LARGEST):
+                return most, worst or proof.worst
+        else:
+            high, worst = trial, proof.worst
+        trial = min(2.0 * trial, most, _LARGEST) if high == math.inf else 0.5 * (low + high)
+    return low, worst or begin.worst
