@@ -27,7 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import box as boxes
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
-from stewart_dynamics.mechanics.frames.pose import Pose
+from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
