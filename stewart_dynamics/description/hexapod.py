@@ -112,11 +112,6 @@ class Hexapod:
     """
     A hexapod with the names of all its bodies.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-
     Attributes
     ----------
     position, rotation : (3,), (3, 3)

@@ -37,11 +37,6 @@ class ModelMessages:
     """
     Writes the messages.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Geometry, names of joints and frames.
-
     Raises
     ------
     ParameterError

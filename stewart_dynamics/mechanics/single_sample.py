@@ -50,15 +50,7 @@ _NO_FLOATS = (TypeError, ValueError)
 
 
 class SingleSample:
-    """
-    The calls for one sample of a hexapod, from any number of threads.
-
-    Parameters
-    ----------
-    constants : (CONSTANTS,)
-        Constants of the hexapod, see ``hexapod_constants``.
-
-    """
+    """The calls for one sample of a hexapod, from any number of threads."""
 
     def __init__(self, constants: Array) -> None:
         self._inverse_dynamics = _Memories(

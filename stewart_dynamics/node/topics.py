@@ -147,11 +147,6 @@ class Topics:
     """
     Publishers and subscriptions of the node; created by ``make``.
 
-    Parameters
-    ----------
-    node : LifecycleNode
-        The node that owns them.
-
     Attributes
     ----------
     publishers : dict of str to Publisher

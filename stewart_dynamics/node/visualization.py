@@ -65,17 +65,7 @@ class _PublisherAtRate:
 
 
 class MarkersPublisher(_PublisherAtRate):
-    """
-    Publishes the markers of the last answer.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Geometry, limits and names shown by the markers, and ``visualization_rate``.
-    publisher : Publisher, optional
-        None if the rate is zero.
-
-    """
+    """Publishes the markers of the last answer."""
 
     def __init__(self, parameters: Parameters, publisher: Any) -> None:
         super().__init__(publisher, parameters['visualization_rate'])

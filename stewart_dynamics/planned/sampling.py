@@ -49,15 +49,7 @@ _FEWEST = 16
 
 
 class Sampling:
-    """
-    The number of samples that the trajectories of a hexapod need.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod, with its limits.
-
-    """
+    """The number of samples that the trajectories of a hexapod need."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._arm = arm = float(parameters['singularity.characteristic_length'])

@@ -52,19 +52,7 @@ _NOTHING = Joined(
 
 
 class BaseInput:
-    """
-    Follows the topics of the base.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Source of the base's motion, frames, timeout, gravity and the mounting of the IMU.
-    rejections : Rejections
-        Counts rejected messages.
-    noticed : callable
-        Called with texts for the log.
-
-    """
+    """Follows the topics of the base."""
 
     def __init__(self, parameters: Parameters, rejections: Rejections,
                  noticed: Callable[[str], object]) -> None:

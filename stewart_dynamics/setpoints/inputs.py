@@ -235,17 +235,7 @@ def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
 
 
 class WrenchInput:
-    """
-    Follows ``~/wrench``.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        ``base_frame`` is used.
-    rejections : Rejections
-        Counts rejected messages.
-
-    """
+    """Follows ``~/wrench``."""
 
     def __init__(self, parameters: Parameters, rejections: Rejections) -> None:
         self.wrench: Six = NO_WRENCH

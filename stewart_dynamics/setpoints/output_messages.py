@@ -45,15 +45,7 @@ Written = tuple[str, Stamps, NDArray[np.void]]
 
 
 class OutputMessages:
-    """
-    Writes the output messages.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Names and zero lengths of the legs, and the base frame.
-
-    """
+    """Writes the output messages."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._zero_lengths = parameters['geometry.zero_length'].tolist()

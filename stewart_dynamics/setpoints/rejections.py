@@ -54,15 +54,7 @@ class Rejection(NamedTuple):
 
 
 class Rejections:
-    """
-    Counts rejected and dropped messages.
-
-    Parameters
-    ----------
-    rejected : callable
-        Called with each rejection and the details of the message.
-
-    """
+    """Counts rejected and dropped messages."""
 
     def __init__(self, rejected: Callable[[Rejection, str], None]) -> None:
         self.counts: Counter[Rejection] = Counter()

@@ -69,15 +69,7 @@ class Harmonics(NamedTuple):
 
 
 class GeneratedBaseMotion:
-    """
-    A base that moves about its center, from rest on.
-
-    Parameters
-    ----------
-    parameters : SimulatorParameters
-        ``base_motion.source`` is sine or sea.
-
-    """
+    """A base that moves about its center, from rest on."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
         self.harmonics = (_sea if parameters['base_motion.source'] == 'sea' else _sine)(parameters)
@@ -210,16 +202,6 @@ class BaseOfTopics:
     Before the first sample it is at rest and level; where samples stop for longer than
     ``base.timeout``, at rest and tilted as it was: a base that kept its last acceleration would
     load the hexapod forever.
-
-    Parameters
-    ----------
-    parameters : SimulatorParameters
-        Frame of the world, gravity and ``base.timeout``.
-    rejections : Rejections
-        Counts rejections.
-    noticed : callable
-        Called with texts for the log.
-
     """
 
     def __init__(self, parameters: SimulatorParameters, rejections: Rejections,

@@ -31,15 +31,7 @@ from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 
 class SimulatedImu:
-    """
-    An IMU mounted as ``base.imu`` says, with bias and noise.
-
-    Parameters
-    ----------
-    parameters : SimulatorParameters
-        The mounting, ``imu.*`` and the seed of the noise.
-
-    """
+    """An IMU mounted as ``base.imu`` says, with bias and noise."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
         self._position = _vector(parameters['base.imu.position'])

@@ -46,15 +46,7 @@ IMU_TYPE = inputs.INPUT_TYPES[inputs.BASE_IMU]
 
 
 class StateMessages:
-    """
-    Writes the messages of states.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Names of joints and base frame, and zero lengths.
-
-    """
+    """Writes the messages of states."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._zero_lengths = parameters['geometry.zero_length'].tolist()
@@ -72,15 +64,7 @@ class StateMessages:
 
 
 class BaseMessages:
-    """
-    Writes the messages of a base that moves.
-
-    Parameters
-    ----------
-    parameters : SimulatorParameters
-        The world frame and the IMU.
-
-    """
+    """Writes the messages of a base that moves."""
 
     def __init__(self, parameters: SimulatorParameters) -> None:
         frame = parameters['world_frame']

@@ -70,11 +70,6 @@ class Plant:
     could reverse it, the hexapod is held at rest in the last pose that could be, permanently:
     ``fault`` states it.
 
-    Parameters
-    ----------
-    parameters : SimulatorParameters
-        The hexapod and the simulation.
-
     Raises
     ------
     ParameterError

@@ -98,15 +98,7 @@ def sources_of(parameters: Parameters) -> tuple[str, ...]:
 
 
 class ForceBreakdownRows:
-    """
-    The force breakdown of rows of motion, as one array.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Parameters of the hexapod.
-
-    """
+    """The force breakdown of rows of motion, as one array."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._friction = tuple(parameters[f'actuator.{name}'].copy() for name in (

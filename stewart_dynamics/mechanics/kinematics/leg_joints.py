@@ -73,11 +73,6 @@ class TreeJoints:
     """
     The joints of a hexapod as a tree: their names, and their positions at a pose.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        Geometry, names and limits of length, which give the home pose.
-
     Attributes
     ----------
     names : tuple of str

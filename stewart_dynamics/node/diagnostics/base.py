@@ -34,17 +34,7 @@ _REJECTED, _UNKNOWN = 'rejected', 'unknown'
 
 
 class BaseDiagnostics(Part):
-    """
-    Counts the base's messages, and notes for which setpoints its motion is known.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        ``base.timeout`` is used.
-    topics : sequence of str
-        Topics of the base; empty if the base is fixed.
-
-    """
+    """Counts the base's messages, and notes for which setpoints its motion is known."""
 
     name = 'base'
 

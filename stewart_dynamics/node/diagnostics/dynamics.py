@@ -33,19 +33,7 @@ from stewart_dynamics.setpoints.step import Output
 
 
 class DynamicsDiagnostics:
-    """
-    The parts of the node's report, from one activation to the next.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Names, timeouts and thresholds.
-    topics, base_topics : sequence of str
-        Setpoint topics that are joined, and topics of the base.
-    now : float
-        The time of the activation.
-
-    """
+    """The parts of the node's report, from one activation to the next."""
 
     def __init__(self, parameters: Parameters, topics: Sequence[str],
                  base_topics: Sequence[str], now: float) -> None:

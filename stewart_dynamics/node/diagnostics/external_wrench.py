@@ -31,15 +31,7 @@ _COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'm
 
 
 class ExternalWrenchDiagnostics(Part):
-    """
-    Notes estimates from measured legs, and rejections of measurements.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Names of the legs, and timeout.
-
-    """
+    """Notes estimates from measured legs, and rejections of measurements."""
 
     name = 'external wrench'
 

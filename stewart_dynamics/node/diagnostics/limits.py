@@ -30,24 +30,14 @@ _MILLIMETRES = 1000.0
 
 
 class LimitsDiagnostics(Part):
-    """
-    Notes which limits setpoints exceed, and the largest force demanded.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Names of the legs, limits and ``limits.action``; may be replaced at any time.
-    answers : Answers
-        The setpoints that were answered.
-
-    """
+    """Notes which limits setpoints exceed, and the largest force demanded."""
 
     name = 'limits'
 
     def __init__(self, parameters: Parameters, answers: Answers) -> None:
         super().__init__(*LIMITS, JUMP)
         self._joints: tuple[str, ...] = parameters['joints']
-        self.parameters = parameters
+        self.parameters = parameters  # may be replaced at any time
         self._answers = answers
         self._output: Output | None = None
         self._setpoints = Counter[str]()  # that exceed each limit

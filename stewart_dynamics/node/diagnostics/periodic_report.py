@@ -141,12 +141,6 @@ class Part:
 
     Subclasses have a ``name`` and define ``values``, and ``state`` and ``level`` where these are
     not those of ``held``.
-
-    Parameters
-    ----------
-    causes : str
-        The causes of its levels.
-
     """
 
     name = ''
@@ -245,17 +239,7 @@ def last_heard(heard: Mapping[str, float], now: float) -> list[tuple[str, str]]:
 
 
 class Report:
-    """
-    The statuses of all parts, and when they are due.
-
-    Parameters
-    ----------
-    parts : sequence of Part
-        In the order of their statuses.
-    now : float
-        Start time of the reports.
-
-    """
+    """The statuses of all parts, and when they are due."""
 
     def __init__(self, parts: Sequence[Part], now: float) -> None:
         self._parts = parts

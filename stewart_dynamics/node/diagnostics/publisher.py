@@ -33,19 +33,7 @@ _READ = ('leg_states', 'leg_forces')
 
 
 class DiagnosticsPublisher:
-    """
-    Publishes reports.
-
-    Parameters
-    ----------
-    node : Node
-        The node that is reported on.
-    topics : Topics
-        Its topics, including that of the reports.
-    log : RepeatedLog
-        Receives the log lines.
-
-    """
+    """Publishes reports."""
 
     def __init__(self, node: Node, topics: Topics, log: RepeatedLog) -> None:
         self._node = node

@@ -41,21 +41,7 @@ _PATIENCE = 0.9
 
 
 class SetpointDiagnostics(Part):
-    """
-    Notes received and rejected setpoint messages, publishers and subscribers.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Timeout and tolerance.
-    topics : sequence of str
-        The setpoint topics that are joined.
-    answers : Answers
-        The setpoints that were answered.
-    now : float
-        The time.
-
-    """
+    """Notes received and rejected setpoint messages, publishers and subscribers."""
 
     name = 'setpoints'
 
@@ -177,17 +163,7 @@ class SetpointDiagnostics(Part):
 
 
 class TimingDiagnostics(Part):
-    """
-    Notes processing times and dropped setpoints.
-
-    Parameters
-    ----------
-    answers : Answers
-        The setpoints that were answered.
-    now : float
-        The time.
-
-    """
+    """Notes processing times and dropped setpoints."""
 
     name = 'timing'
 

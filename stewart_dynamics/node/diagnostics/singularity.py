@@ -58,25 +58,13 @@ def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
 
 
 class SingularityDiagnostics(Part):
-    """
-    Notes the distance of setpoints from a singularity.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Names of the legs, thresholds; may be replaced at any time.
-    answers : Answers
-        The setpoints that were answered.
-    now : float
-        The time.
-
-    """
+    """Notes the distance of setpoints from a singularity."""
 
     name = 'singularity'
 
     def __init__(self, parameters: Parameters, answers: Answers, now: float) -> None:
         super().__init__(_CROSSING, _NEARNESS)
-        self.parameters = parameters
+        self.parameters = parameters  # may be replaced at any time
         self._answers = answers
         self._output: Output | None = None
         self._crossed = False  # with the last setpoint
