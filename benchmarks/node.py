@@ -43,7 +43,7 @@ from latency import FIRST_STAMP, legs, MOTION, PARAMETERS, PERIOD
 import numpy as np
 
 from stewart_dynamics.arrays import NO_WRENCH
-from stewart_dynamics.description.joint_states import ModelMessages
+from stewart_dynamics.description.model import ModelMessages
 from stewart_dynamics.executables import executable
 from stewart_dynamics.external_wrench.estimate import ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs

@@ -29,7 +29,7 @@ import time
 import rclpy
 
 from stewart_dynamics.node.node import DynamicsNode
-from stewart_dynamics.ros.repeated_events import Series
+from stewart_dynamics.ros.repeated_log import Series
 
 REPEATED = 21
 REJECTION = 'setpoint/pose rejected: not finite'

@@ -40,7 +40,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 from running import (
     assert_only_log_lines, bits, DEADLINE, DynamicsNode, executable, HOME, LATCHED, log_lines,
-    nanoseconds, NODE, NodeProcess, OUTPUTS, participants, Peer, PLATFORM, Program, raw, rejected,
+    nanoseconds, NODE, NodeProcess, OUTPUTS, participants, Peer, PLATFORM, raw, rejected,
     ROOT, Sample, says, SEPARATE, wrench_message)
 from std_msgs.msg import Bool
 
@@ -580,7 +580,6 @@ sys.modules['{}'] = None  # importing it fails, as if it were missing
 from stewart_dynamics.node.node import main
 sys.exit(main())
 """
-WITHOUT_EVENTS = [sys.executable, '-c', WITHOUT.format('rclpy.experimental.events_executor')]
 WITHOUT_NUMBA = [sys.executable, '-c', WITHOUT.format('numba')]
 
 
@@ -617,16 +616,6 @@ def _passed_over(node: DynamicsNode, key: str, sent: int) -> int:
 
 
 # Missing libraries
-
-def test_without_the_events_executor_nothing_starts(domain: int, tmp_path: Path) -> None:
-    program = Program([*WITHOUT_EVENTS, '--ros-args', '--params-file', PLATFORM], domain, tmp_path)
-    try:
-        assert program.wait() == 1
-    finally:
-        program.kill()
-    assert program.stderr.splitlines()[-1].startswith(
-        'stewart_dynamics: this rclpy has no events executor: rclpy 7.1.4 or later is needed')
-
 
 @pytest.mark.parametrize('command, environment', [
     (WITHOUT_NUMBA, {}), (None, {'NUMBA_DISABLE_JIT': '1'})], ids=['no numba', 'numba disabled'])

@@ -24,7 +24,7 @@ from referees import rng, rotation_about, size_of
 from simulated import random_simulated, simulated
 
 from stewart_dynamics import ParameterError, Pose, StewartPlatform
-from stewart_dynamics.simulator.step_size import largest_eigenvalue, substeps
+from stewart_dynamics.simulator.plant import largest_eigenvalue, substeps
 
 
 @pytest.mark.parametrize('seed', range(20))

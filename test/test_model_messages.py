@@ -25,7 +25,7 @@ from referees import Array, random_motion, random_parameters, rng
 from scipy.spatial.transform import Rotation
 
 from stewart_dynamics import Parameters
-from stewart_dynamics.description.joint_states import JOINT_STATES, ModelMessages, TF
+from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.leg_joints import mounts
 from stewart_dynamics.replay.recorded_model import MODEL_TYPES

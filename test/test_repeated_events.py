@@ -19,7 +19,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stewart_dynamics.ros.repeated_events import SECONDS, Series
+from stewart_dynamics.ros.repeated_log import SECONDS, Series
 
 
 def test_the_first_is_logged_at_once_and_the_last_when_the_series_ends() -> None:

@@ -53,7 +53,7 @@ from scipy.spatial.transform import Rotation
 
 import stewart_dynamics
 from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
-from stewart_dynamics.description.joint_states import JOINT_STATES, TF
+from stewart_dynamics.description.model import JOINT_STATES, TF
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ

@@ -266,7 +266,8 @@ def _gravity(mechanism: Mechanism, found: Topology, remarks: list[str]) -> dict[
     if gravity is None:
         gravity = np.array(STANDARD_GRAVITY)
         if 'gravity' not in mechanism.carried:
-            remarks.append("gravity: not in the file: 9.80665 m/s^2 along the world's -z")
+            remarks.append(f'gravity: not in the file: {-STANDARD_GRAVITY[2]} m/s^2 along the '
+                           "world's -z")
     turn = found.base.placement.rotation
     return {'gravity': gravity if np.array_equal(turn, np.eye(3)) else turn.T @ gravity}
 

@@ -30,7 +30,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.compilation.functions import Preparation
-from stewart_dynamics.description.joint_states import JOINT_STATES, ModelMessages, TF
+from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
 from stewart_dynamics.errors import ParameterError, StewartError
 from stewart_dynamics.external_wrench import estimate as external_wrench, payload
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH, ExternalWrench
@@ -44,7 +44,6 @@ from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TI
 from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
 from stewart_dynamics.node.payload_service import inertia_message, PayloadService
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
-from stewart_dynamics.node.repeated_log import RepeatedLog
 from stewart_dynamics.node.topics import MARKERS, PAYLOAD, Topics
 from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
@@ -53,6 +52,7 @@ from stewart_dynamics.planned import messages as planned, trajectory as planned_
 from stewart_dynamics.ros.declared_parameters import declare_parameters
 from stewart_dynamics.ros.rclpy_workarounds import (
     answer_impossible_transitions, OneShotTimer)
+from stewart_dynamics.ros.repeated_log import RepeatedLog
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints import base_wrench

@@ -32,7 +32,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_policy_name_from_kind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from stewart_dynamics.description.joint_states import JOINT_STATES, TF
+from stewart_dynamics.description.model import JOINT_STATES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS

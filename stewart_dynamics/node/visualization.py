@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from stewart_dynamics.description.joint_states import ModelMessages
+from stewart_dynamics.description.model import ModelMessages
 from stewart_dynamics.node.markers import Markers
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint

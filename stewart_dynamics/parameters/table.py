@@ -34,7 +34,7 @@ from stewart_dynamics.parameters.rules import Parameter
 
 
 # The length of a given quaternion may differ from one by this; the quaternion is normalized.
-QUATERNION_TOLERANCE = 1e-3
+_QUATERNION_TOLERANCE = 1e-3
 # A singularity warning or stop ends below this part of the condition number at which it began, or
 # when the predicted time to the crossing exceeds warn_time divided by it.
 HYSTERESIS = 0.8
@@ -242,10 +242,9 @@ class Parameters(ParameterSet):
                 f'{source}: singularity.stop_condition: {stop}: must be at least '
                 f'singularity.warn_condition, {warn}')
         length = float(np.linalg.norm(self['base.imu.orientation']))
-        if abs(length - 1.0) > QUATERNION_TOLERANCE:
-            raise ParameterError(
-                f'{source}: base.imu.orientation: {self["base.imu.orientation"].tolist()}: length '
-                f'{length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1')
+        if not is_unit(length):
+            raise ParameterError(f'{source}: base.imu.orientation: '
+                                 f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
         platform_joints = self['geometry.platform_joints']
         size = float(np.mean(np.linalg.norm(
             platform_joints - platform_joints.mean(axis=0), axis=1)))
@@ -265,3 +264,13 @@ def inertia_matrix(six: ArrayLike) -> Any:
     """Return the matrix (3, 3) of ixx ixy ixz iyy iyz izz [kg m^2]."""
     ixx, ixy, ixz, iyy, iyz, izz = np.asarray(six, dtype=float)
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+def is_unit(length: Any) -> Any:
+    """Return whether a quaternion's length, or each of an array, is one within the tolerance."""
+    return abs(length - 1.0) <= _QUATERNION_TOLERANCE
+
+
+def unit_rule(length: float) -> str:
+    """Return the rule that a quaternion of this length breaks, as text of an error."""
+    return f'length {length:.6g}, must be within {_QUATERNION_TOLERANCE:g} of 1'

@@ -38,13 +38,13 @@ from stewart_dynamics.mechanics.rows import (
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
-from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters
+from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters, unit_rule
 from stewart_dynamics.planned.approach import approach_in_pieces
 from stewart_dynamics.planned.trajectory import (
     check_in_pieces, first_not_increasing, NOT_INCREASING, PIECE, PlannedTrajectory)
 from stewart_dynamics.setpoints.inputs import unit_quaternions
 from stewart_dynamics.setpoints.rejections import (
-    BASE_NOT_KNOWN, frame_details, length_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
+    BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 
 INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
@@ -244,7 +244,7 @@ def _rows(first: int, numbers: Array) -> Array:
     if not unit.all():
         n = int(np.argmin(unit))
         raise _RejectedError(
-            NOT_UNIT, f'points[{first + n}]: {length_details(float(lengths[n]))}')
+            NOT_UNIT, f'points[{first + n}]: {unit_rule(float(lengths[n]))}')
     rows = np.empty((len(numbers), MOTION))
     rows[:, POSITION] = numbers[:, _POSITION]
     rows[:, ROTATION] = np.column_stack(from_quaternion(*quaternions))

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 
 from stewart_dynamics.bags.recording import Recording
-from stewart_dynamics.description.joint_states import JOINT_STATES
+from stewart_dynamics.description.model import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options

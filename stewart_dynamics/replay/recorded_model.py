@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, Stamps
 from stewart_dynamics.description.hexapod import Hexapod
-from stewart_dynamics.description.joint_states import JOINT_STATES, TF
-from stewart_dynamics.description.link_transforms import LinkTransforms
+from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, TF
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION

@@ -40,7 +40,6 @@ from rclpy.task import Future
 from rclpy.time_source import TimeSource
 
 from stewart_dynamics.arrays import SECOND
-from stewart_dynamics.errors import StewartError
 
 _PIECE, _LOOK = 10.0, 0.1  # [s]
 
@@ -201,23 +200,6 @@ def reject_impossible_times() -> None:
     test_a_time_before_zero_on_clock_is_not_followed passes without this.
     """
     rclpy.node.TimeSource = _TimeSource  # type: ignore[misc]
-
-
-def make_executor() -> Executor:
-    """
-    Return the events executor.
-
-    The single-threaded executor takes 2.5 times the processor time, most of it for building its
-    wait set anew for every message (https://github.com/ros2/rclpy/issues/1389), and answers a
-    backlog one message after the other. Raises StewartError where rclpy has no events executor.
-    """
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError as exc:
-        raise StewartError(
-            'this rclpy has no events executor: rclpy 7.1.4 or later is needed (ROS 2 Jazzy of '
-            '2025 or later)') from exc
-    return EventsExecutor()
 
 
 def spin(executor: Executor, node: Node, stop: Future, stopped: Callable[[], bool]) -> None:

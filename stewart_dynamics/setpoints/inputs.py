@@ -27,14 +27,14 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, NO_WRENCH, Six, Stamps
-from stewart_dynamics.mechanics.frames.rotation import from_quaternion, is_unit, quaternion_length
+from stewart_dynamics.mechanics.frames.rotation import from_quaternion, quaternion_length
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import is_unit, Parameters, unit_rule
 from stewart_dynamics.setpoints.batch_joining import Samples
 from stewart_dynamics.setpoints.rejections import (
-    frame_details, length_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
+    frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)
 
 # Topics, relative to the node's name.
@@ -138,7 +138,7 @@ class SampleReader:
             x, y, z, w = values[3:7]
             length = quaternion_length(x, y, z, w)
             if not is_unit(length):
-                self._rejections.reject(self._topic, NOT_UNIT, length_details(length))
+                self._rejections.reject(self._topic, NOT_UNIT, unit_rule(length))
                 return None
             values = values[:3] + from_quaternion(
                 x / length, y / length, z / length, w / length) + values[7:]
@@ -223,7 +223,7 @@ def unit_quaternions(quaternions: Array) -> tuple[Array, Array, Flags]:
     lengths : (N,)
         Lengths before normalization.
     unit : (N,)
-        Which lengths are 1 within QUATERNION_TOLERANCE.
+        Which lengths are 1 within the tolerance.
 
     """
     # Element by element, as for one sample, so that results are bit-identical.

@@ -20,12 +20,11 @@ from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple
 
-from stewart_dynamics.mechanics.frames.rotation import QUATERNION_TOLERANCE
 from stewart_dynamics.messages.cdr import MALFORMED, NOT_FINITE
 
-__all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'length_details', 'MALFORMED',
-           'NOT_EXCLUSIVE', 'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT',
-           'OUT_OF_RANGE', 'Rejection', 'Rejections', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
+__all__ = ['BASE_NOT_KNOWN', 'DROPPED', 'frame_details', 'MALFORMED', 'NOT_EXCLUSIVE',
+           'NOT_FINITE', 'NOT_JOINED', 'NOT_MEASURED', 'NOT_UNIT', 'OUT_OF_RANGE', 'Rejection',
+           'Rejections', 'TOO_OLD', 'TWICE', 'WRONG_FRAME']
 
 BASE_NOT_KNOWN = "the base's motion is not known"
 NOT_UNIT = 'quaternion not of unit length'
@@ -71,8 +70,3 @@ def frame_details(frame: bytes, wanted: bytes) -> str:
     """Return the details for WRONG_FRAME."""
     given, must = (each[:60].decode(errors='replace') for each in (frame, wanted))
     return f'{given!r}, must be {must!r} or empty'
-
-
-def length_details(length: float) -> str:
-    """Return the details for NOT_UNIT."""
-    return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'

@@ -38,7 +38,7 @@ from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.ros.declared_parameters import declare_parameters
-from stewart_dynamics.ros.repeated_events import Series
+from stewart_dynamics.ros.repeated_log import RepeatedLog
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints.inputs import WrenchInput
@@ -65,6 +65,7 @@ _BEGIN = SECOND
 _ANNOUNCE_SECONDS = 0.1
 _BACKLOG = 100_000_000  # [ns]
 _WATCH_SECONDS = 1.0
+_WARN = 1  # level of diagnostics
 
 NOT_SIX = 'not six numbers'
 
@@ -91,7 +92,7 @@ class SimulatorNode(Node):
             allow_undeclared_parameters=True)
         self._settings = declare_parameters(self, SimulatorParameters)
         self._stepped = bool(self.get_parameter('use_sim_time').value)
-        self._series = Series()
+        self._log = RepeatedLog(self.get_logger())
         if machine_code.HINT:
             self.get_logger().warning(machine_code.HINT)
         begun = time.monotonic()
@@ -265,12 +266,10 @@ class SimulatorNode(Node):
         self._say(rejection, rejection.words(details))
 
     def _say(self, kind: Hashable, text: str) -> None:
-        if (line := self._series.add(kind, text, time.monotonic())) is not None:
-            self.get_logger().warning(line)
+        self._log.write([(_WARN, text, kind)])
 
     def _on_watch(self) -> None:
-        for line in self._series.over(time.monotonic()):
-            self.get_logger().warning(line)
+        self._log.write_last(time.monotonic())
 
 
 def main() -> int:

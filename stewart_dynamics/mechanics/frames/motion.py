@@ -29,6 +29,7 @@ from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
+from stewart_dynamics.parameters.table import is_unit, unit_rule
 
 Self = TypeVar('Self', bound='Samples')
 
@@ -301,12 +302,11 @@ def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
     q = as_array('quaternion', quaternion, (4,))
     with np.errstate(over='ignore'):
         length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
-    off = ~np.asarray(rotations.is_unit(length))
+    off = ~np.asarray(is_unit(length))
     if off.any():
         at = tuple(map(int, np.argwhere(off)[0]))
         raise MotionError(
-            f'quaternion{list(at) if at else ""}: {q[at].tolist()}: length {length[at]:.6g}, must '
-            f'be within {rotations.QUATERNION_TOLERANCE:g} of 1')
+            f'quaternion{list(at) if at else ""}: {q[at].tolist()}: {unit_rule(length[at])}')
     x, y, z, w = np.moveaxis(q / length[..., None], -1, 0)
     return np.stack(rotations.from_quaternion(x, y, z, w), axis=-1).reshape(*q.shape[:-1], 3, 3)
 

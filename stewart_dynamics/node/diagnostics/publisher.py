@@ -25,8 +25,8 @@ from std_msgs.msg import Header
 
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import OK, Status
-from stewart_dynamics.node.repeated_log import RepeatedLog
 from stewart_dynamics.node.topics import DIAGNOSTICS, Topics
+from stewart_dynamics.ros.repeated_log import RepeatedLog
 
 # The topics for controllers; diagnostics give the number of their subscribers.
 _READ = ('leg_states', 'leg_forces')

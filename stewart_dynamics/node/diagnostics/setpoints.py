@@ -29,7 +29,7 @@ from statistics import median
 from stewart_dynamics.node.diagnostics.periodic_report import (
     Answers, ERROR, last_heard, Level, LogLine, NEVER, Part, silent_topics, STALE, WARN)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.ros.repeated_events import SECONDS
+from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
 
 _REJECTED, _INCOMPLETE = 'rejected', 'incomplete'

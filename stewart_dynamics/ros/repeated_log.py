@@ -15,13 +15,18 @@
 """
 Log lines of repeated events: the first, one in five seconds, and the last.
 
-It uses no ROS and no clock: callers pass the time.
+Lines that are no kind of repeated event are logged each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
+import math
+import time
+from typing import Any
+
+_INFO, _WARNING = 0, 1  # levels of diagnostic_msgs/DiagnosticStatus
 
 # Time without an event after which a series ends, and interval of the lines while it lasts [s].
 SECONDS = 5.0
@@ -68,3 +73,40 @@ class Series:
                 if one.unlogged:
                     lines.append(f'{one.text} (the last of {one.number})')
         return lines
+
+
+class RepeatedLog:
+    """Writes lines to the logger of a node; of repeated events only some."""
+
+    def __init__(self, logger: Any) -> None:
+        self._logger = logger
+        self._series: dict[int, Series] = {}
+
+    def write(self, lines: Iterable[tuple[int, str, Hashable]]) -> None:
+        """
+        Write lines, each a level, a text, and the kind of repeated event or None.
+
+        Levels are those of diagnostic_msgs/DiagnosticStatus: 0 information, 1 warning, 2 error.
+        """
+        for level, text, kind in lines:
+            if kind is None:
+                self._write(level, text)
+                continue
+            series = self._series.setdefault(level, Series())
+            if (line := series.add(kind, text, time.monotonic())) is not None:
+                self._write(level, line)
+
+    def write_last(self, now: float = math.inf) -> None:
+        """Write the last line of each series that has ended by ``now``, by default of all."""
+        for level, series in self._series.items():
+            for line in series.over(now):
+                self._write(level, line)
+
+    def _write(self, level: int, text: str) -> None:
+        # One call for each level: rclpy requires the level of a call to be constant.
+        if level == _INFO:
+            self._logger.info(text)
+        elif level == _WARNING:
+            self._logger.warning(text)
+        else:
+            self._logger.error(text)

@@ -13,14 +13,16 @@
 # limitations under the License.
 
 """
-The transforms between the links of a URDF, from the positions of its joints.
+The hexapod as a model for RViz and Foxglove: positions of the joints of its URDF, and transforms.
 
-They are what robot_state_publisher publishes: Foxglove, and RViz's RobotModel, move a URDF by them
-and not by positions of joints.
+Positions and the platform's transform, from setpoints or from measured legs, go to
+``~/joint_states`` and ``/tf``. The transforms between all links are what robot_state_publisher
+publishes: Foxglove, and RViz's RobotModel, move a URDF by them and not by positions of joints.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -29,7 +31,52 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import Placement
 from stewart_dynamics.description.read_urdf import axis_of, end_of, origin_of
-from stewart_dynamics.mechanics.frames.rotation import quaternion_product, to_quaternion
+from stewart_dynamics.mechanics.frames.rotation import (
+    quaternion_of, quaternion_product, to_quaternion)
+from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
+from stewart_dynamics.mechanics.rows import POSITION, ROTATION
+from stewart_dynamics.messages.model import PositionsWriter, TransformWriter
+from stewart_dynamics.parameters.table import Parameters
+
+JOINT_STATES = 'joint_states'
+"""Under the node's name."""
+TF = '/tf'
+
+
+class ModelMessages:
+    """
+    Writes the messages.
+
+    Raises
+    ------
+    ParameterError
+        Two joints of the URDF would have the same name.
+
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._joints = TreeJoints(parameters)
+        self._positions = PositionsWriter(self._joints.names)
+        self._transform = TransformWriter(parameters['base_frame'], parameters['platform_frame'])
+
+    def joint_states(self, stamp: int, pose: Sequence[float]) -> bytes:
+        """
+        Return the sensor_msgs/JointState of all joints at a pose.
+
+        Parameters
+        ----------
+        stamp : int
+            [ns]
+        pose : sequence of float
+            A row of motion, or its first 12 numbers.
+
+        """
+        return self._positions.write(stamp, self._joints.of_sample(pose))
+
+    def transform(self, stamp: int, pose: Sequence[float]) -> bytes:
+        """Return the tf2_msgs/TFMessage from ``base_frame`` to ``platform_frame`` at a pose."""
+        return self._transform.write(stamp, (*pose[POSITION], *quaternion_of(pose[ROTATION])))
+
 
 _SOURCE = Path('robot_description')  # of errors
 
