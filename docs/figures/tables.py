@@ -33,8 +33,7 @@ import re
 from typing import Any
 
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
-from stewart_dynamics.parameters.parameter_set import ParameterSet
-from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters

@@ -29,8 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.parameter_set import ParameterSet
-from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 
 
 # The length of a given quaternion may differ from one by this; the quaternion is normalized.

@@ -24,8 +24,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.parameter_set import ParameterSet
-from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 
 _POSE = 'X Y Z alpha beta gamma'
 

@@ -30,8 +30,7 @@ from stewart_dynamics.parameters.yaml_file import is_of_ros, parameters_of, read
 from stewart_dynamics.ros.signals import SIGNALS
 
 if TYPE_CHECKING:
-    from stewart_dynamics.parameters.parameter_set import ParameterSet
-    from stewart_dynamics.parameters.rules import Parameter
+    from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 
 
 def parameter_files(arguments: Sequence[str]) -> list[str]:

@@ -31,8 +31,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.parameter_set import ParameterSet
-from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value
 from stewart_dynamics.ros.console_scripts import given_parameters, parameter_files
 

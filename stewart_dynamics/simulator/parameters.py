@@ -25,7 +25,7 @@ import math
 from types import MappingProxyType
 
 from stewart_dynamics.errors import ParameterError
-from stewart_dynamics.parameters.rules import Parameter
+from stewart_dynamics.parameters.parameter_set import Parameter
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 _POSE = 'X Y Z alpha beta gamma'
