@@ -38,7 +38,7 @@ from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import LegHistory
-from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, Outcome
+from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, PayloadOutcome
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 
@@ -96,7 +96,7 @@ def measured(noise: tuple[float, float, float]) -> Callable[[int], LegHistory]:
     return of_seed
 
 
-def outcome_of(history: LegHistory) -> tuple[Outcome, Array]:
+def outcome_of(history: LegHistory) -> tuple[PayloadOutcome, Array]:
     """Return the outcome, and how long the pieces took [ms of the processor]."""
     work, took = identify(history, StewartPlatform(GIVEN)), []
     outcome = None

@@ -35,7 +35,7 @@ from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.simulator.node import SimulatorNode
 from stewart_dynamics.simulator.parameters import SimulatorParameters
-from stewart_dynamics.simulator.plant import State
+from stewart_dynamics.simulator.plant import PlantState
 
 # Coordinates of the MJCF: three of each leg, then the platform's free joint.
 _LEGS, _POSITION, _QUATERNION = slice(2, 18, 3), slice(18, 21), slice(21, 25)
@@ -62,7 +62,7 @@ class MuJoCoPlant:
         mujoco.mj_forward(self._model, self._data)
         self.state = self._now()._replace(acceleration=NO_WRENCH, forces=NO_WRENCH)
 
-    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> State:
+    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> PlantState:
         """Return the state one period later, under the commands [N]."""
         self._data.ctrl[:] = commands
         mujoco.mj_step(self._model, self._data, self.steps)
@@ -72,17 +72,17 @@ class MuJoCoPlant:
         self.state = self._now()
         return self.state
 
-    def brake(self) -> State:
+    def brake(self) -> PlantState:
         """Return the state at rest in the present pose."""
         self._data.qvel[:] = 0.0
         self.state = self._now()._replace(acceleration=NO_WRENCH)
         return self.state
 
-    def measured(self) -> State:
+    def measured(self) -> PlantState:
         """Return the present state; there is no noise."""
         return self.state
 
-    def _now(self) -> State:
+    def _now(self) -> PlantState:
         qpos, qvel, qacc = self._data.qpos, self._data.qvel, self._data.qacc
         w, x, y, z = qpos[_QUATERNION].tolist()
         # A free joint turns in axes of its body.
@@ -95,8 +95,8 @@ class MuJoCoPlant:
         lengths: Any = tuple((qpos[_LEGS] + self._zero_length).tolist())
         rates: Any = tuple(qvel[_LEGS].tolist())
         forces: Any = tuple(self._data.actuator_force.tolist())
-        return State(lengths, rates, forces, (*qpos[_POSITION].tolist(), x, y, z, w),
-                     in_base_axes(qvel), in_base_axes(qacc))
+        return PlantState(lengths, rates, forces, (*qpos[_POSITION].tolist(), x, y, z, w),
+                          in_base_axes(qvel), in_base_axes(qacc))
 
 
 class MuJoCoNode(SimulatorNode):

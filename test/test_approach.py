@@ -25,7 +25,7 @@ from stewart_dynamics import (
     approach, check_planned_trajectory, Motion, MotionError, Pose, rest_to_rest, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.planned import messages as planned
-from stewart_dynamics.planned.messages import Outcome
+from stewart_dynamics.planned.messages import PlannedOutcome
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from test_planned_trajectory_messages import decoded
@@ -90,7 +90,7 @@ def test_where_no_speed_is_slow_enough_there_is_no_approach(end: Pose, text: str
         approach(PLATFORM, HOME, end)
 
 
-def outcome(mode: str, measured: Array | None) -> Outcome:
+def outcome(mode: str, measured: Array | None) -> PlannedOutcome:
     """Return the outcome of a motion that begins in START."""
     there = Pose.from_euler(START[:3], START[3:])
     times, motion = rest_to_rest(there, HOME, 2.0)

@@ -29,7 +29,8 @@ from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.body_fit import about
 from stewart_dynamics.external_wrench.estimate import Estimate
 from stewart_dynamics.external_wrench.measured_legs import HIGHEST_RATE, LegHistory
-from stewart_dynamics.external_wrench.payload import identify, NAMES, numbers_of, Outcome, Payload
+from stewart_dynamics.external_wrench.payload import (
+    identify, NAMES, numbers_of, Payload, PayloadOutcome)
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin
 from stewart_dynamics.mechanics.rows import NO_BASE
 from stewart_dynamics.reference_motion.motion import motion_at
@@ -115,7 +116,7 @@ def recorded(moves: Any, seconds: float = 10.0, rate: float = 500.0, noise: Nois
     return history
 
 
-def outcome_of(history: LegHistory, given: Parameters = HEXAPOD) -> Outcome:
+def outcome_of(history: LegHistory, given: Parameters = HEXAPOD) -> PayloadOutcome:
     """Return the outcome of all pieces of the work."""
     *pieces, last = identify(history, StewartPlatform(given))
     assert not any(pieces) and last is not None

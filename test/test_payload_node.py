@@ -30,7 +30,7 @@ from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import ExternalWrench
 from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
-from stewart_dynamics.external_wrench.payload import identify, numbers_of, Outcome
+from stewart_dynamics.external_wrench.payload import identify, numbers_of, PayloadOutcome
 from test_external_wrench import BEGIN, measured, resting, six
 from test_external_wrench import HOME as AT_HOME
 from test_measured_legs import message_of
@@ -87,7 +87,7 @@ def carried(fresh: Start) -> Iterator[Carried]:
     each.node.state_of(each.node.send())
 
 
-def expected(messages: list[bytes]) -> Outcome:
+def expected(messages: list[bytes]) -> PayloadOutcome:
     """Return what the library gives for these messages."""
     parameters, history = HEXAPOD.replaced({'setpoint.timeout': TIMEOUT}), LegHistory(10.0)
     legs = MeasuredLegs(parameters, ExternalWrench(parameters), lambda *_: None,

@@ -22,12 +22,12 @@ from stewart_dynamics import Parameters
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.outcomes import PlannedTrajectoryDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
-from stewart_dynamics.planned.messages import Outcome
+from stewart_dynamics.planned.messages import PlannedOutcome
 
 PLATFORM = ROOT / 'config' / 'platform.yaml'
 BEGIN = 100.0
-ACCEPTED = Outcome('accepted: 2 points', answer=b'1')
-REJECTED = Outcome('rejected: x', 'why', values=(('points', '3'),))
+ACCEPTED = PlannedOutcome('accepted: 2 points', answer=b'1')
+REJECTED = PlannedOutcome('rejected: x', 'why', values=(('points', '3'),))
 
 
 def test_planned_trajectories_have_a_status_once_there_was_one() -> None:

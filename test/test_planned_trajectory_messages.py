@@ -32,7 +32,7 @@ from stewart_dynamics import (
 from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
-from stewart_dynamics.planned.messages import Outcome
+from stewart_dynamics.planned.messages import PlannedOutcome
 from stewart_dynamics.planned.trajectory import NOT_INCREASING, PIECE, TOO_FAR
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, NOT_FINITE, NOT_UNIT
 from trajectories import (
@@ -40,7 +40,7 @@ from trajectories import (
 
 
 def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = NO_WRENCH,
-               base: Array | None = None) -> Outcome:
+               base: Array | None = None) -> PlannedOutcome:
     """Return the outcome of a trajectory."""
     *pieces, outcome = planned.answer(parameters, wrench, data, base)
     assert outcome is not None
@@ -50,7 +50,7 @@ def outcome_of(data: bytes, parameters: Parameters = PARAMETERS, wrench: Six = N
     return outcome
 
 
-def decoded(outcome: Outcome) -> Any:
+def decoded(outcome: PlannedOutcome) -> Any:
     """Return the answer as another library reads it."""
     assert outcome.answer, outcome.message
     return messages.STORE.deserialize_cdr(outcome.answer, planned.OUTPUT_TYPE)
@@ -280,7 +280,7 @@ def test_parameters_and_wrench_are_those_it_began_with() -> None:
     data = messages.trajectory(STAMP, times, rows)
     light = PARAMETERS.replaced({'platform.mass': 100.0})
     works = [planned.answer(parameters, NO_WRENCH, data) for parameters in (PARAMETERS, light)]
-    outcomes: list[Outcome | None] = [None, None]
+    outcomes: list[PlannedOutcome | None] = [None, None]
     while not all(outcomes):
         outcomes = [next(work, None) or outcome
                     for work, outcome in zip(works, outcomes, strict=True)]

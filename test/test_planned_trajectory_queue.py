@@ -20,7 +20,7 @@ from collections.abc import Iterator
 
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.node.planned_queue import LENGTH, PlannedTrajectoryQueue
-from stewart_dynamics.planned.messages import Outcome
+from stewart_dynamics.planned.messages import PlannedOutcome
 
 
 class Timed:
@@ -42,12 +42,12 @@ class Timed:
         self.running = False
         self.queue.tick()
 
-    def work(self, name: str, pieces: int = 2) -> Iterator[Outcome | None]:
+    def work(self, name: str, pieces: int = 2) -> Iterator[PlannedOutcome | None]:
         """Yield None after each piece, and the outcome at the end."""
         for _ in range(pieces):
             self.pieces.append(name)
             yield None
-        yield Outcome(name)
+        yield PlannedOutcome(name)
 
 
 def test_each_tick_is_one_piece_and_the_timer_runs_while_there_is_work() -> None:

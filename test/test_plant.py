@@ -31,7 +31,7 @@ from stewart_dynamics import Motion, ParameterError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.parameters.yaml_file import read_yaml
 from stewart_dynamics.simulator.parameters import SimulatorParameters
-from stewart_dynamics.simulator.plant import Plant, State
+from stewart_dynamics.simulator.plant import Plant, PlantState
 from stewart_dynamics.simulator.plant_dynamics import STATE_TWIST
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def set_moving(plant: Plant, twist: Any) -> None:
     plant._state[STATE_TWIST] = twist
 
 
-def motion_of(state: State) -> Motion:
+def motion_of(state: PlantState) -> Motion:
     """Return a state as a motion."""
     rotation = np.reshape(from_quaternion(*state.pose[3:]), (3, 3))
     return Motion(state.pose[:3], rotation, state.twist[:3], state.twist[3:],
@@ -383,7 +383,7 @@ def test_the_energy_of_a_released_stiff_hexapod_never_increases(seed: int) -> No
 
 # Motions that cannot be computed
 
-def finite(state: State) -> bool:
+def finite(state: PlantState) -> bool:
     """Return whether all numbers of a state are."""
     return all(map(math.isfinite, (number for part in state for number in part)))
 

@@ -27,7 +27,7 @@ from referees import (
     relative, rng, rotation_about, size_of, smooth_motion)
 from simulated import FRICTIONLESS, MASSLESS, random_simulated, simulated, UNLIMITED
 from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
-from stewart_dynamics.simulator.plant import Plant, State
+from stewart_dynamics.simulator.plant import Plant, PlantState
 from test_plant import motion_of, set_moving, ZERO
 
 Array = NDArray[np.float64]
@@ -113,7 +113,7 @@ def balance(parameters: Any, base: MotionOf, blocks: int) -> tuple[float, float,
     return change, float(np.sum(works)), float(np.sum(np.abs(works)))
 
 
-def batch(states: list[State]) -> Motion:
+def batch(states: list[PlantState]) -> Motion:
     """Return states as one motion."""
     motions = [motion_of(state) for state in states]
     return Motion(*(np.array([getattr(each, name) for each in motions]) for name in (
@@ -190,7 +190,7 @@ def test_a_free_body_does_not_feel_the_base() -> None:
     assert relative(end_momentum, momentum) < 1e-8
 
 
-def followed(parameters: Any, rows: Array | None) -> State:
+def followed(parameters: Any, rows: Array | None) -> PlantState:
     """Return where it is after half a second under forces."""
     plant = Plant(parameters)
     for n in range(250):

@@ -53,7 +53,7 @@ UNLIMITED = 1e9
 """Force or rate of a leg without a limit, where a format requires one [N, m/s]."""
 
 
-class Body(NamedTuple):
+class RigidBody(NamedTuple):
     """A rigid body."""
 
     name: str
@@ -65,7 +65,7 @@ class Body(NamedTuple):
     """About the center of mass, axes of the body (3, 3) [kg m^2]."""
 
 
-class Leg(NamedTuple):
+class LegDescription(NamedTuple):
     """A leg: its names, its joints, its two bodies, and the properties of its actuator."""
 
     name: str
@@ -86,15 +86,15 @@ class Leg(NamedTuple):
     zero_length: float
     home_length: float
     """[m]"""
-    cylinder: Body
-    piston: Body
+    cylinder: RigidBody
+    piston: RigidBody
     reflected_mass: float
     viscous_friction: float
     coulomb_friction: float
-    limits: Limits
+    limits: LegLimits
 
 
-class Limits(NamedTuple):
+class LegLimits(NamedTuple):
     """The limits of a leg; None where it is unlimited."""
 
     length_min: float | None
@@ -137,7 +137,7 @@ class Hexapod:
         self.position, self.rotation = positions[0], rotations[0]
         self.base, self.platform = parameters['base_frame'], parameters['platform_frame']
         self.base_body = f'{_WORLD}_base' if self.base == _WORLD else self.base
-        self.platform_body = Body(
+        self.platform_body = RigidBody(
             self.platform, parameters['platform.mass'], parameters['platform.center_of_mass'],
             inertia_matrix(parameters['platform.inertia']))
         directions = mounts(parameters)
@@ -156,29 +156,29 @@ class Hexapod:
                 f'{shown(list(self.parameters["joints"]))}: the name {shown(twice[0])} would be '
                 'there twice')
 
-    def _leg(self, n: int, mount: Array) -> Leg:
+    def _leg(self, n: int, mount: Array) -> LegDescription:
         p = self.parameters
         first, second, name = self.joints[len(PLATFORM_JOINTS) + 3 * n:][:3]
         base, platform = p['geometry.base_joints'][n], p['geometry.platform_joints'][n]
         length = float(np.linalg.norm(self.position + self.rotation @ platform - base))
-        return Leg(
+        return LegDescription(
             name, f'{name}_cross', (first, second),
             f'{name}_platform_joint', f'{name}_tip', base, platform, mount,
             float(p['geometry.zero_length'][n]), length,
             self._part(n, 'cylinder', 1.0), self._part(n, 'piston', -1.0),
             float(p['actuator.reflected_mass'][n]), float(p['actuator.viscous_friction'][n]),
             float(p['actuator.coulomb_friction'][n]),
-            Limits(*(None if p[f'limits.{each}'] is None else float(p[f'limits.{each}'][n])
-                     for each in Limits._fields)))
+            LegLimits(*(None if p[f'limits.{each}'] is None else float(p[f'limits.{each}'][n])
+                        for each in LegLimits._fields)))
 
-    def _part(self, n: int, part: str, sign: float) -> Body:
+    def _part(self, n: int, part: str, sign: float) -> RigidBody:
         p = self.parameters
         across = float(p[f'legs.{part}.inertia'][n])
         center = sign * float(p[f'legs.{part}.center_of_mass'][n])
-        return Body(f'{p["joints"][n]}_{part}', float(p[f'legs.{part}.mass'][n]),
-                    np.array([0.0, 0.0, center + 0.0]), np.diag([across, across, 0.0]))
+        return RigidBody(f'{p["joints"][n]}_{part}', float(p[f'legs.{part}.mass'][n]),
+                         np.array([0.0, 0.0, center + 0.0]), np.diag([across, across, 0.0]))
 
-    def solid(self, body: Body, leg: Leg) -> Body:
+    def solid(self, body: RigidBody, leg: LegDescription) -> RigidBody:
         """Return a leg's body with mass and inertia about all axes, as tools need it."""
         mass = body.mass or _LEAST_MASS * self.platform_body.mass
         across = float(body.inertia[0, 0]) or mass * (_LEAST_GYRATION * leg.home_length) ** 2
@@ -199,7 +199,7 @@ _BARREL, _ROD, _BALL, _PLATE = 0.05, 0.0275, 0.07, 0.05
 _BARREL_LENGTH, _ROD_LENGTH, _OF_HOME = 0.9, 0.95, 0.7
 
 
-class Shape(NamedTuple):
+class VisualShape(NamedTuple):
     """A cylinder along z, a ball, or a mesh; placed in the axes of its body."""
 
     kind: str
@@ -216,7 +216,7 @@ class Shape(NamedTuple):
     scale: float = 1.0
 
 
-def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[Shape, ...]]:
+def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[VisualShape, ...]]:
     """Return the shapes of each body, by its name; without ``uris`` only meshes that are paths."""
     p = hexapod.parameters
     base, platform = p['geometry.base_joints'], p['geometry.platform_joints']
@@ -225,7 +225,7 @@ def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[Shape, ...]]:
     for name, kind, joints in ((hexapod.base, 'base', base),
                                (hexapod.platform, 'platform', platform)):
         found[name] = _mesh(hexapod, kind, uris) or (_plate(kind, joints, _PLATE * size), *(
-            Shape('sphere', 'joint', joint, np.eye(3), _BALL * size) for joint in joints))
+            VisualShape('sphere', 'joint', joint, np.eye(3), _BALL * size) for joint in joints))
     for leg in hexapod.legs:
         found[leg.cylinder.name] = _mesh(hexapod, 'cylinder', uris) or (
             _rod('cylinder', _BARREL * size, _BARREL_LENGTH * _shortest(leg), 1.0),)
@@ -234,32 +234,32 @@ def shapes(hexapod: Hexapod, uris: bool = True) -> dict[str, tuple[Shape, ...]]:
     return found
 
 
-def solids(looks: Sequence[Shape]) -> list[Shape]:
+def solids(looks: Sequence[VisualShape]) -> list[VisualShape]:
     """Return which shapes of a body others collide with: not the balls of its joints."""
     return [shape for shape in looks if shape.kind != 'sphere']
 
 
-def _shortest(leg: Leg) -> float:
+def _shortest(leg: LegDescription) -> float:
     return leg.limits.length_min or _OF_HOME * leg.home_length
 
 
-def _rod(kind: str, radius: float, length: float, sign: float) -> Shape:
-    return Shape('cylinder', kind, np.array([0.0, 0.0, 0.5 * sign * length]), np.eye(3), radius,
-                 length)
+def _rod(kind: str, radius: float, length: float, sign: float) -> VisualShape:
+    return VisualShape('cylinder', kind, np.array([0.0, 0.0, 0.5 * sign * length]), np.eye(3),
+                       radius, length)
 
 
-def _plate(kind: str, joints: Array, thickness: float) -> Shape:
+def _plate(kind: str, joints: Array, thickness: float) -> VisualShape:
     center = joints.mean(axis=0)
     axes = level_axes(joints - center)
     radius = float(np.linalg.norm((joints - center) @ axes[:2].T, axis=1).max())
-    return Shape('cylinder', kind, center, axes.T, max(radius, thickness), thickness)
+    return VisualShape('cylinder', kind, center, axes.T, max(radius, thickness), thickness)
 
 
-def _mesh(hexapod: Hexapod, kind: str, uris: bool) -> tuple[Shape, ...]:
+def _mesh(hexapod: Hexapod, kind: str, uris: bool) -> tuple[VisualShape, ...]:
     p = hexapod.parameters
     file = p[f'meshes.{kind}']
     if not file or (not uris and '://' in file):
         return ()
     offset = p[f'meshes.{kind}_offset']
-    return (Shape('mesh', kind, offset[:3], from_euler(offset[3:]), file=file,
-                  scale=p['meshes.scale']),)
+    return (VisualShape('mesh', kind, offset[:3], from_euler(offset[3:]), file=file,
+                        scale=p['meshes.scale']),)

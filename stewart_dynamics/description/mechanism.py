@@ -64,7 +64,7 @@ HERE = Placement(np.eye(3), np.zeros(3))
 
 
 @dataclass
-class Part:
+class MechanismBody:
     """A body; mass is None where the file gives none."""
 
     name: str
@@ -109,7 +109,7 @@ class Mechanism:
 
     source: str
     name: str
-    parts: dict[str, Part]
+    parts: dict[str, MechanismBody]
     joints: list[Joint]
     gravity: Array | None = None
     """World axes [m/s^2]."""

@@ -32,7 +32,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import Body, COLORS, Hexapod, Leg, Shape, shapes
+from stewart_dynamics.description.hexapod import (
+    COLORS, Hexapod, LegDescription, RigidBody, shapes, VisualShape)
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_quaternion
@@ -74,8 +75,8 @@ def mjcf(hexapod: Hexapod, name: str) -> str:
     return text_of(root, _COMMENT)
 
 
-def _leg(base: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],
-         ) -> None:
+def _leg(base: ET.Element, hexapod: Hexapod, leg: LegDescription,
+         looks: dict[str, tuple[VisualShape, ...]]) -> None:
     add(base, 'site', name=f'{leg.name}_base_joint', pos=numbers(leg.base_joint))
     cylinder = add(base, 'body', name=leg.cylinder.name, pos=numbers(leg.base_joint),
                    quat=_quaternion(leg.mount))
@@ -97,7 +98,7 @@ def _leg(base: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Sh
     add(piston, 'site', name=leg.tip)
 
 
-def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[Shape]) -> None:
+def _platform(world: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
     platform = add(world, 'body', name=hexapod.platform, pos=numbers(hexapod.position),
                    quat=_quaternion(hexapod.rotation))
     add(platform, 'freejoint', name=hexapod.platform)
@@ -134,7 +135,7 @@ def _actuators(root: ET.Element, hexapod: Hexapod) -> None:
         add(sensors, 'actuatorfrc', name=f'{leg.name}_force', actuator=leg.name)
 
 
-def _assets(root: ET.Element, looks: dict[str, tuple[Shape, ...]]) -> None:
+def _assets(root: ET.Element, looks: dict[str, tuple[VisualShape, ...]]) -> None:
     assets = add(root, 'asset')
     for color, rgba in COLORS.items():
         add(assets, 'material', name=color, rgba=numbers(rgba))
@@ -143,7 +144,7 @@ def _assets(root: ET.Element, looks: dict[str, tuple[Shape, ...]]) -> None:
         add(assets, 'mesh', name=kind, file=shape.file, scale=numbers([shape.scale] * 3))
 
 
-def _geoms(body: ET.Element, looks: Sequence[Shape]) -> None:
+def _geoms(body: ET.Element, looks: Sequence[VisualShape]) -> None:
     for shape in looks:
         geom = add(body, 'geom', type=shape.kind, material=shape.color,
                    pos=numbers(shape.position), quat=_quaternion(shape.rotation))
@@ -156,7 +157,7 @@ def _geoms(body: ET.Element, looks: Sequence[Shape]) -> None:
             geom.set('size', numbers(shape.radius, 0.5 * shape.length))
 
 
-def _inertial(parent: ET.Element, body: Body) -> None:
+def _inertial(parent: ET.Element, body: RigidBody) -> None:
     i = body.inertia
     add(parent, 'inertial', pos=numbers(body.center), mass=numbers(body.mass),
         fullinertia=numbers(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))

@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE, WORLD)
+    BALL, DescriptionError, FIXED, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement, SLIDE,
+    WORLD)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.errors import one_line
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
@@ -107,12 +108,12 @@ def _name(model: Any, body: int) -> str:
     return WORLD if body == 0 else model.body(body).name or f'body {body}'
 
 
-def _parts(model: Any, data: Any) -> dict[str, Part]:
+def _parts(model: Any, data: Any) -> dict[str, MechanismBody]:
     parts = {}
     for body in range(model.nbody):
         w, x, y, z = model.body_iquat[body].tolist()
         turn = np.reshape(from_quaternion(x, y, z, w), (3, 3))
-        parts[_name(model, body)] = Part(
+        parts[_name(model, body)] = MechanismBody(
             _name(model, body),
             Placement(data.xmat[body].reshape(3, 3).copy(), data.xpos[body].copy()),
             float(model.body_mass[body]), model.body_ipos[body].copy(),
@@ -131,7 +132,8 @@ def _joints_of(mujoco: Any, model: Any, data: Any, body: int, mechanism: Mechani
                                       data.xpos[body].copy()))
     for n in range(first, first + count):
         child = name if n == first + count - 1 else f'{name} after {n}'
-        mechanism.parts.setdefault(child, Part(child, mechanism.parts[name].placement, 0.0))
+        mechanism.parts.setdefault(
+            child, MechanismBody(child, mechanism.parts[name].placement, 0.0))
         kind = kinds.get(int(model.jnt_type[n]), OTHER)
         made = Joint(model.joint(n).name or f'{name}_joint_{n - first + 1}', kind, parent, child,
                      data.xanchor[n].copy(), [data.xaxis[n].copy()])

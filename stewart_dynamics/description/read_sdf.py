@@ -24,12 +24,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE,
-    UNIVERSAL, WORLD)
-from stewart_dynamics.description.read_urdf import INERTIA, numbers_of, unit
+    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
+    SLIDE, UNIVERSAL, WORLD)
+from stewart_dynamics.description.read_urdf import body_of, INERTIA, numbers_of, unit
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
-from stewart_dynamics.parameters.table import inertia_matrix
 
 _KINDS = {'fixed': FIXED, 'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE,
           'universal': UNIVERSAL, 'revolute2': UNIVERSAL, 'ball': BALL}
@@ -109,21 +108,19 @@ class _Model:
             return self._text(element, 'child')
         return element.get('attached_to', '') if element.tag == 'frame' else ''
 
-    def part(self, link: ET.Element) -> Part:
+    def part(self, link: ET.Element) -> MechanismBody:
         """Return a link as a body."""
         name, inertial = link.get('name', ''), link.find('inertial')
         if inertial is None:
-            return Part(name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), note=(
+            return MechanismBody(name, self.place(name), _DEFAULT_MASS, inertia=np.eye(3), note=(
                 f'{name}: no mass: {_DEFAULT_MASS:g} kg, as SDFormat has it'))
-        own = self._own(inertial)
-        tensor = inertia_matrix(numbers_of(' '.join(
+        six = numbers_of(' '.join(
             inertial.findtext(f'inertia/{key}', '1' if key in ('ixx', 'iyy', 'izz') else '0')
-            for key in INERTIA), 6, self._source, f'{name}: inertia'))
-        r = own.rotation
+            for key in INERTIA), 6, self._source, f'{name}: inertia')
         text = inertial.findtext('mass')
-        return Part(name, self.place(name), _DEFAULT_MASS if text is None else float(
-            numbers_of(text, 1, self._source, f'{name}: mass')[0]), own.position,
-            tensor if np.array_equal(r, np.eye(3)) else r @ tensor @ r.T)
+        mass = _DEFAULT_MASS if text is None else float(
+            numbers_of(text, 1, self._source, f'{name}: mass')[0])
+        return body_of(name, self.place(name), mass, six, self._own(inertial))
 
     def joint(self, joint: ET.Element) -> Joint | None:
         """Return a joint."""

@@ -24,8 +24,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, OTHER, Part, Placement, SLIDE,
-    UNIVERSAL)
+    BALL, DescriptionError, FIXED, HERE, HINGE, Joint, Mechanism, MechanismBody, OTHER, Placement,
+    SLIDE, UNIVERSAL)
 from stewart_dynamics.description.xml_text import CARRIED
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.parameters.table import inertia_matrix
@@ -131,20 +131,27 @@ def axis_of(joint: ET.Element, source: Path) -> Array:
                       f'axis of joint {joint.get("name", "")!r}')
 
 
-def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> Part:
+def _part(name: str, link: ET.Element, placement: Placement, source: Path) -> MechanismBody:
     inertial = link.find('inertial')
     if inertial is None:
-        return Part(name, placement)
+        return MechanismBody(name, placement)
     what = f'inertial of link {name!r}'
     origin = origin_of(inertial, source)
-    mass, given = inertial.find('mass'), inertial.find('inertia')
+    given, of_mass = inertial.find('inertia'), inertial.find('mass')
     six = np.zeros(6) if given is None else numbers_of(
         ' '.join(given.get(key, '0') for key in INERTIA), 6, source, what)
-    tensor = inertia_matrix(six)
-    r = origin.rotation
-    return Part(name, placement,
-                None if mass is None else float(numbers_of(mass.get('value'), 1, source, what)[0]),
-                origin.position, tensor if np.array_equal(r, np.eye(3)) else r @ tensor @ r.T)
+    mass = None if of_mass is None else float(
+        numbers_of(of_mass.get('value'), 1, source, what)[0])
+    return body_of(name, placement, mass, six, origin)
+
+
+def body_of(name: str, placement: Placement, mass: float | None, six: Array, own: Placement,
+            ) -> MechanismBody:
+    """Return a body from the inertia ixx ixy ixz iyy iyz izz in the frame of its inertial."""
+    tensor, r = inertia_matrix(six), own.rotation
+    if not np.array_equal(r, np.eye(3)):
+        tensor = r @ tensor @ r.T
+    return MechanismBody(name, placement, mass, own.position, tensor)
 
 
 def _joint(joint: ET.Element, placements: dict[str, Placement], source: Path) -> Joint:

@@ -32,11 +32,11 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, HERE, HINGE, Mechanism, Part, Placement, UNIVERSAL)
+    BALL, DescriptionError, HERE, HINGE, Mechanism, MechanismBody, Placement, UNIVERSAL)
 from stewart_dynamics.description.read_mjcf import read_mjcf
 from stewart_dynamics.description.read_sdf import read_sdf
 from stewart_dynamics.description.read_urdf import read_urdf
-from stewart_dynamics.description.topology import Chain, Step, Topology, topology_of
+from stewart_dynamics.description.topology import Chain, LegJoint, Topology, topology_of
 from stewart_dynamics.description.xml_text import LIMITS, NOT_CHECKED
 from stewart_dynamics.errors import one_line, shown
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
@@ -173,7 +173,7 @@ def _leg(chain: Chain, found: Topology, said: list[str]) -> dict[str, Any]:
     return leg
 
 
-def _center(steps: list[Step], where: str, said: list[str]) -> Array:
+def _center(steps: list[LegJoint], where: str, said: list[str]) -> Array:
     """Return the point about which joints turn, on the side of the leg [m]."""
     points = [step.far if where == 'base' else step.near for step in steps]
     full = [point for point, step in zip(points, steps, strict=True)
@@ -206,7 +206,7 @@ def _center(steps: list[Step], where: str, said: list[str]) -> Array:
     return center
 
 
-def _slender(part: str, bodies: list[Part], start: Array, way: Array, length: float,
+def _slender(part: str, bodies: list[MechanismBody], start: Array, way: Array, length: float,
              said: list[str]) -> dict[str, Any]:
     """Return mass, center and transverse inertia of a leg's bodies along its line."""
     body = _together(bodies, HERE)
@@ -232,7 +232,7 @@ def _slender(part: str, bodies: list[Part], start: Array, way: Array, length: fl
             f'{name}.inertia': max(transverse, 0.0)}
 
 
-def _together(parts: Iterable[Part], frame: Placement) -> _Body:
+def _together(parts: Iterable[MechanismBody], frame: Placement) -> _Body:
     """Return several bodies as one, in a frame."""
     heavy = [part for part in parts if part.mass]
     if not heavy:

@@ -38,7 +38,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.description.hexapod import Body, COLORS, Hexapod, Leg, Shape, shapes, solids
+from stewart_dynamics.description.hexapod import (
+    COLORS, Hexapod, LegDescription, RigidBody, shapes, solids, VisualShape)
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, LEG_BODIES, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -92,8 +93,8 @@ def upright(gravity: Array) -> Array:
     return turn
 
 
-def _leg(model: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],
-         ) -> None:
+def _leg(model: ET.Element, hexapod: Hexapod, leg: LegDescription,
+         looks: dict[str, tuple[VisualShape, ...]]) -> None:
     cylinder = _link(model, leg.cylinder.name, hexapod.base_body, leg.base_joint, leg.mount)
     _inertial(cylinder, hexapod.solid(leg.cylinder, leg))
     _shapes(cylinder, looks[leg.cylinder.name])
@@ -119,11 +120,11 @@ def _leg(model: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[S
     add(dynamics, 'friction', numbers(leg.coulomb_friction))
 
 
-def _tip(model: ET.Element, hexapod: Hexapod, leg: Leg) -> None:
+def _tip(model: ET.Element, hexapod: Hexapod, leg: LegDescription) -> None:
     """Write a ball joint, the tip that it leads to, and the plugin that fixes the tip."""
     mass = _TIP_MASS * hexapod.platform_body.mass
     tip = _link(model, leg.tip, hexapod.platform, leg.platform_joint, np.eye(3))
-    _inertial(tip, Body(leg.tip, mass, np.zeros(3), mass * _TIP_GYRATION ** 2 * np.eye(3)))
+    _inertial(tip, RigidBody(leg.tip, mass, np.zeros(3), mass * _TIP_GYRATION ** 2 * np.eye(3)))
     _joint(model, leg.ball, 'ball', leg.piston.name, leg.tip)
     fixes = add(model, 'plugin', filename='gz-sim-detachable-joint-system',
                 name='gz::sim::systems::DetachableJoint')
@@ -152,7 +153,7 @@ def _pose(parent: ET.Element, position: Array, rotation: Array, relative_to: str
         pose.set('relative_to', relative_to)
 
 
-def _inertial(link: ET.Element, body: Body) -> None:
+def _inertial(link: ET.Element, body: RigidBody) -> None:
     inertial = add(link, 'inertial')
     _pose(inertial, body.center, np.eye(3))
     add(inertial, 'mass', numbers(body.mass))
@@ -162,7 +163,7 @@ def _inertial(link: ET.Element, body: Body) -> None:
         add(inertia, tag, numbers(value))
 
 
-def _shapes(link: ET.Element, looks: Sequence[Shape]) -> None:
+def _shapes(link: ET.Element, looks: Sequence[VisualShape]) -> None:
     for kind, some in (('visual', looks), ('collision', solids(looks))):
         for n, shape in enumerate(some, 1):
             one = add(link, kind, name=f'{kind}_{n}')
@@ -174,7 +175,7 @@ def _shapes(link: ET.Element, looks: Sequence[Shape]) -> None:
                 add(material, 'diffuse', numbers(COLORS[shape.color]))
 
 
-def _geometry(parent: ET.Element, shape: Shape) -> None:
+def _geometry(parent: ET.Element, shape: VisualShape) -> None:
     geometry = add(parent, 'geometry')
     if shape.kind == 'mesh':
         mesh = add(geometry, 'mesh')

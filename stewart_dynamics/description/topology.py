@@ -30,12 +30,12 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.mechanism import (
-    BALL, DescriptionError, FIXED, Joint, Mechanism, Part, SLIDE, WORLD)
+    BALL, DescriptionError, FIXED, Joint, Mechanism, MechanismBody, SLIDE, WORLD)
 
 LEGS = 6
 
 
-class Step(NamedTuple):
+class LegJoint(NamedTuple):
     """A joint of a leg, on the way from the base to the platform."""
 
     joint: Joint
@@ -60,10 +60,10 @@ class Step(NamedTuple):
 class Chain(NamedTuple):
     """A leg as found."""
 
-    steps: list[Step]
-    lower: list[Part]
+    steps: list[LegJoint]
+    lower: list[MechanismBody]
     """The bodies on the side of the base of its slide."""
-    upper: list[Part]
+    upper: list[MechanismBody]
 
     @property
     def slide(self) -> int:
@@ -74,10 +74,10 @@ class Chain(NamedTuple):
 class Topology(NamedTuple):
     """The hexapod within a mechanism."""
 
-    base: Part
+    base: MechanismBody
     """Whose frame is the base frame."""
-    platform: Part
-    platform_parts: list[Part]
+    platform: MechanismBody
+    platform_parts: list[MechanismBody]
     """All bodies that are fixed to the platform, itself included."""
     chains: list[Chain]
 
@@ -272,11 +272,11 @@ def _chain(mechanism: Mechanism, groups: _Groups, base: str, platform: str, insi
                 waiting.append(other)
     if platform not in before:
         return None
-    steps: list[Step] = []
+    steps: list[LegJoint] = []
     path, group = [platform], platform
     while group != base:
         group, joint = before[group]
-        steps.append(Step(joint, groups.of(joint.parent) == group))
+        steps.append(LegJoint(joint, groups.of(joint.parent) == group))
         path.append(group)
     steps.reverse()
     path.reverse()
@@ -289,7 +289,7 @@ def _chain(mechanism: Mechanism, groups: _Groups, base: str, platform: str, insi
                            if (groups.of(name) in lower) == side] for side in (True, False)))
 
 
-def _main(mechanism: Mechanism, groups: _Groups, group: str) -> Part:
+def _main(mechanism: Mechanism, groups: _Groups, group: str) -> MechanismBody:
     """Return the body of a group to which its legs are attached, or else the heaviest."""
     ends = Counter(end for joint in groups.at(group) for end in (joint.parent, joint.child))
     members = [mechanism.parts[name] for name in groups.members(group) if name in mechanism.parts]

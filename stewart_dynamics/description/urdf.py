@@ -34,7 +34,8 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.description.hexapod import (
-    Body, COLORS, Hexapod, Leg, PASSIVE_RATE, Shape, shapes, solids, UNLIMITED)
+    COLORS, Hexapod, LegDescription, PASSIVE_RATE, RigidBody, shapes, solids, UNLIMITED,
+    VisualShape)
 from stewart_dynamics.description.xml_text import (
     add, CARRIED, carried, numbers, text_of)
 from stewart_dynamics.mechanics.frames.rotation import to_euler
@@ -80,7 +81,7 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str
     for color, rgba in COLORS.items():
         add(add(root, 'material', name=color), 'color', rgba=numbers(rgba))
     looks = shapes(hexapod)
-    _link(root, Body(hexapod.base, 0.0, np.zeros(3), np.zeros((3, 3))), looks[hexapod.base])
+    _link(root, RigidBody(hexapod.base, 0.0, np.zeros(3), np.zeros((3, 3))), looks[hexapod.base])
     _platform(root, hexapod, looks[hexapod.platform])
     for leg in hexapod.legs:
         _leg(root, hexapod, leg, looks)
@@ -95,7 +96,7 @@ def urdf(hexapod: Hexapod, name: str, control: Ros2Control | None = None) -> str
     return text_of(root, _COMMENT)
 
 
-def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[Shape]) -> None:
+def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[VisualShape]) -> None:
     """Write the chain of virtual joints, the platform and the frames of its joints."""
     parent = hexapod.base
     reach = sum(np.linalg.norm(joints, axis=1).max() for joints in (
@@ -119,8 +120,8 @@ def _platform(root: ET.Element, hexapod: Hexapod, looks: Sequence[Shape]) -> Non
                leg.platform_joint)
 
 
-def _leg(root: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Shape, ...]],
-         ) -> None:
+def _leg(root: ET.Element, hexapod: Hexapod, leg: LegDescription,
+         looks: dict[str, tuple[VisualShape, ...]]) -> None:
     add(root, 'link', name=leg.cross)
     _link(root, leg.cylinder, looks[leg.cylinder.name])
     _link(root, leg.piston, looks[leg.piston.name])
@@ -141,7 +142,7 @@ def _leg(root: ET.Element, hexapod: Hexapod, leg: Leg, looks: dict[str, tuple[Sh
         friction=numbers(leg.coulomb_friction))
 
 
-def _link(root: ET.Element, body: Body, looks: Sequence[Shape]) -> None:
+def _link(root: ET.Element, body: RigidBody, looks: Sequence[VisualShape]) -> None:
     link = add(root, 'link', name=body.name)
     if body.mass or body.inertia.any():
         inertial = add(link, 'inertial')
@@ -160,7 +161,7 @@ def _link(root: ET.Element, body: Body, looks: Sequence[Shape]) -> None:
                 add(one, 'material', name=shape.color)
 
 
-def _geometry(parent: ET.Element, shape: Shape) -> None:
+def _geometry(parent: ET.Element, shape: VisualShape) -> None:
     geometry = add(parent, 'geometry')
     if shape.kind == 'mesh':
         add(geometry, 'mesh', filename=shape.file, scale=numbers([shape.scale] * 3))

@@ -113,7 +113,7 @@ class FittedBody(NamedTuple):
     residual: float
 
 
-class Samples(NamedTuple):
+class LegSamples(NamedTuple):
     """
     N consecutive measurements, and how a wrong acceleration changes them.
 
@@ -173,7 +173,7 @@ class BodyFit:
 
     """
 
-    def __init__(self, samples: Samples, given: Body, size: float) -> None:
+    def __init__(self, samples: LegSamples, given: Body, size: float) -> None:
         self._given = given
         moment = float(given.inertia[[0, 3, 5]].mean())
         self._scales = np.array([_MASS * given.mass, *3 * [_CENTER * size * given.mass],

@@ -36,7 +36,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers, Stamps
 from stewart_dynamics.compilation.machine_code import COMPILED
 from stewart_dynamics.external_wrench.body_fit import (
-    about, Body, BodyFit, FittedBody, FRICTION, LAGS, ROUNDS, Samples, TEN)
+    about, Body, BodyFit, FittedBody, FRICTION, LAGS, LegSamples, ROUNDS, TEN)
 from stewart_dynamics.external_wrench.measured_legs import (
     ACTED, LegHistory, LOADED, motions_of, OF_BASE, TURNED)
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
@@ -97,14 +97,14 @@ class Payload(NamedTuple):
     """The parameters, of which what is not known has the values."""
 
 
-class Outcome(NamedTuple):
+class PayloadOutcome(NamedTuple):
     """The result of a request."""
 
     message: str
     payload: Payload | None = None
 
 
-def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome | None]:
+def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[PayloadOutcome | None]:
     """
     Yield None after each piece of the work, and the outcome at the end.
 
@@ -119,7 +119,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
     p = platform.parameters
     begin, end = _range(history, p['payload.window'])
     if end == begin:
-        yield Outcome('no measured legs')
+        yield PayloadOutcome('no measured legs')
         return
     stamps = history.stamps(begin, end)
     yield None
@@ -132,17 +132,18 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
     if samples is None:
         needed = LEAST_WINDOWS * work.half_width
         more = '' if needed < p['payload.window'] else ', more than payload.window'
-        yield Outcome(f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps '
-                      f'are needed{more}{_excluded(work.excluded)}')
+        yield PayloadOutcome(
+            f'too short: {seconds:.1f} s of measured legs, {needed:.1f} s without gaps are needed'
+            f'{more}{_excluded(work.excluded)}')
         return
     yield None
     if not math.isfinite(work.scale):
-        yield Outcome('numbers overflow')
+        yield PayloadOutcome('numbers overflow')
         return
     if not _LEAST_SCALE < work.scale < _MOST_SCALE:
         what = 'sign' if work.scale < 0.0 else 'unit'
-        yield Outcome(f'the measured forces are {work.scale:.3g} times those of the model: likely '
-                      f'they have another {what}')
+        yield PayloadOutcome(f'the measured forces are {work.scale:.3g} times those of the model: '
+                             f'likely they have another {what}')
         return
     given = Body(p['platform.mass'], p['platform.center_of_mass'], p['platform.inertia'])
     fit = BodyFit(samples, given, p['singularity.characteristic_length'])
@@ -155,7 +156,7 @@ def identify(history: LegHistory, platform: StewartPlatform) -> Iterator[Outcome
             yield None
         fitted = fit.result()
     except np.linalg.LinAlgError as exc:
-        yield Outcome(f'the fit failed: {exc}')
+        yield PayloadOutcome(f'the fit failed: {exc}')
         return
     yield _outcome(Payload(int(stamps[-1]), seconds, work.excluded, fitted, given))
 
@@ -274,7 +275,7 @@ class _Windows:
         self._covered[low:high] += share.sum(axis=1)
 
     @_QUIET
-    def samples(self) -> Samples | None:
+    def samples(self) -> LegSamples | None:
         """Return the means over the windows, None where they are too few."""
         sound = self._covered > _COVERED * self.half_width
         if np.count_nonzero(sound) < LEAST_WINDOWS or self._middle is None or not self._noises:
@@ -287,8 +288,8 @@ class _Windows:
         friction[..., 2] = np.abs(friction[..., 1]) < self._coulomb_velocity
         columns, model = self._by_acceleration(*self._middle)
         noise = self._noise_gain / (self._noises * _FOURTH_VARIANCE) * self._noise
-        return Samples(means[..., :TEN], friction * self._friction, differences, noise, columns,
-                       model)
+        return LegSamples(means[..., :TEN], friction * self._friction, differences, noise, columns,
+                          model)
 
     def _by_acceleration(self, motion: Array, base: Array) -> tuple[Array, Array]:
         """Return the derivatives of columns and model by the accelerations, in one motion."""
@@ -299,15 +300,15 @@ class _Windows:
         return columns[1:] - columns[0], model[1:] - model[0]
 
 
-def _outcome(payload: Payload) -> Outcome:
+def _outcome(payload: Payload) -> PayloadOutcome:
     fitted = payload.fitted
     mass = fitted.body.mass
     if not mass > 0.0:
-        return Outcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
+        return PayloadOutcome(f'the mass that fits best is {mass:.6g} kg: must be more than 0')
     if not fitted.known[0]:
-        return Outcome('the measured forces do not tell the mass: what no body explains is '
-                       f'{fitted.residual:.3g} N (RMS)')
-    return Outcome(_words(payload), payload)
+        return PayloadOutcome('the measured forces do not tell the mass: what no body explains is '
+                              f'{fitted.residual:.3g} N (RMS)')
+    return PayloadOutcome(_words(payload), payload)
 
 
 def _words(payload: Payload) -> str:

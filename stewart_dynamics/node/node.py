@@ -44,7 +44,7 @@ from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TI
 from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
 from stewart_dynamics.node.payload_service import inertia_message, PayloadService
 from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
-from stewart_dynamics.node.topics import MARKERS, PAYLOAD, Topics
+from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD
 from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
@@ -102,7 +102,7 @@ class DynamicsNode(LifecycleNode):
         self._log = RepeatedLog(self.get_logger())
         self._active = False
         self._configured = False
-        self._topics = Topics(self)
+        self._topics = NodeTopics(self)
         self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
@@ -346,21 +346,22 @@ class DynamicsNode(LifecycleNode):
         if diagnostics.estimated(estimate, target, now):
             self._report()
 
-    def _identify_payload(self) -> Iterator[payload.Outcome | None] | payload.Outcome:
+    def _identify_payload(
+            self) -> Iterator[payload.PayloadOutcome | None] | payload.PayloadOutcome:
         if not self._active:
-            return payload.Outcome('the node is not active')
+            return payload.PayloadOutcome('the node is not active')
         if not self._external_wrench_code.ready:
             self._external_wrench_code.begin()
-            return payload.Outcome(
+            return payload.PayloadOutcome(
                 'the code for measured legs is being compiled, which takes seconds, once: move '
                 'the hexapod for payload.window after that, and ask again')
         silence = self._diagnostics.external_wrench.silence(time.monotonic())
         if self._settings['setpoint.timeout'] < silence < math.inf:
-            return payload.Outcome(f'measured_legs silent for {silence:.1f} s')
+            return payload.PayloadOutcome(f'measured_legs silent for {silence:.1f} s')
         # Parameters are those of now, whatever changes meanwhile.
         return payload.identify(self._history, StewartPlatform(self._settings))
 
-    def _on_payload(self, outcome: payload.Outcome, seconds: float) -> None:
+    def _on_payload(self, outcome: payload.PayloadOutcome, seconds: float) -> None:
         if not self._active:
             return
         if outcome.payload:
@@ -385,7 +386,7 @@ class DynamicsNode(LifecycleNode):
         self._planned.add(planned.answer(
             self._settings, self._setpoints.wrench, data, base, measured), now)
 
-    def _on_outcome(self, outcome: planned.Outcome, came: float) -> None:
+    def _on_outcome(self, outcome: planned.PlannedOutcome, came: float) -> None:
         if outcome.answer:
             self._topics.publishers[planned.OUTPUT].publish(outcome.answer)
         self._diagnostics.planned_trajectory.done(outcome, time.monotonic() - came)

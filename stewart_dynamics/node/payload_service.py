@@ -27,7 +27,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from stewart_dynamics.compilation.functions import Preparation
-from stewart_dynamics.external_wrench.payload import FUNCTIONS, Outcome, Payload
+from stewart_dynamics.external_wrench.payload import FUNCTIONS, Payload, PayloadOutcome
 from stewart_dynamics.ros.rclpy_workarounds import create_later_service, OneShotTimer
 
 IDENTIFY_PAYLOAD = 'identify_payload'
@@ -53,12 +53,14 @@ class PayloadService:
 
     """
 
-    def __init__(self, node: Node, work: Callable[[], Iterator[Outcome | None] | Outcome],
-                 done: Callable[[Outcome, float], None]) -> None:
+    def __init__(
+            self, node: Node,
+            work: Callable[[], Iterator[PayloadOutcome | None] | PayloadOutcome],
+            done: Callable[[PayloadOutcome, float], None]) -> None:
         self.code = Preparation(*FUNCTIONS)
         self._begin, self._done = work, done
         self._timer = OneShotTimer(node, _PAUSE, self._on_timer)
-        self._work: Iterator[Outcome | None] | None = None
+        self._work: Iterator[PayloadOutcome | None] | None = None
         self._begun = 0.0
         self._waiting: list[Callable[[Any], None]] = []
         # Never destroyed before the node: a waiting request would get no answer.
@@ -67,7 +69,7 @@ class PayloadService:
     def drop(self, reason: str) -> None:
         """End the task in progress, if any, without result."""
         self._timer.stop()
-        self._answer(Outcome(reason))
+        self._answer(PayloadOutcome(reason))
 
     def _on_request(self, answer: Callable[[Any], None]) -> None:
         self._waiting.append(answer)
@@ -75,7 +77,7 @@ class PayloadService:
             return
         self._begun = time.monotonic()
         work = self._begin()
-        if isinstance(work, Outcome):
+        if isinstance(work, PayloadOutcome):
             self._end(work)
             return
         self._work = work
@@ -89,11 +91,11 @@ class PayloadService:
         elif self._work:
             self._timer.start()
 
-    def _end(self, outcome: Outcome) -> None:
+    def _end(self, outcome: PayloadOutcome) -> None:
         self._done(outcome, time.monotonic() - self._begun)
         self._answer(outcome)
 
-    def _answer(self, outcome: Outcome) -> None:
+    def _answer(self, outcome: PayloadOutcome) -> None:
         waiting, self._waiting, self._work = self._waiting, [], None
         for answer in waiting:
             answer(Trigger.Response(

@@ -20,7 +20,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 
 from stewart_dynamics.compilation.functions import Preparation
-from stewart_dynamics.planned.messages import Outcome
+from stewart_dynamics.planned.messages import PlannedOutcome
 
 # Maximum number of trajectories in work or waiting.
 LENGTH = 5
@@ -46,18 +46,18 @@ class PlannedTrajectoryQueue:
     """
 
     def __init__(self, start: Callable[[], None], code: Preparation,
-                 done: Callable[[Outcome, float], None]) -> None:
+                 done: Callable[[PlannedOutcome, float], None]) -> None:
         self._start = start
         self._code = code
         self._done = done
-        self._waiting: deque[tuple[Iterator[Outcome | None], float]] = deque()
+        self._waiting: deque[tuple[Iterator[PlannedOutcome | None], float]] = deque()
 
     @property
     def full(self) -> bool:
         """Whether the queue is full."""
         return len(self._waiting) >= LENGTH
 
-    def add(self, work: Iterator[Outcome | None], came: float) -> None:
+    def add(self, work: Iterator[PlannedOutcome | None], came: float) -> None:
         """Add the check of a trajectory that arrived at a time [s]."""
         self._code.begin()
         self._waiting.append((work, came))

@@ -143,7 +143,7 @@ PUBLISHED = (
 _INPUTS = {topic.name: topic for topic in SUBSCRIBED}
 
 
-class Topics:
+class NodeTopics:
     """
     Publishers and subscriptions of the node; created by ``make``.
 

@@ -65,7 +65,7 @@ START_TOLERANCE = 0.01
 _POSITION, _QUATERNION, _TWIST_AND_ACCELERATION = consecutive(3, 4, 12)
 
 
-class Outcome(NamedTuple):
+class PlannedOutcome(NamedTuple):
     """The outcome of the check of a trajectory."""
 
     message: str
@@ -80,20 +80,20 @@ class Outcome(NamedTuple):
     """Keys with their units, and values."""
 
 
-class _RejectedError(Exception):
+class _NotCheckableError(Exception):
 
     def __init__(self, reason: str, details: str) -> None:
         super().__init__(reason, details)
         self.outcome = rejected(reason, details)
 
 
-def rejected(reason: str, details: str) -> Outcome:
+def rejected(reason: str, details: str) -> PlannedOutcome:
     """Return the outcome of a trajectory that cannot be checked."""
-    return Outcome(f'rejected: {reason}: {details}', reason)
+    return PlannedOutcome(f'rejected: {reason}: {details}', reason)
 
 
 def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None = None,
-           measured: Sequence[float] | None = None) -> Iterator[Outcome | None]:
+           measured: Sequence[float] | None = None) -> Iterator[PlannedOutcome | None]:
     """
     Yield None after each piece of the work, and the outcome at the end.
 
@@ -118,7 +118,7 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
         message = _checked_header(data, parameters['base_frame'])
         times, rows, given = yield from _read(message, parameters)
         if given is None and base is not None and np.isnan(base).any():
-            raise _RejectedError(
+            raise _NotCheckableError(
                 BASE_NOT_KNOWN, 'give it with the points, or publish the topics of the base')
         bases = base if given is None else given
         if parameters['trajectory.approach'] != IGNORE:
@@ -127,7 +127,7 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
     except MalformedError as exc:
         yield rejected(MALFORMED, str(exc))
         return
-    except _RejectedError as exc:
+    except _NotCheckableError as exc:
         yield exc.outcome
         return
     result = None
@@ -138,14 +138,14 @@ def answer(parameters: Parameters, wrench: Six, data: bytes, base: Array | None 
     written = b''
     if result.accepted:
         written = yield from _written(parameters, message.stamp, times, result)
-    yield Outcome(result.message, result.reason, written, result.warning,
-                  _values(parameters, result))
+    yield PlannedOutcome(result.message, result.reason, written, result.warning,
+                         _values(parameters, result))
 
 
 def _checked_header(data: bytes, base_frame: str) -> PlatformTrajectory:
     message = PlatformTrajectory(data)
     if message.frame not in (b'', base_frame.encode()):
-        raise _RejectedError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
+        raise _NotCheckableError(WRONG_FRAME, frame_details(message.frame, base_frame.encode()))
     if not 1 <= message.size <= MOST_POINTS:
         raise MalformedError(f'{message.size} points: must be 1 to {MOST_POINTS}')
     if message.joints == 2 and (message.names[1] != base_frame.encode()
@@ -179,7 +179,7 @@ def _read(message: PlatformTrajectory, parameters: Parameters,
         stuck = first_not_increasing(times[first:end], times[first - 1] if first else -1)
         if stuck is not None:
             n = first + stuck
-            raise _RejectedError(NOT_INCREASING, f'points[{n}]: {times[n] * 1e-9:.9g} s, ' + (
+            raise _NotCheckableError(NOT_INCREASING, f'points[{n}]: {times[n] * 1e-9:.9g} s, ' + (
                 f'after {times[n - 1] * 1e-9:.9g} s' if n else 'must be at least 0'))
         rows[first:end] = _rows(first, _numbers(points, 0))
         if bases is not None:
@@ -201,7 +201,7 @@ def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench
     """
     p = platform.parameters
     if measured is None:
-        raise _RejectedError(NOT_MEASURED, 'trajectory.approach needs ~/measured_legs')
+        raise _NotCheckableError(NOT_MEASURED, 'trajectory.approach needs ~/measured_legs')
     start = np.zeros(MOTION)
     start[POSE] = measured[POSE]
     lengths = platform.solve(np.stack([start, rows[0]]))[:, LENGTHS]
@@ -211,7 +211,7 @@ def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench
         return times, rows, bases
     leg = int(np.argmax(away))
     if p['trajectory.approach'] == CHECK:
-        raise _RejectedError(
+        raise _NotCheckableError(
             STARTS_ELSEWHERE, f'{p["joints"][leg]} is {away[leg]:.4g} m from its first length, '
             f'more than {tolerance:.4g} m')
     first = bases if bases is None or bases.ndim == 1 else bases[0]
@@ -221,7 +221,7 @@ def _from_measured(platform: StewartPlatform, times: Stamps, rows: Array, wrench
             if found is None:
                 yield
     except MotionError as exc:
-        raise _RejectedError(NO_APPROACH, str(exc)) from exc
+        raise _NotCheckableError(NO_APPROACH, str(exc)) from exc
     assert found is not None  # the last one
     before = np.rint(found.times[:-1] * 1e9).astype(np.int64)
     times = np.concatenate([before, times - times[0] + round(found.times[-1] * 1e9)])
@@ -239,11 +239,11 @@ def _rows(first: int, numbers: Array) -> Array:
     """Return rows of motion (N, MOTION) of points (N, 19) from an index on; reject bad ones."""
     if not (finite := np.isfinite(numbers).all(axis=1)).all():
         n = int(np.argmin(finite))
-        raise _RejectedError(NOT_FINITE, f'points[{first + n}]: {tuple(numbers[n].tolist())}')
+        raise _NotCheckableError(NOT_FINITE, f'points[{first + n}]: {tuple(numbers[n].tolist())}')
     quaternions, lengths, unit = unit_quaternions(numbers[:, _QUATERNION])
     if not unit.all():
         n = int(np.argmin(unit))
-        raise _RejectedError(
+        raise _NotCheckableError(
             NOT_UNIT, f'points[{first + n}]: {unit_rule(float(lengths[n]))}')
     rows = np.empty((len(numbers), MOTION))
     rows[:, POSITION] = numbers[:, _POSITION]

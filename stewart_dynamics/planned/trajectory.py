@@ -210,7 +210,7 @@ def check_in_pieces(platform: StewartPlatform, times: Stamps, rows: Array, wrenc
     work = _Work(platform, times, rows, wrench, bases, piece)
     try:
         yield from work.check()
-    except _RejectedError as exc:
+    except _ViolationError as exc:
         yield work.rejected(exc.violation)
     else:
         yield work.accepted()
@@ -222,7 +222,7 @@ def first_not_increasing(times: Stamps, before: int = -1) -> int | None:
     return int(np.argmax(stuck)) if stuck.any() else None
 
 
-class _RejectedError(Exception):
+class _ViolationError(Exception):
 
     def __init__(self, violation: Violation) -> None:
         super().__init__(violation)
@@ -251,7 +251,7 @@ class _Work:
         for first in range(0, max(last, 1), self._piece):
             yield from self._check_block(first, min(first + self._piece, last))
             if violations := self._checks.violations or self._legs_checks.violations:
-                raise _RejectedError(min(violations, key=lambda each: each.order))
+                raise _ViolationError(min(violations, key=lambda each: each.order))
 
     def _check_block(self, first: int, end: int) -> Iterator[None]:
         """Check from one point to another, both included."""
@@ -357,9 +357,9 @@ class _Work:
         if self._samples > MOST_SAMPLES:
             raise self._too_far(f'{TOO_FAR}: more', None)
 
-    def _too_far(self, words: str, point: int | None) -> _RejectedError:
+    def _too_far(self, words: str, point: int | None) -> _ViolationError:
         time = math.nan if point is None else float(self._times[point]) * 1e-9
-        return _RejectedError(Violation(
+        return _ViolationError(Violation(
             time, TOO_FAR, f'{words} than {MOST_SAMPLES} samples are needed to check what lies '
             'between'))
 

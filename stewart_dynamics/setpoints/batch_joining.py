@@ -32,7 +32,7 @@ Waiting = dict[int, tuple[float, ...]]
 """Values of the waiting samples of a topic, by stamp [ns], in order of arrival."""
 
 
-class Samples(NamedTuple):
+class TopicSamples(NamedTuple):
     """New samples of a topic, N of them."""
 
     stamps: Stamps
@@ -57,7 +57,7 @@ class Joined(NamedTuple):
     """Stamps of samples that can no longer be joined."""
 
 
-def join_many(samples: Mapping[str, Samples], waiting: Mapping[str, Waiting],
+def join_many(samples: Mapping[str, TopicSamples], waiting: Mapping[str, Waiting],
               last: Mapping[str, int]) -> Joined | None:
     """
     Join samples; None if stamps are not strictly increasing or more than WAITING samples wait.

@@ -32,7 +32,7 @@ from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
 from stewart_dynamics.parameters.table import is_unit, Parameters, unit_rule
-from stewart_dynamics.setpoints.batch_joining import Samples
+from stewart_dynamics.setpoints.batch_joining import TopicSamples
 from stewart_dynamics.setpoints.rejections import (
     frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)
@@ -249,7 +249,7 @@ class WrenchInput:
             fx, fy, fz, tx, ty, tz = sample[1]
             self.wrench = fx, fy, fz, tx, ty, tz
 
-    def at(self, samples: Samples, places: Integers) -> Array:
+    def at(self, samples: TopicSamples, places: Integers) -> Array:
         """
         Use new wrenches in order, and return the one that is valid at each of the given indices.
 

@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.rows import BASE, MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base import BaseInput
-from stewart_dynamics.setpoints.batch_joining import Samples
+from stewart_dynamics.setpoints.batch_joining import TopicSamples
 from stewart_dynamics.setpoints.inputs import SOURCES, WRENCH, WrenchInput
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
@@ -168,7 +168,7 @@ class Setpoints:
                 messages.data, messages.starts[which], messages.sizes[which])
             if read is None:
                 return None
-            wrenches = Samples(*read, which)
+            wrenches = TopicSamples(*read, which)
         joined = self._joining.join_many(messages, places)
         base = self.base.join_many(messages, places)
         if joined is None or base is None:

@@ -28,12 +28,13 @@ import numpy as np
 
 from stewart_dynamics.arrays import Integers
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.batch_joining import join_many, Joined, Samples, WAITING, Waiting
+from stewart_dynamics.setpoints.batch_joining import (
+    join_many, Joined, TopicSamples, WAITING, Waiting)
 from stewart_dynamics.setpoints.inputs import SampleReader
 from stewart_dynamics.setpoints.rejections import NOT_JOINED, Rejections, TOO_OLD, TWICE
 
 _NOWHERE = np.empty(0, dtype=np.int64)
-NO_SAMPLES = Samples(_NOWHERE, np.empty((0, 0)), _NOWHERE)
+NO_SAMPLES = TopicSamples(_NOWHERE, np.empty((0, 0)), _NOWHERE)
 
 
 class JoinedSample(NamedTuple):
@@ -163,7 +164,7 @@ class SampleJoining:
                     messages.data, messages.starts[which], messages.sizes[which])
                 if read is None:
                     return None
-                samples[topic] = Samples(*read, which)
+                samples[topic] = TopicSamples(*read, which)
         return join_many(samples, self._waiting, self._last)
 
     def accept(self, joined: Joined, places: Mapping[str, Integers]) -> None:

@@ -26,7 +26,7 @@ from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.simulator.base import BasePeriod
 from stewart_dynamics.simulator.imu import ImuWriter, SimulatedImu
 from stewart_dynamics.simulator.parameters import SimulatorParameters
-from stewart_dynamics.simulator.plant import State
+from stewart_dynamics.simulator.plant import PlantState
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
@@ -54,7 +54,7 @@ class StateMessages:
         frame = parameters['base_frame']
         self._pose, self._six = StampedWriter(frame, 7), StampedWriter(frame, 6)
 
-    def write(self, stamp: int, state: State) -> Iterator[tuple[str, bytes]]:
+    def write(self, stamp: int, state: PlantState) -> Iterator[tuple[str, bytes]]:
         """Yield topics, keys of OUTPUT_TYPES, and messages of a state at a time [ns]."""
         yield 'leg_states', self._joint_state.write(
             stamp, map(sub, state.lengths, self._zero_lengths), state.rates, state.forces)

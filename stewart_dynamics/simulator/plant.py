@@ -125,7 +125,7 @@ def largest_eigenvalue(parameters: Parameters, of_legs: Array) -> float:
 _NUMBERS = Struct(f'{STATE + RESULT}d')
 
 
-class State(NamedTuple):
+class PlantState(NamedTuple):
     """The hexapod at the end of a period."""
 
     lengths: Six
@@ -187,7 +187,7 @@ class Plant:
             parameters['noise.length'], parameters['noise.rate'], parameters['noise.force']], 6)
         self._noise = np.random.default_rng(np.float64(parameters['noise.seed']).view(np.uint64))
 
-    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> State:
+    def advance(self, commands: Six, wrench: Six, base: Array | None = None) -> PlantState:
         """
         Return the state one period later.
 
@@ -208,7 +208,7 @@ class Plant:
             self.state = self._run(self.steps)
         return self.state
 
-    def brake(self) -> State:
+    def brake(self) -> PlantState:
         """Return the state at rest in the present pose: the brakes take all speed at once."""
         if not self.fault:
             self._state[STATE_TWIST] = 0.0
@@ -216,7 +216,7 @@ class Plant:
             self.state = self._run(0)._replace(acceleration=NO_WRENCH)
         return self.state
 
-    def measured(self) -> State:
+    def measured(self) -> PlantState:
         """
         Return the present state as it is measured: noise on lengths, rates and forces.
 
@@ -231,7 +231,7 @@ class Plant:
         return state._replace(lengths=numbers[RESULT_LENGTHS], rates=numbers[RESULT_RATES],
                               forces=numbers[RESULT_FORCES])
 
-    def _run(self, steps: int) -> State:
+    def _run(self, steps: int) -> PlantState:
         (self._take_steps if steps else self._take_none)()
         numbers = _NUMBERS.unpack_from(self._memory)
         state, result = numbers[:STATE], numbers[STATE:]
@@ -243,8 +243,9 @@ class Plant:
                 f'{self._step:.3g} s the platform turns by more than {LARGEST_MOVE} rad or a '
                 'joint moves by more than that part of its leg; shortest leg '
                 f'{min(lengths):.3g} m')
-        return State(lengths, result[RESULT_RATES], result[RESULT_FORCES],
-                     state[:STATE_TWIST.start], state[STATE_TWIST], result[RESULT_ACCELERATION])
+        return PlantState(
+            lengths, result[RESULT_RATES], result[RESULT_FORCES], state[:STATE_TWIST.start],
+            state[STATE_TWIST], result[RESULT_ACCELERATION])
 
     def _check_lengths(self) -> None:
         """Raise ParameterError where the hexapod does not fit between its end stops."""

@@ -26,7 +26,7 @@ from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
 from stewart_dynamics.mechanics.dynamics.base_load import carried
 from stewart_dynamics.mechanics.frames.motion import (
-    as_rotation, Field, listed, Motion, Pose, row_by_row, Samples)
+    as_rotation, Field, listed, Motion, Pose, row_by_row, RowSamples)
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION,
     BASE_ANGULAR_VELOCITY, GRAVITY, LINEAR_ACCELERATION, ROTATION)
@@ -34,7 +34,7 @@ from stewart_dynamics.mechanics.vectors import Matrix3, rotate, rotate_back, sub
 from stewart_dynamics.parameters.table import STANDARD_GRAVITY
 
 
-class BaseMotion(Samples):
+class BaseMotion(RowSamples):
     """
     How the base moves, in one sample or any leading shape of samples; all in base axes.
 

@@ -31,7 +31,7 @@ from stewart_dynamics.mechanics.rows import (
     POSITION, ROTATION)
 from stewart_dynamics.parameters.table import is_unit, unit_rule
 
-Self = TypeVar('Self', bound='Samples')
+Self = TypeVar('Self', bound='RowSamples')
 
 
 class Field:
@@ -53,7 +53,7 @@ class Field:
         self.where, self.__doc__, self.required = where, text, required
         self._is_rotation = where.stop - where.start == 9
 
-    def __get__(self, samples: Samples | None, kind: type[Samples]) -> Array:
+    def __get__(self, samples: RowSamples | None, kind: type[RowSamples]) -> Array:
         """Return the view; of a class the field itself."""
         if samples is None:
             return self  # type: ignore[return-value]
@@ -66,7 +66,7 @@ class Field:
         return row_by_row(as_rotation(value)) if self._is_rotation else as_array(name, value, (3,))
 
 
-class Samples:
+class RowSamples:
     """
     Samples of any leading shape.
 
@@ -147,7 +147,7 @@ ORTHOGONALITY = 1e-6
 _WELL = 0.9 * ORTHOGONALITY
 
 
-class Posed(Samples):
+class Posed(RowSamples):
     """The pose that is part of each sample of a Pose or a Motion."""
 
     position = Field(

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from stewart_dynamics.mechanics.rows import (
     BASE_ACCELERATION, BASE_ANGULAR_ACCELERATION, BASE_ANGULAR_VELOCITY, GRAVITY)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, last_heard, Level, LogLine, NEVER, OK, Part, silent_topics)
+    ERROR, last_heard, Level, LogLine, NEVER, OK, silent_topics, StatusPart)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base import BaseInput
 from stewart_dynamics.setpoints.rejections import Rejection
@@ -33,7 +33,7 @@ _QUANTITIES = (('gravity', 'm/s^2', GRAVITY), ('acceleration', 'm/s^2', BASE_ACC
 _REJECTED, _UNKNOWN = 'rejected', 'unknown'
 
 
-class BaseDiagnostics(Part):
+class BaseDiagnostics(StatusPart):
     """Counts the base's messages, and notes for which setpoints its motion is known."""
 
     name = 'base'

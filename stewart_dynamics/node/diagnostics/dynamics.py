@@ -24,7 +24,7 @@ from stewart_dynamics.node.diagnostics.external_wrench import ExternalWrenchDiag
 from stewart_dynamics.node.diagnostics.limits import LimitsDiagnostics
 from stewart_dynamics.node.diagnostics.outcomes import (
     PayloadDiagnostics, PlannedTrajectoryDiagnostics)
-from stewart_dynamics.node.diagnostics.periodic_report import Answers, Report, TICK
+from stewart_dynamics.node.diagnostics.periodic_report import Answers, PeriodicReport, TICK
 from stewart_dynamics.node.diagnostics.setpoints import SetpointDiagnostics, TimingDiagnostics
 from stewart_dynamics.node.diagnostics.singularity import SingularityDiagnostics
 from stewart_dynamics.parameters.table import Parameters
@@ -47,7 +47,7 @@ class DynamicsDiagnostics:
         self.planned_trajectory = PlannedTrajectoryDiagnostics()
         self.external_wrench = ExternalWrenchDiagnostics(parameters)
         self.payload = PayloadDiagnostics()
-        self.report = Report([
+        self.report = PeriodicReport([
             self.setpoints, self.singularity, self.limits, self.base, self.timing,
             self.planned_trajectory, self.external_wrench, self.payload], now)
 

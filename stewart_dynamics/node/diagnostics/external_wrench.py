@@ -21,7 +21,7 @@ import math
 
 from stewart_dynamics.external_wrench.estimate import Estimate, Overload
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Level, NEVER, OK, Part, STALE, Status)
+    ERROR, Level, NEVER, OK, STALE, Status, StatusPart)
 from stewart_dynamics.parameters.table import Parameters
 
 _QUANTITIES = {'external_wrench.force_max': ('force', 'N'),
@@ -30,7 +30,7 @@ _COMPONENTS = ('force x (N)', 'force y (N)', 'force z (N)', 'moment x (N m)', 'm
                'moment z (N m)')
 
 
-class ExternalWrenchDiagnostics(Part):
+class ExternalWrenchDiagnostics(StatusPart):
     """Notes estimates from measured legs, and rejections of measurements."""
 
     name = 'external wrench'

@@ -21,7 +21,7 @@ from collections import Counter
 from stewart_dynamics.mechanics.limits import (
     ANGLES, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    Answers, ERROR, Level, LogLine, OK_LEVEL, Part)
+    Answers, ERROR, Level, LogLine, OK_LEVEL, StatusPart)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output
 
@@ -29,7 +29,7 @@ from stewart_dynamics.setpoints.step import Output
 _MILLIMETRES = 1000.0
 
 
-class LimitsDiagnostics(Part):
+class LimitsDiagnostics(StatusPart):
     """Notes which limits setpoints exceed, and the largest force demanded."""
 
     name = 'limits'

@@ -23,15 +23,15 @@ from __future__ import annotations
 from collections import Counter
 
 from stewart_dynamics.external_wrench.payload import (
-    NAMES, numbers_of, Outcome as PayloadOutcome, Payload, UNITS)
+    NAMES, numbers_of, Payload, PayloadOutcome, UNITS)
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    ERROR, Level, LogLine, OK, OK_LEVEL, Part, WARN)
-from stewart_dynamics.planned.messages import Outcome
+    ERROR, Level, LogLine, OK, OK_LEVEL, StatusPart, WARN)
+from stewart_dynamics.planned.messages import PlannedOutcome
 
 _LONG = 2.0  # [s]
 
 
-class _LastOutcome(Part):
+class _LastOutcome(StatusPart):
     """The level and values of the last outcome, until the next one."""
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class PlannedTrajectoryDiagnostics(_LastOutcome):
         super().__init__()
         self._counts: Counter[str] = Counter()
 
-    def done(self, outcome: Outcome, seconds: float) -> None:
+    def done(self, outcome: PlannedOutcome, seconds: float) -> None:
         """Note an outcome, and the time from the message to the outcome [s]."""
         level = ERROR if outcome.reason else WARN if outcome.warning else OK
         counts = self._counts

@@ -135,7 +135,7 @@ class Held:
             del self._seen[cause, level]
 
 
-class Part:
+class StatusPart:
     """
     A part of the report: one status, and the log lines of its changes.
 
@@ -238,10 +238,10 @@ def last_heard(heard: Mapping[str, float], now: float) -> list[tuple[str, str]]:
             for topic, at in heard.items()]
 
 
-class Report:
+class PeriodicReport:
     """The statuses of all parts, and when they are due."""
 
-    def __init__(self, parts: Sequence[Part], now: float) -> None:
+    def __init__(self, parts: Sequence[StatusPart], now: float) -> None:
         self._parts = parts
         self._levels_of = [part.level for part in parts]
         self._made = now

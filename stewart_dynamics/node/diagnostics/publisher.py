@@ -25,7 +25,7 @@ from std_msgs.msg import Header
 
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import OK, Status
-from stewart_dynamics.node.topics import DIAGNOSTICS, Topics
+from stewart_dynamics.node.topics import DIAGNOSTICS, NodeTopics
 from stewart_dynamics.ros.repeated_log import RepeatedLog
 
 # The topics for controllers; diagnostics give the number of their subscribers.
@@ -35,7 +35,7 @@ _READ = ('leg_states', 'leg_forces')
 class DiagnosticsPublisher:
     """Publishes reports."""
 
-    def __init__(self, node: Node, topics: Topics, log: RepeatedLog) -> None:
+    def __init__(self, node: Node, topics: NodeTopics, log: RepeatedLog) -> None:
         self._node = node
         self._topics = topics
         self._log = log

@@ -27,7 +27,7 @@ import math
 from statistics import median
 
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    Answers, ERROR, last_heard, Level, LogLine, NEVER, Part, silent_topics, STALE, WARN)
+    Answers, ERROR, last_heard, Level, LogLine, NEVER, silent_topics, STALE, StatusPart, WARN)
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.ros.repeated_log import SECONDS
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_JOINED, Rejection
@@ -40,7 +40,7 @@ _COUNTED = {DROPPED: 'dropped', NOT_JOINED: _INCOMPLETE}
 _PATIENCE = 0.9
 
 
-class SetpointDiagnostics(Part):
+class SetpointDiagnostics(StatusPart):
     """Notes received and rejected setpoint messages, publishers and subscribers."""
 
     name = 'setpoints'
@@ -162,7 +162,7 @@ class SetpointDiagnostics(Part):
             f'setpoint.sync_tolerance, {self._tolerance:g} s'))
 
 
-class TimingDiagnostics(Part):
+class TimingDiagnostics(StatusPart):
     """Notes processing times and dropped setpoints."""
 
     name = 'timing'

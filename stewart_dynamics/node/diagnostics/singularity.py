@@ -19,7 +19,7 @@ from __future__ import annotations
 from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.singularity_warning import Cause
 from stewart_dynamics.node.diagnostics.periodic_report import (
-    Answers, ERROR, Level, LogLine, OK_LEVEL, Part, PERIOD, WARN)
+    Answers, ERROR, Level, LogLine, OK_LEVEL, PERIOD, StatusPart, WARN)
 from stewart_dynamics.parameters.table import HYSTERESIS, Parameters
 from stewart_dynamics.setpoints.step import Output
 
@@ -57,7 +57,7 @@ def _condition(output: Output, parameters: Parameters, threshold: str) -> str:
             f'and is not yet below {HYSTERESIS * bound:g}')
 
 
-class SingularityDiagnostics(Part):
+class SingularityDiagnostics(StatusPart):
     """Notes the distance of setpoints from a singularity."""
 
     name = 'singularity'
