@@ -17,12 +17,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 from stewart_dynamics.arrays import Bytes, Integers
 from stewart_dynamics.compilation.functions import entry_point
+from stewart_dynamics.errors import one_line
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
 
@@ -80,6 +81,15 @@ class Source(Protocol):
         """Close the file."""
 
 
+def described(channels: Iterable[tuple[str, str, str]]) -> dict[str, str]:
+    """Return the types of each topic, of channels given by topic, type and encoding."""
+    kinds: dict[str, set[str]] = {}
+    for topic, kind, encoding in channels:
+        kinds.setdefault(topic, set()).add(
+            kind if encoding == 'cdr' else f'{kind} encoded as {encoding or "nothing"}')
+    return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+
+
 def cost(block: Messages) -> int:
     """Return the memory that a block needs, with its index arrays [bytes]."""
     return len(block.data) + 32 * len(block.times) + 1000
@@ -134,29 +144,49 @@ def compact(block: Messages) -> Messages:
     return block._replace(starts=np.cumsum(block.sizes) - block.sizes, data=data)
 
 
-def rows_in_blocks(rows: Iterator[tuple[str, int, bytes]], keys: Mapping[str, str],
-                   ) -> Iterator[tuple[Messages, int]]:
-    """Yield single messages, topic, time and data, in blocks, also those before an error."""
-    names = tuple(dict.fromkeys(keys.values()))
-    numbers = {topic: names.index(key) for topic, key in keys.items()}
-    more = True
-    while more:
-        of_topic, times, messages, size, error = list[int](), list[int](), list[bytes](), 0, None
-        more = False
-        try:
-            for topic, time, data in rows:
-                of_topic.append(numbers[topic])
-                times.append(time)
-                messages.append(data)
-                size += len(data)
-                if len(times) == _FEWEST or size >= MOST_BYTES:
-                    more = True
-                    break
-        except Exception as exc:  # raised once these are handed over
-            error = exc
-        yield Messages.of(names, of_topic, times, messages), size
-        if error is not None:
-            raise error
+class RowsFile:
+    """
+    A file without checksums that is read message by message, see Source.
+
+    Attributes
+    ----------
+    missing : list of str
+        Descriptions of the parts that could not be read.
+    unchecked : bool
+        True.
+
+    """
+
+    def __init__(self) -> None:
+        self.missing: list[str] = []
+        self.unchecked = True
+
+    def rows(self, keys: Mapping[str, str]) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time [ns] and bytes of each message of these topics, in order of time."""
+        raise NotImplementedError
+
+    def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
+        """Yield the messages of these topics, see Source; an error ends them, and is noted."""
+        names = tuple(dict.fromkeys(keys.values()))
+        numbers = {topic: names.index(key) for topic, key in keys.items()}
+        rows, count, more = self.rows(keys), 0, True
+        while more:
+            of_topic, times, messages, size = list[int](), list[int](), list[bytes](), 0
+            more = False
+            try:
+                for topic, time, data in rows:
+                    of_topic.append(numbers[topic])
+                    times.append(time)
+                    messages.append(data)
+                    size += len(data)
+                    if len(times) == _FEWEST or size >= MOST_BYTES:
+                        more = True
+                        break
+            except Exception as exc:  # damaged bytes: the readers raise any exception
+                self.missing.append(
+                    f'everything after {count + len(times)} messages: {one_line(exc)}')
+            count += len(times)
+            yield Messages.of(names, of_topic, times, messages), size
 
 
 def of_good_length(blocks: Iterator[tuple[Messages, int]]) -> Iterator[tuple[Messages, int]]:

@@ -26,21 +26,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from io import BytesIO
 from pathlib import Path
-import struct
 from typing import Any
 import zlib
 
 import lz4.frame
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Schema, Statistics
+from mcap.records import Channel, Chunk, Footer, Schema, Statistics
 from mcap.stream_reader import StreamReader
 import numpy as np
 
-from stewart_dynamics.arrays import Integers
+from stewart_dynamics.arrays import Flags, Integers
 from stewart_dynamics.bags.blocks import (
-    compact, cost, IN_A_BLOCK, LARGEST_CHUNK, LATEST, merged, split)
+    compact, cost, described, IN_A_BLOCK, LARGEST_CHUNK, LATEST, merged, split)
 from stewart_dynamics.bags.mcap_scan import (
     HEAD, IGNORED, MESSAGE_HEAD, NUMBERS, Scan, scanned, UNDECLARED)
 from stewart_dynamics.errors import BagError, one_line, shown
@@ -51,6 +49,7 @@ import zstandard
 MAGIC = b'\x89MCAP0\r\n'
 
 _FOOTER = HEAD + 20 + len(MAGIC)
+_DATA_END = bytes([Opcode.DATA_END, 4, 0, 0, 0, 0, 0, 0, 0])
 _LARGEST_INDEX = 1 << 28
 # Bytes read at once to follow records: the head of each chunk, and messages outside of chunks.
 _WINDOW, _RUN = 1 << 16, 1 << 20
@@ -58,18 +57,19 @@ _WINDOW, _RUN = 1 << 16, 1 << 20
 _MOST_WAITING = 1 << 27
 _NO_TOPIC = np.full(NUMBERS, IGNORED)
 _ANY_TOPIC = np.zeros(NUMBERS, np.int64)
-# Records that may be in front of the end of the data; the others are damage.
-_FOLLOWED = np.isin(np.arange(256), [
-    Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK,
-    Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA])
 
 
-class _Damaged(ValueError):
-    """The record of a topic or type that cannot be used, by its index in a scan."""
+def _records(*opcodes: int) -> Flags:
+    return np.isin(np.arange(256), opcodes)
 
-    def __init__(self, record: int, fault: str) -> None:
-        super().__init__(fault)
-        self.record = record
+
+# Records of each part of a file; others are damage.
+_IN_CHUNK = _records(Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+_IN_DATA = _IN_CHUNK | _records(Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX,
+                                Opcode.ATTACHMENT, Opcode.METADATA)
+_IN_SUMMARY = _records(
+    Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX,
+    Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET)
 
 
 class McapFile:
@@ -93,9 +93,7 @@ class McapFile:
         self._types: dict[int, str] = {}
         self._channels: dict[int, Channel] = {}
         self._declared: set[int] = set()
-        # Number of messages according to the index, and those that were found.
-        self._expected: int | None = None
-        self._messages = self._undeclared = 0
+        self._undeclared = 0
         # Chunks and runs of messages outside of chunks: start time, offset, length, is a run;
         # (P, 4), sorted by time.
         self._pieces: Integers = np.empty((0, 4), np.int64)
@@ -105,9 +103,8 @@ class McapFile:
                 raise BagError('does not begin like an MCAP file')
             self._size = self._file.seek(0, 2)
             if not self._read_index():
-                self._types.clear()
-                self._channels.clear()
-                self._declared.clear()
+                for known in (self._types, self._channels, self._declared):
+                    known.clear()
                 self._follow_records()
             self._pieces = self._pieces[np.lexsort(self._pieces.T[1::-1])]
         except BaseException:
@@ -117,13 +114,9 @@ class McapFile:
     @property
     def topics(self) -> dict[str, str]:
         """Return the type of each topic, and its encoding if that is not CDR."""
-        kinds: dict[str, set[str]] = {}
-        for channel in self._channels.values():
-            kind = self._types.get(channel.schema_id) or 'message without a type'
-            if channel.message_encoding != 'cdr':
-                kind += f' encoded as {channel.message_encoding or "nothing"}'
-            kinds.setdefault(channel.topic, set()).add(kind)
-        return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+        return described(
+            (channel.topic, self._types.get(channel.schema_id) or 'message without a type',
+             channel.message_encoding) for channel in self._channels.values())
 
     def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
         """Yield the messages of these topics, see Source; those of one time in file order."""
@@ -136,7 +129,7 @@ class McapFile:
         waiting: list[tuple[int, tuple[int, int], Messages]] = []
         starts = [*self._pieces[:, 0].tolist(), LATEST + 1]
         reached, held, read = -1, 0, 0
-        self._messages = self._undeclared = 0
+        self._undeclared = 0
         for n, piece in enumerate(self._pieces.tolist()):
             until = starts[n + 1]  # later pieces contain nothing earlier
             read += piece[2]
@@ -163,9 +156,6 @@ class McapFile:
                 read = 0
         if self._undeclared:
             self._note('messages on a channel that no valid record declares')
-        if not self.missing and self._expected not in (None, self._messages):
-            self.missing.append(f'{self._expected} messages are in the index, {self._messages} '
-                                'in chunks')
 
     def close(self) -> None:
         """Close the file."""
@@ -177,7 +167,6 @@ class McapFile:
         found = self._content(piece, numbers)
         if found is None:
             return []
-        self._messages += found.messages
         self._undeclared += found.undeclared
         block = Messages(names, found.kinds, found.times, found.data, found.starts, found.sizes)
         if np.any(block.of_topic < 0):
@@ -219,7 +208,7 @@ class McapFile:
             if footer.summary_crc and zlib.crc32(
                     summary[:-len(MAGIC) - 4]) != footer.summary_crc:
                 raise ValueError
-            found = scanned(summary[:-_FOOTER], _NO_TOPIC)
+            found = scanned(summary[:-_FOOTER], _NO_TOPIC, _IN_SUMMARY)
             if found.end != len(found.data):
                 raise ValueError
             return bool(footer.summary_crc) and self._use(found, start)
@@ -228,74 +217,68 @@ class McapFile:
             return False
 
     def _use(self, summary: Scan, start: int) -> bool:
-        """Take topics and chunks from an index; return False if it is incomplete."""
-        self._declare(summary)
-        statistics = None
-        for n in np.flatnonzero(summary.kinds == -Opcode.STATISTICS)[:1]:
-            statistics = Statistics.read(ReadDataStream(BytesIO(summary.content(n))))
+        """Take topics and chunks from an index; return False if it does not list all chunks."""
+        self._declare_all(summary)
+        statistics = [Statistics.read(ReadDataStream(BytesIO(summary.content(n))))
+                      for n in np.flatnonzero(summary.kinds == -Opcode.STATISTICS)[:1]]
         # Start time, end time, offset, and length with the head of the record.
         which = np.flatnonzero(summary.kinds == -Opcode.CHUNK_INDEX)
         entries = np.minimum(at_any_byte(summary.data, 32)[summary.starts[which]].view(
             '<u8').reshape(-1, 4), np.uint64(LATEST)).astype(np.int64)
-        places = entries[np.argsort(entries[:, 2]), 2:]
-        if statistics is None or statistics.chunk_count != len(entries) or (
-                statistics.channel_count != len(self._channels)) or (
-                statistics.message_count and not len(entries)) or (
-                places > start).any() or (
-                places.sum(axis=1) > [*places[1:, 0], start][:len(places)]).any():
+        # No chunk is listed twice: the time of reading grows with the size of the file.
+        begins, sizes = entries[np.argsort(entries[:, 2]), 2:].T
+        if not statistics or statistics[0].chunk_count != len(entries) or (
+                statistics[0].message_count and not len(entries)) or (
+                np.maximum(begins, sizes) > start).any() or (
+                begins + sizes > [*begins[1:], start][:len(begins)]).any():
             return False
         self._pieces = np.column_stack(
             [entries[:, 0], entries[:, 2], entries[:, 3] - HEAD, np.zeros(len(entries), np.int64)])
-        self._expected = statistics.message_count
         return True
 
     # The records
 
     def _follow_records(self) -> None:
         """Follow the records to the end of the data, and note where messages are."""
-        at, run = len(MAGIC), False
+        at, run, fault, checksum = len(MAGIC), False, '', 0
         chunks, runs = [self._pieces], [self._pieces]
-        fault, checksum = '', 0
         while not fault:
-            found = scanned(self._read_at(at, _RUN if run else _WINDOW), _ANY_TOPIC)
-            opcodes = np.where(found.kinds == 0, Opcode.MESSAGE, -found.kinds)
+            found = scanned(self._read_at(at, _RUN if run else _WINDOW), _ANY_TOPIC, _IN_DATA)
             heads = found.starts - HEAD - np.where(found.kinds == 0, MESSAGE_HEAD, 0)
-            ends = found.starts + found.sizes
-            is_sound = _FOLLOWED[opcodes] & (ends <= self._size - at)
-            count = len(ends) if is_sound.all() else int(np.argmin(is_sound))
-            try:
-                self._declare(found._replace(kinds=found.kinds[:count]), at)
-            except _Damaged as exc:
-                count, fault = exc.record, f'{exc}'
-            which = np.flatnonzero(opcodes[:count] == Opcode.CHUNK)
+            ends = [*heads[1:].tolist(), found.end]
+            # Only the last record can extend beyond the file.
+            count = len(heads) - (at + found.end > self._size)
+            for n in np.flatnonzero(_is_declaration(found.kinds[:count])).tolist():
+                try:
+                    self._declare(found.kinds[n], self._read_at(
+                        at + int(found.starts[n]), min(int(found.sizes[n]), LARGEST_CHUNK)))
+                except Exception:  # any bytes can be there
+                    count, fault = n, 'a damaged or contradictory record of a topic or type'
+                    break
+            kinds, sizes = found.kinds[:count], found.sizes[:count]
+            which = np.flatnonzero(kinds == -Opcode.CHUNK)
             # Size of the content; empty chunks are skipped.
             unpacked = at_any_byte(found.data, 24)[found.starts[which]].view('<u8')[2::3]
             which = which[unpacked > 0]
-            chunks.append(np.column_stack([
-                found.times[which], heads[which] + at, found.sizes[which],
-                np.zeros(len(which), np.int64)]))
-            loose = np.flatnonzero(opcodes[:count] == Opcode.MESSAGE)
+            chunks.append(np.column_stack(
+                [found.times[which], heads[which] + at, sizes[which], np.zeros_like(which)]))
+            loose = np.flatnonzero(kinds == 0)
             run = len(loose) > 0
             if run:
                 first, last = heads[loose[0]], ends[loose[-1]]
                 runs.append(np.array([[found.times[loose].min(), first + at, last - first, 1]]))
-            if count < len(ends):
-                at += int(heads[count])
-                if not fault and opcodes[count] == Opcode.DATA_END and found.sizes[count] == 4:
-                    checksum = DataEnd.read(ReadDataStream(BytesIO(self._read_at(
-                        at + HEAD, 4)))).data_section_crc
-                    break
-                fault = fault or (
-                    'no record begins there' if not _FOLLOWED[opcodes[count]] else
-                    'the file is cut off, or a length in it is wrong')
-            elif not count:
+            if not count:
+                break
+            at += ends[count - 1]
+        if not fault:
+            end = self._read_at(at, HEAD + 4)
+            checksum = int.from_bytes(end[HEAD:], 'little')
+            if not end.startswith(_DATA_END):
                 fault = 'the file is cut off, or no record begins there'
-            else:
-                at += found.end
         if fault:
             self.missing.append(f'byte {at} to the end: {fault}')
         self._pieces = np.concatenate(chunks)
-        if len(runs) > 1 and self._are_sound(at, checksum):
+        if len(runs) > 1 and self._are_sound(at, 0 if fault else checksum):
             self._pieces = np.concatenate([self._pieces, *runs])
         for piece in self._pieces.tolist():
             if not piece[3]:
@@ -323,49 +306,30 @@ class McapFile:
             self.missing.append(f'messages outside of chunks: {fault}')
         return not fault
 
-    def _declare(self, found: Scan, at: int = 0) -> None:
+    def _declare_all(self, found: Scan) -> None:
+        for n in np.flatnonzero(_is_declaration(found.kinds)).tolist():
+            self._declare(found.kinds[n], found.content(n))
+
+    def _declare(self, kind: int, content: bytes) -> None:
         """
-        Note schemas and channels, of which the first record of a number counts.
+        Note a schema or a channel.
 
-        Parameters
-        ----------
-        found : Scan
-            Records in which they are looked for.
-        at : int
-            Position of these in the file, if contents may extend beyond the bytes read.
-
-        Raises _Damaged at a record that is damaged, or contradicts an earlier one.
-
+        Raises any exception if it is damaged, or differs from an earlier one of its number.
         """
-        for n in np.flatnonzero(found.kinds < 0).tolist():
-            if -found.kinds[n] not in (Opcode.SCHEMA, Opcode.CHANNEL):
-                continue
-            content = found.content(n)
-            if at and len(content) < found.sizes[n]:
-                content = self._read_at(at + int(found.starts[n]),
-                                        min(int(found.sizes[n]), LARGEST_CHUNK))
-            kind = Schema if found.kinds[n] == -Opcode.SCHEMA else Channel
-            known = hash((kind, content))
-            if known in self._declared:
-                continue
-            stream = ReadDataStream(BytesIO(content))
-            try:
-                record = kind.read(stream)
-            except (McapError, struct.error, UnicodeDecodeError):
-                record = None
-            if record is None or stream.count != found.sizes[n]:
-                raise _Damaged(n, 'a damaged record of a topic or type')
-            own: Any
-            first: Any
-            if isinstance(record, Schema):
-                own, first = record.name, self._types.setdefault(record.id, record.name)
-            else:
-                own, first = _used(record), _used(self._channels.setdefault(record.id, record))
-            if first != own:
-                raise _Damaged(n, f'number {record.id} of two topics or types')
-            self._declared.add(known)
-            if len(self._declared) > 4 * NUMBERS:
-                raise _Damaged(n, 'too many records of topics and types')
+        if (known := hash((kind, content))) in self._declared:
+            return
+        stream = ReadDataStream(BytesIO(content))
+        own: Any
+        first: Any
+        if kind == -Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            own, first = schema.name, self._types.setdefault(schema.id, schema.name)
+        else:
+            channel = Channel.read(stream)
+            own, first = map(_used, (channel, self._channels.setdefault(channel.id, channel)))
+        if stream.count != len(content) or own != first or len(self._declared) >= 4 * NUMBERS:
+            raise ValueError('a damaged or contradictory record of a topic or type')
+        self._declared.add(known)
 
     # Chunks
 
@@ -376,11 +340,11 @@ class McapFile:
             if length > LARGEST_CHUNK:
                 raise ValueError(f'{length} bytes, at most {LARGEST_CHUNK} are read')
             data = self._read_at(offset, length) if is_run else self._unpacked(offset, length)
-            found = scanned(data, numbers)
+            found = scanned(data, numbers, _IN_CHUNK)
             if found.end != len(data):
                 raise ValueError('its records are inconsistent')
             if not is_run:
-                self._declare(found)
+                self._declare_all(found)
         except Exception as exc:  # damaged bytes: the decompressors raise any exception
             if note:
                 self._note(f'the chunk at byte {offset}: {one_line(exc)}')
@@ -424,3 +388,8 @@ class McapFile:
 
 def _used(channel: Channel) -> tuple[int, str, str]:
     return channel.schema_id, channel.topic, channel.message_encoding
+
+
+def _is_declaration(kinds: Integers) -> Flags:
+    declares: Flags = (kinds == -Opcode.SCHEMA) | (kinds == -Opcode.CHANNEL)
+    return declares

@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stewart_dynamics.arrays import Bytes, Integers
-from stewart_dynamics.compilation.functions import entry_point
+from stewart_dynamics.arrays import Bytes, Flags, Integers
+from stewart_dynamics.compilation.functions import compiled, entry_point
 
 # Opcode and length in front of each record; the fields of a message in front of its data.
 HEAD, MESSAGE_HEAD = 9, 22
@@ -33,7 +33,7 @@ NUMBERS = 1 << 16
 
 
 class Scan(NamedTuple):
-    """Records found in a sequence of bytes."""
+    """Records found in a sequence of bytes, without the messages that are skipped."""
 
     kinds: Integers
     """(K,): the number of the topic of a message; minus the opcode of another record."""
@@ -46,9 +46,6 @@ class Scan(NamedTuple):
     data: Bytes
     end: int
     """End of the last record; it may be outside of the data."""
-    records: int
-    """Number of records, with the messages that are not listed."""
-    messages: int
     undeclared: int
     """Number of messages on undeclared channels."""
 
@@ -58,8 +55,19 @@ class Scan(NamedTuple):
         return self.data[start:start + self.sizes[record]].tobytes()
 
 
-@entry_point('u1[::1]', 'i8[::1]', 'i8[:,::1]', 'i8[::1]')
-def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> None:
+@compiled
+def _integer(data: Bytes, at: int, size: int) -> np.int64:
+    """Return the little-endian integer at a place; 0 if it is not in the data."""
+    value = np.int64(0)
+    if at + size <= len(data):
+        for k in range(size):
+            value |= np.int64(data[at + k]) << np.int64(8 * k)
+    return value
+
+
+@entry_point('u1[::1]', 'i8[::1]', 'b1[::1]', 'i8[:,::1]', 'i8[::1]')
+def scan(data: Bytes, numbers: Integers, valid: Flags, found: Integers,
+         totals: Integers) -> None:
     """
     List the messages of some channels, and all records that are not messages.
 
@@ -70,69 +78,55 @@ def scan(data: Bytes, numbers: Integers, found: Integers, totals: Integers) -> N
         or where the lengths in a chunk, a message or a message index are inconsistent.
     numbers : (65536,)
         Number of the topic of each channel, IGNORED or UNDECLARED.
+    valid : (256,)
+        Whether records with an opcode may occur; the scan ends at others.
     found : (4, K)
         Output: see Scan. Records beyond K are only counted.
-    totals : (5,)
-        Output: K, end, records, messages, undeclared, see Scan.
+    totals : (3,)
+        Output: K, end, undeclared, see Scan.
 
     """
-    count = at = records = messages = undeclared = 0
+    count = at = undeclared = 0
     while at + 9 <= len(data):
-        opcode, begin, length = np.int64(data[at]), at + 9, np.int64(0)
-        for k in range(8):
-            length |= np.int64(data[at + 1 + k]) << np.int64(8 * k)
+        opcode, begin, length = np.int64(data[at]), at + 9, _integer(data, at + 1, 8)
         # Fields up to this offset are read.
         needed = 22 if opcode == 5 else 6 if opcode == 7 else 40 if opcode == 6 else 0
-        if opcode == 0 or length < needed or length > (1 << 60) or begin + needed > len(data):
+        if not valid[opcode] or length < needed or length > (1 << 60) or (
+                begin + needed > len(data)):
             break
         if opcode == 6:
-            name = np.int64(data[begin + 28])  # length of the name of the compression
-            if data[begin + 29] or data[begin + 30] or data[begin + 31] or (
-                    begin + 40 + name > len(data)):
+            name = _integer(data, begin + 28, 4)  # length of the name of the compression
+            if begin + 40 + name > len(data) or (
+                    _integer(data, int(begin + 32 + name), 8) != length - 40 - name):
                 break
-            packed = np.int64(0)
-            for k in range(8):
-                packed |= np.int64(data[begin + 32 + name + k]) << np.int64(8 * k)
-            if packed != length - 40 - name:
-                break
-        elif opcode == 7:
-            entries = np.int64(0)
-            for k in range(4):
-                entries |= np.int64(data[begin + 2 + k]) << np.int64(8 * k)
-            if entries != length - 6:
-                break
-        records += 1
+        elif opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
+            break
         kind, first, skipped = -opcode, begin, 0
         if opcode == 5:
-            messages += 1
-            kind = numbers[np.int64(data[begin]) + 256 * np.int64(data[begin + 1])]
+            kind = numbers[_integer(data, begin, 2)]
             undeclared += kind == -2
             first, skipped = begin + 6, 22
         if opcode != 5 or kind >= 0:
             if count < found.shape[1]:
-                time = np.int64(0)
-                if first + 8 <= len(data):
-                    for k in range(8):
-                        time |= np.int64(data[first + k]) << np.int64(8 * k)
+                time = _integer(data, first, 8)
                 found[0, count] = kind
                 found[1, count] = time if time >= 0 else np.int64(9223372036854775807)
                 found[2, count] = begin + skipped
                 found[3, count] = length - skipped
             count += 1
         at = int(begin + length)
-    totals[0], totals[1], totals[2], totals[3], totals[4] = (
-        count, at, records, messages, undeclared)
+    totals[0], totals[1], totals[2] = count, at, undeclared
 
 
-def scanned(data: bytes, numbers: Integers) -> Scan:
+def scanned(data: bytes, numbers: Integers, valid: Flags) -> Scan:
     """Return the records in these bytes, see ``scan``."""
-    array, totals = np.frombuffer(data, np.uint8), np.empty(5, np.int64)
+    array, totals = np.frombuffer(data, np.uint8), np.empty(3, np.int64)
     # For most chunks this is enough, and they are scanned once.
     found = np.empty((4, min(len(data) // (HEAD + MESSAGE_HEAD), 8192) + 16), np.int64)
-    scan(array, numbers, found, totals)
-    count, end, records, messages, undeclared = totals.tolist()
+    scan(array, numbers, valid, found, totals)
+    count, end, undeclared = totals.tolist()
     if count > found.shape[1]:
         found = np.empty((4, count), np.int64)
-        scan(array, numbers, found, totals)
+        scan(array, numbers, valid, found, totals)
     kinds, times, starts, sizes = found[:, :count]
-    return Scan(kinds, times, starts, sizes, array, end, records, messages, undeclared)
+    return Scan(kinds, times, starts, sizes, array, end, undeclared)

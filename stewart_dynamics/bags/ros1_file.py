@@ -28,29 +28,18 @@ from rosbags.rosbag1.reader import decompressors
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
-from stewart_dynamics.bags.blocks import LARGEST_CHUNK, rows_in_blocks
-from stewart_dynamics.errors import one_line
-from stewart_dynamics.messages.recorded import Messages
+from stewart_dynamics.bags.blocks import described, LARGEST_CHUNK, RowsFile
 
 
-class Ros1File:
+class Ros1File(RowsFile):
     """
     The messages of a bag of ROS 1, converted to those of ROS 2.
 
     Raises any exception of rosbags if it cannot be opened.
-
-    Attributes
-    ----------
-    missing : list of str
-        Descriptions of the parts that could not be read.
-    unchecked : bool
-        Messages without a checksum were read; always True.
-
     """
 
     def __init__(self, path: Path) -> None:
-        self.missing: list[str] = []
-        self.unchecked = True
+        super().__init__()
         self._reader = Reader(path)
         self._reader.open()
         # rosbags does not limit the size of decompressed chunks.
@@ -62,34 +51,22 @@ class Ros1File:
     @property
     def topics(self) -> dict[str, str]:
         """Return the type of each topic, and whether its definition differs."""
-        kinds: dict[str, set[str]] = {}
         store = get_typestore(Stores.ROS1_NOETIC)
-        for of in self._reader.connections:
-            kind = str(of.msgtype)
-            if kind in store.types and store.generate_msgdef(kind)[1] != of.digest:
-                kind += ' of another definition'
-            kinds.setdefault(of.topic, set()).add(kind)
-        return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+        return described(
+            (of.topic, str(of.msgtype) + (
+                ' of another definition' if of.msgtype in store.types
+                and store.generate_msgdef(of.msgtype)[1] != of.digest else ''), 'cdr')
+            for of in self._reader.connections)
 
-    def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
-        """Yield the messages of these topics, see Source; an error ends them, and is noted."""
+    def rows(self, keys: Mapping[str, str]) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time [ns] and bytes of each message of these topics, in order of time."""
         wanted = [of for of in self._reader.connections if of.topic in keys]
-        count = 0
-
-        def rows() -> Iterator[tuple[str, int, bytes]]:
-            nonlocal count
-            for of, time, data in self._reader.messages(wanted) if wanted else ():
-                count += 1
-                try:
-                    message = bytes(self._store.ros1_to_cdr(data, of.msgtype))
-                except SerdeError:
-                    message = b''  # rejected as malformed
-                yield of.topic, time, message
-
-        try:
-            yield from rows_in_blocks(rows(), keys)
-        except Exception as exc:  # damaged bytes: rosbags raises any exception
-            self.missing.append(f'everything after {count} messages: {one_line(exc)}')
+        for of, time, data in self._reader.messages(wanted) if wanted else ():
+            try:
+                message = bytes(self._store.ros1_to_cdr(data, of.msgtype))
+            except SerdeError:
+                message = b''  # rejected as malformed
+            yield of.topic, time, message
 
     def close(self) -> None:
         """Close the file."""

@@ -21,9 +21,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 import sqlite3
 
-from stewart_dynamics.bags.blocks import LARGEST_ROW, rows_in_blocks
+from stewart_dynamics.bags.blocks import described, LARGEST_ROW, RowsFile
 from stewart_dynamics.errors import BagError, one_line, shown
-from stewart_dynamics.messages.recorded import Messages
 
 # Instructions of sqlite's virtual machine at most, for all of a file and for each byte: ten
 # times as many as the rows of a recording need.
@@ -32,24 +31,15 @@ _TABLES = {'topics': ('id', 'name', 'type', 'serialization_format'),
            'messages': ('topic_id', 'timestamp', 'data')}
 
 
-class SqliteFile:
+class SqliteFile(RowsFile):
     """
     The messages of a file in sqlite3.
 
     Raises BagError if it has no such tables, sqlite3.Error if it cannot be opened.
-
-    Attributes
-    ----------
-    missing : list of str
-        Descriptions of the parts that could not be read.
-    unchecked : bool
-        Messages without a checksum were read; always True.
-
     """
 
     def __init__(self, path: Path) -> None:
-        self.missing: list[str] = []
-        self.unchecked = True
+        super().__init__()
         # Read the file as it is on disk: journals are neither applied nor created.
         self._database = sqlite3.connect(f'{path.absolute().as_uri()}?immutable=1', uri=True,
                                          check_same_thread=False)
@@ -68,32 +58,20 @@ class SqliteFile:
     @property
     def topics(self) -> dict[str, str]:
         """Return the type of each topic, and its encoding if that is not CDR."""
-        kinds: dict[str, set[str]] = {}
-        for name, kind in self._topics.values():
-            kinds.setdefault(name, set()).add(kind)
-        return {topic: ' and '.join(sorted(of)) for topic, of in kinds.items()}
+        return described(self._topics.values())
 
-    def blocks(self, keys: Mapping[str, str]) -> Iterator[tuple[Messages, int]]:
-        """Yield the messages of these topics, see Source; an error ends them, and is noted."""
-        wanted = {number: name for number, (name, _) in self._topics.items() if name in keys}
-        count = unsound = 0
-
-        def rows() -> Iterator[tuple[str, int, bytes]]:
-            nonlocal count, unsound
-            for number, time, data in self._database.execute(
-                    "SELECT topic_id, timestamp, CASE WHEN typeof(data) = 'blob' AND "
-                    f'length(data) <= {LARGEST_ROW} THEN data END FROM messages WHERE topic_id IN '
-                    f'({", ".join(map(str, wanted))}) ORDER BY timestamp'):
-                count += 1
-                if isinstance(time, int) and time >= 0 and data is not None:
-                    yield wanted[number], time, data
-                else:
-                    unsound += 1
-
-        try:
-            yield from rows_in_blocks(rows(), keys)
-        except sqlite3.Error as exc:
-            self.missing.append(f'everything after {count} messages: {one_line(exc)}')
+    def rows(self, keys: Mapping[str, str]) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time [ns] and bytes of each message of these topics, in order of time."""
+        wanted = {number: name for number, (name, _, _) in self._topics.items() if name in keys}
+        unsound = 0
+        for number, time, data in self._database.execute(
+                "SELECT topic_id, timestamp, CASE WHEN typeof(data) = 'blob' AND "
+                f'length(data) <= {LARGEST_ROW} THEN data END FROM messages WHERE topic_id IN '
+                f'({", ".join(map(str, wanted))}) ORDER BY timestamp'):
+            if isinstance(time, int) and time >= 0 and data is not None:
+                yield wanted[number], time, data
+            else:
+                unsound += 1
         if unsound:
             self.missing.append(f'{unsound} rows that are not messages')
         if not self.missing:
@@ -118,8 +96,8 @@ class SqliteFile:
         if kinds != ['table'] or not found.issuperset(columns):
             raise BagError(f'has no table {table} with the columns {", ".join(columns)}')
 
-    def _read_topics(self) -> dict[int, tuple[str, str]]:
-        """Return name and type of each topic, by its number."""
+    def _read_topics(self) -> dict[int, tuple[str, str, str]]:
+        """Return name, type and encoding of each topic, by its number."""
         topics = {}
         for number, *texts in self._database.execute(
                 f'SELECT {", ".join(_TABLES["topics"])} FROM topics'):
@@ -128,8 +106,7 @@ class SqliteFile:
                 self.missing.append(f'topic {shown(name)}: number, name, type or encoding is not '
                                     'valid')
             else:
-                topics[number] = name, kind if encoding == 'cdr' else (
-                    f'{kind} encoded as {encoding}')
+                topics[number] = name, kind, encoding
         return topics
 
     def _check_pages(self) -> None:
