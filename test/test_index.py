@@ -42,21 +42,32 @@ HOSTILE = ['<img src=x onerror=alert(1)>', '</script><script>alert(2)</script>',
            '\tx', '<!-- <script>', 'caf\udce9', '℃ 50 %20#?.mcap', 'SHA256 FLEET']
 
 
+POINTS = {'answered': 1000, 'duration_s': 10.0, 'base_unknown': 0, 'gaps': 0, 'restarts': 0,
+          'jumps': 0}
+UNANSWERED = {**POINTS, 'answered': 0, 'duration_s': 0.0}
+NEAR = {'determinant_nearest_m3': 0.25, 'determinant_nearest_at_s': 1.0, 'crossings': 0,
+        'crossings_at_s': [], 'condition_max': 4.5, 'condition_max_at_s': 1.0, 'warnings': 0,
+        'warnings_from_to_s': [], 'warning_s': 0.0, 'unsolved': 0, 'suppressed': 0}
+
+
 def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
     """Return the parts of a summary that go into the table; the peaks are forces [N]."""
     legs = {f'leg_{n}': {
         'force_peak_n': peak, 'force_peak_at_s': n * 1.0,
         'force_margin_n': None if peak is None else 100.0 - abs(peak),
         'length_margin_m': None, 'rate_margin_m_s': 0.1 * n,
-        'base_joint_angle_margin_rad': None, 'platform_joint_angle_margin_rad': None,
+        **{f'{joint}_joint_angle_{key}': None for joint in ('base', 'platform')
+           for key in ('max_rad', 'max_at_s', 'margin_rad')},
         'force_rms_n': None if peak is None else 0.5 * abs(peak),
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
     return {'software': 'stewart_dynamics 9', 'complete': True,
-            'setpoints': {'answered': 1000, 'duration_s': 10.0, 'base_unknown': 0}, 'legs': legs,
-            'limits': [], 'limits_not_checked': [], 'measured': None,
-            'rejected': [], 'singularity': {
-                'determinant_nearest_m3': 0.25, 'crossings': 0, 'condition_max': 4.5,
-                'warnings': 0}, **changes}
+            'setpoints': POINTS, 'legs': legs, 'limits': [], 'limits_not_checked': [],
+            'measured': None, 'missing': [], 'rejected': [], 'singularity': NEAR,
+            'base_wrench': {'force': {'peak_n': None}, 'moment': {'peak_n_m': None}}, **changes}
+
+
+def exceeded(limit: str, leg: str) -> dict[str, Any]:
+    return {'limit': f'limits.{limit}', 'leg': leg, 'bound': 1.0, 'worst': 2.0, 'first_at_s': 3.0}
 
 
 def rejected(*counts: int) -> list[dict[str, Any]]:
@@ -77,12 +88,13 @@ def table(folder: Path) -> list[dict[str, str]]:
 # fleet.csv
 
 def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
-    limits = [{'limit': f'limits.{limit}', 'leg': leg} for limit, leg in (
-        ('length_max', 'leg_2'), ('force_max', 'leg_1'), ('force_max', 'leg_3'))]
+    limits = [exceeded('length_max', 'leg_2'), exceeded('force_max', 'leg_1'),
+              exceeded('force_max', 'leg_3')]
     write_fleet(tmp_path, [row('a', 1, summary(
         [3.0, -120.5, 7.0, 120.0], limits=limits, rejected=rejected(3, 4),
-        singularity={'determinant_nearest_m3': -1e-7, 'crossings': 2, 'condition_max': 8e3,
-                     'warnings': 1}), results='deep/a')])
+        singularity={**NEAR, 'determinant_nearest_m3': -1e-7, 'crossings': 2,
+                     'crossings_at_s': [1.0, 2.0], 'condition_max': 8e3, 'warnings': 1,
+                     'warnings_from_to_s': [[0.5, None]]}), results='deep/a')])
     assert table(tmp_path) == [{
         'bag': 'a', 'code': '1', 'result': 'limit or warning', 'complete': 'true',
         'setpoints': '1000', 'duration_s': '10.0', 'force_worst_n': '-120.5',
@@ -93,16 +105,18 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3',
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
         'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
-        'reason': 'length_max: leg_2; force_max: leg_1, leg_3; 2 crossings of det(J) = 0; '
-                  '1 singularity warning; setpoint/pose: 4 rejected: reason 1; '
+        'reason': 'limits.length_max, 1 m, exceeded by leg_2: 2 m at worst, first at t = 3.00 s; '
+                  'limits.force_max, 1 N, exceeded by leg_1 and 1 other leg: 2 N at worst, first '
+                  'at t = 3.00 s; det(J) crossed zero at t = 1.00 s and 1 time more: forces grow '
+                  'without bound there; singularity warning at t = 0.50 s, 0.50 s before the '
+                  'crossing, for 0.00 s in all; setpoint/pose: 4 rejected: reason 1; '
                   'setpoint/pose: 3 rejected: reason 0',
         'residual_rms_n': '', 'residual_share': '', 'contacts': '', 'measured': '',
         'results': 'deep/a'}]
 
 
 def test_results_without_answers_have_their_own_word(tmp_path: Path) -> None:
-    unanswered = summary([None] * 6, setpoints={
-        'answered': 0, 'duration_s': 0.0, 'base_unknown': 0}, rejected=[
+    unanswered = summary([None] * 6, setpoints=UNANSWERED, rejected=[
         {'topic': 'setpoint/pose', 'reason': reason, 'count': count}
         for reason, count in (('wrong frame_id', 2), ('not finite', 900))])
     write_fleet(tmp_path, [row('a', 3, unanswered, 'no setpoint could be answered'),
@@ -129,15 +143,10 @@ def test_rejected_messages_are_a_reason(
     assert cells['code'] == f'{code}'
 
 
-def test_a_base_that_is_not_known_is_a_reason(tmp_path: Path) -> None:
-    write_fleet(tmp_path, [row('a', 0, summary([1.0], setpoints={
-        'answered': 9, 'duration_s': 1.0, 'base_unknown': 2}))])
-    assert table(tmp_path)[0]['reason'] == "the base's motion is not known in 2 setpoints"
-
-
 def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: Path) -> None:
     measured = {
-        'headline': 'they differ', 'residual_share': 0.25, 'contacts': {'count': 2},
+        'setpoints_compared': 9, 'headline': 'they differ', 'residual_share': 0.25,
+        'contacts': {'count': 2, 'strongest': [{'from_s': 0.0}]},
         'legs': {f'leg_{n}': {'residual_rms_n': 10.0 * n} for n in range(6)}}
     write_fleet(tmp_path, [row('a', 0, summary([1.0], measured=measured)), row('b')])
     cells, without = table(tmp_path)
@@ -147,8 +156,7 @@ def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: P
 
 
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:
-    nothing = summary([None] * 6, singularity=dict.fromkeys(
-        ('determinant_nearest_m3', 'crossings', 'condition_max', 'warnings')))
+    nothing = summary([None] * 6, setpoints=UNANSWERED, singularity=dict.fromkeys(NEAR))
     write_fleet(tmp_path, [row('none', 0, nothing, results='none'), row('bad', 2, None, 'why')])
     none, bad = table(tmp_path)
     assert (none['force_worst_n'], none['force_worst_leg'], none['condition_max']) == ('',) * 3
@@ -246,7 +254,7 @@ def six() -> list[dict[str, Any]]:
     names = ['b', 'a10', 'a9', 'C', 'd', 'e']
     codes = [0, 1, 2, 3, 0, 1]
     return [row(name, code, None if peak is None else summary([peak], limits=[
-        {'limit': 'limits.force_max', 'leg': 'leg_0'}] if abs(peak) >= 100 else []),
+        exceeded('force_max', 'leg_0')] if abs(peak) >= 100 else []),
         'some words' if code in (2, 3) else '', None if code == 2 else name)
         for name, code, peak in zip(names, codes, PEAKS, strict=True)]
 
@@ -295,7 +303,7 @@ def test_failed_bags_and_exceeded_limits_are_highlighted(page: Page, tmp_path: P
 
 @in_browser
 def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
-    limits = [{'limit': f'limits.{limit}', 'leg': f'leg_{n}'} for n in range(6)
+    limits = [exceeded(limit, f'leg_{n}') for n in range(6)
               for limit in ('length_max', 'force_max', 'velocity_max')]
     long = 'a_recording_with_a_long_name/of_a_long_day'
     reason = 'part of it could not be read: ' + '; '.join(
@@ -304,8 +312,7 @@ def test_reasons_are_visible_at_1440_pixels(page: Page, tmp_path: Path) -> None:
     page.show(tmp_path, [
         row(f'{long}/limits', 1, summary([1.0], limits=limits)),
         row(f'{long}/damaged', 3, summary([1.0]), reason), row(f'{long}/failed', 2, None, reason),
-        row(f'{long}/rejected', 3, summary([None], setpoints={
-            'answered': 0, 'duration_s': 0.0, 'base_unknown': 0}),
+        row(f'{long}/rejected', 3, summary([None], setpoints=UNANSWERED),
             'no setpoint could be answered')])
     boxes = page.page.eval_on_selector_all(
         'td.reason div', 'all => all.map((it) => it.getBoundingClientRect().right)')

@@ -38,6 +38,7 @@ from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRo
 from stewart_dynamics.mechanics.rows import BASE, MOTION, NO_BASE, RESULT, WRENCH
 from stewart_dynamics.mechanics.singularity_warning import CAUSE, STATE, TIME, UNSOLVABLE_CONDITION
 from stewart_dynamics.replay.residuals import AXES
+from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.replay.summary import Summary
 from stewart_dynamics.replay.summary_text import summary_lines
 from stewart_dynamics.reporting.block_statistics import LISTED
@@ -138,9 +139,14 @@ class Samples:
         return summary
 
 
+def lines_of(found: dict[str, Any]) -> list[str]:
+    """Return the lines for the terminal of a bag that was read as a whole."""
+    return summary_lines({**found, 'missing': [], 'rejected': [], 'measured': None})
+
+
 def table_of(samples: Samples, parameters: Parameters) -> str:
     """Return the summary for the terminal."""
-    return '\n'.join(summary_lines(samples.summary(parameters).values(), parameters))
+    return '\n'.join(lines_of(samples.summary(parameters).values()))
 
 
 def values(many: int, **given: Any) -> dict[str, Any]:
@@ -529,7 +535,7 @@ def test_without_a_setpoint_there_is_nothing() -> None:
     assert set(found['base_wrench']['moment'].values()) == {None}
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
-    assert summary_lines(summary.values(), hexapod()) == ['no setpoint could be answered']
+    assert lines_of(summary.values()) == ['no setpoint could be answered']
     assert_same(Samples(0).summary(hexapod()).values(), Summary(hexapod()).values())
 
 
@@ -626,19 +632,17 @@ def test_a_small_example() -> None:
         'f                 3.0      2.00      2.3     22.0       0.8  6.0000  6.0000  4.0000'
         '   0.2500',
         '* reaches limits.force_max: the published force is clipped to it',
-        'limits.length_min, 0.75, exceeded by front left in 1 setpoint from t = 2.00 s on: 0.5 at '
-        'worst',
-        'limits.force_max, 25, exceeded by front left in 1 setpoint from t = 1.00 s on: -30 at '
-        'worst',
+        'limits.length_min, 0.75 m, exceeded by front left: 0.5 m at worst, first at t = 2.00 s',
+        'limits.force_max, 25 N, exceeded by front left: -30 N at worst, first at t = 1.00 s',
         'limits.force_max could not be checked in 1 setpoint: J_inv cannot be solved',
-        'base wrench: at most 50.0 N at t = 1.00 s (RMS 36.6) and 1.7 N m at t = 0.00 s (RMS '
-        '1.7)',
+        'force on the base: 50.0 N at most at t = 1.00 s (RMS 36.6)',
+        'moment on the base: 1.7 N m at most at t = 0.00 s (RMS 1.7)',
         '',
-        'det(J) crossed zero at t = 1.500 s: forces grow without bound there',
+        'det(J) crossed zero at t = 1.50 s: forces grow without bound there',
+        'J_inv cannot be solved in 1 setpoint: they have no forces',
+        'singularity warning at t = 1.00 s, 0.50 s before the crossing, for 3.00 s in all',
         'det(J) nearest zero: 1 m^3 at t = 1.00 s',
-        'condition number of J_inv: 3 at most, at t = 2.00 s',
-        'no forces were published in 1 setpoint',
-        'singularity warning from t = 1.00 s to 4.00 s: 0.50 s before the crossing']
+        'condition number of J_inv: 3 at most, at t = 2.00 s']
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
@@ -655,41 +659,61 @@ def test_the_table_is_no_wider_than_100_columns(
     assert 'None' not in table
 
 
-def test_a_leg_without_forces_has_no_columns_of_them() -> None:
-    table = table_of(Samples(3, demanded=math.nan), hexapod(**LIMITS))
-    assert 'force [N]' not in table
-    assert 'length [m]' in table
-    assert 'no forces were published in 3 setpoints' in table
+FORCE_LIMIT = {'limits.force_max': 5.0}
 
 
-def test_held_limits_and_missing_warnings_are_stated() -> None:
-    held = table_of(Samples(1), hexapod(**{'limits.force_max': 5.0}))
-    assert 'all limits held' in held
-    assert '1 setpoint in 0.00 s' in held
-    assert 'det(J) did not cross zero' in held
-    assert 'no singularity warning' in held
-    assert 'all limits held' not in table_of(Samples(1), hexapod())
-    # clipped forces do not show how much was demanded
-    clipped = table_of(Samples(1), hexapod(**{'limits.force_max': 1.0}))
-    assert 'all limits held' not in clipped
-    assert '1.0*' in clipped
+@pytest.mark.parametrize(('given_', 'limits', 'shown', 'absent'), [
+    ({'many': 1}, FORCE_LIMIT, 'all limits held', 'singularity warning at'),
+    ({'many': 1}, FORCE_LIMIT, '1 setpoint in 0.00 s', ''),
+    ({'many': 1}, {}, 'det(J) did not cross zero\nno singularity warning', 'limits'),
+    ({'many': 1, 'demanded': 5.0}, FORCE_LIMIT, '5.0*', 'exceeded'),
+    ({'many': 3, 'demanded': math.nan}, FORCE_LIMIT,
+     'J_inv cannot be solved in 3 setpoints: they have no forces', 'force [N]'),
+    ({'many': 3, 'suppressed': 1.0}, {}, 'forces were suppressed in 3 setpoints', ''),
+    ({'many': 4, 'demanded': [[1.0] * 6, [math.nan] * 6, [math.nan] * 6, [1.0] * 6]}, FORCE_LIMIT,
+     'limits.force_max could not be checked in 2 setpoints: J_inv cannot', 'all limits held'),
+    ({'many': 5, 'det': [2.0, 1.0, -1.0, -2.0, -3.0], 'warnings': [0, 1, 0, 1, 1]}, {},
+     'singularity warning at t = 1.00 s, 0.50 s before the crossing and 1 time more, for 2.00 s',
+     ''),
+    ({'many': 40, 'det': (-1.0) ** np.arange(40)}, {},
+     'det(J) crossed zero at t = 0.50 s and 38 times more: forces grow without bound', ''),
+    ({'many': 2, 'demanded': 6.0}, FORCE_LIMIT,
+     'limits.force_max, 5 N, exceeded by front left and 5 other legs: 6 N at worst, first at t = '
+     '0.00 s', 'all limits held'),
+    ({'many': 5, 'seconds': [0.0, 0.1, 0.2, 3.2, 3.2], 'restarts': [0, 0, 0, 0, 1]}, {},
+     '5 setpoints in 3.20 s, of them 3.00 s in 1 gap, 1 restart\n', '')])
+def test_statements_for_the_terminal(
+        given_: dict[str, Any], limits: dict[str, Any], shown: str, absent: str) -> None:
+    table = table_of(Samples(**given_), hexapod(**limits))
+    assert shown in table
+    assert not absent or absent not in table
 
 
-def test_the_lead_time_of_warnings_is_stated_and_long_lists_are_cut() -> None:
-    table = table_of(Samples(5, det=[2.0, 1.0, -1.0, -2.0, -3.0],
-                             warnings=[0, 1, 0, 1, 1]), hexapod())
-    assert 'warning from t = 1.00 s to 2.00 s: 0.50 s before the crossing' in table
-    assert table.endswith('warning from t = 3.00 s to the end')
-    many = np.arange(40)
-    table = table_of(Samples(40, det=(-1.0) ** many, warnings=many % 2), hexapod())
-    assert 't = 4.500 s and 34 times more: forces' in ' '.join(table.split())
-    assert table.endswith('and 15 singularity warnings more, for 19.00 s in all')
+def test_cards_of_the_report_have_the_worst_level_of_their_statements() -> None:
+    samples = Samples(2, det=[1.0, -1.0], warnings=1.0, demanded=6.0)
+    found = {**samples.summary(hexapod(**FORCE_LIMIT)).values(), 'missing': [], 'measured': None,
+             'rejected': [{'topic': f'{n}', 'count': n, 'reason': 'late'} for n in range(1, 6)]}
 
+    def shown(**changes: Any) -> dict[str, tuple[str, str]]:
+        return {name: card[:2] for name, card in cards({**found, **changes}).items()}
 
-def test_gaps_and_restarts_are_in_the_first_line() -> None:
-    samples = Samples(5, seconds=[0.0, 0.1, 0.2, 3.2, 3.2], restarts=[0, 0, 0, 0, 1])
-    assert table_of(samples, hexapod()).startswith(
-        '5 setpoints in 3.20 s, of them 3.00 s in 1 gap, 1 restart\n')
+    assert shown() == {
+        'reading': ('warn', 'Not all messages could be used'),
+        'limits': ('bad', 'Limits are exceeded'),
+        'singularity': ('bad', 'A singularity is reached'),
+        'measured': ('none', 'Measured forces')}
+    assert shown(missing=['a chunk'])['reading'][0] == 'bad'
+    assert shown(rejected=[])['reading'] == ('good', 'The whole bag was read')
+    assert shown(limits=[])['limits'] == ('good', 'All limits are held')
+    assert shown(limits=[], limits_not_checked=['limits.velocity_max'])['limits'][0] == 'warn'
+    empty = {**Summary(hexapod()).values(), 'missing': [], 'rejected': [], 'measured': None}
+    assert [card.level for card in cards(empty).values()] == ['good', 'none', 'none', 'none']
+    lines = [each.line for each in cards(found)['reading'].statements]
+    assert lines == ['2 setpoints in 1.00 s', '5: 5 rejected: late', '4: 4 rejected: late',
+                     '3: 3 rejected: late', '3 rejected for other reasons']
+    jumps = {**found, 'setpoints': {**found['setpoints'], 'jumps': 2, 'jumps_first_at_s': 0.5}}
+    assert ('2 jumps, first at t = 0.50 s: the legs cannot follow within limits.velocity_max'
+            in [each.line for each in cards(jumps)['limits'].statements])
 
 
 def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
@@ -709,26 +733,13 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     # a limit that cannot be checked is not held
     assert (found['limits'], found['limits_not_checked']) == ([], ['limits.velocity_max'])
     assert found['limit_met']
-    text = '\n'.join(summary_lines(found, parameters))
+    text = '\n'.join(lines_of(found))
     assert 'limits.velocity_max could not be checked' in text
     assert 'all limits held' not in text
     without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
     without.add(samples.seconds, batch(samples.stamps), samples.outputs(),
                 samples.base_wrenches)
     assert not without.values()['limit_met']
-
-
-def test_a_force_limit_is_not_checked_where_there_are_no_forces() -> None:
-    demanded = np.ones((4, 6))
-    demanded[1:3] = math.nan
-    parameters = hexapod(**{'limits.force_max': 5.0})
-    found = Samples(4, demanded=demanded).summary(parameters).values()
-    assert (found['limits'], found['limits_not_checked']) == ([], ['limits.force_max'])
-    assert found['limit_met']
-    text = '\n'.join(summary_lines(found, parameters))
-    assert 'limits.force_max could not be checked in 2 setpoints: J_inv cannot be solved' in text
-    assert 'all limits held' not in text
-    assert not Samples(4, demanded=demanded).summary(hexapod()).values()['limits_not_checked']
 
 
 def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None:
@@ -742,7 +753,7 @@ def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None
         assert found['setpoints']['base_unknown_first_at_s'] == 1.0
         assert (found['singularity']['unsolved'], found['singularity']['suppressed']) == (0, 0)
         assert bool(found['limits_not_checked']) is found['limit_met'] is not checked
-        text = '\n'.join(summary_lines(found, parameters))
+        text = '\n'.join(lines_of(found))
         assert ("the base's motion is not known in 2 setpoints, first at t = 1.00 s: they have no "
                 'forces') in text
         assert ("limits.force_max could not be checked in 2 setpoints: the base's motion is not "

@@ -22,7 +22,7 @@ from typing import Any
 
 from stewart_dynamics.identification.results import IDENTIFIED, NOT_TOLD
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
-from stewart_dynamics.replay.summary_text import plural
+from stewart_dynamics.replay.statements import plural
 
 
 def result_text(result: Mapping[str, Any]) -> str:

@@ -37,8 +37,9 @@ from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSE, POSITION,
     ROTATION)
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.replay.report_verdicts import (
-    date, exceeded_limits, margin_columns, rejections, smallest_margins, units, verdicts)
+from stewart_dynamics.replay.report_tables import (
+    date, margin_columns, rejections, smallest_margins, units)
+from stewart_dynamics.replay.statements import cards
 from stewart_dynamics.reporting import plots as channels
 from stewart_dynamics.reporting.colors import LEG_COLORS
 from stewart_dynamics.reporting.curves import Curves, Frames
@@ -167,10 +168,8 @@ class Report:
             plotly_file=None if plotly is None else quote(Path(
                 os.path.relpath(plotly, path.parent)).as_posix()),
             data=self._data(summary), sources=sources_of(self._parameters),
-            verdicts=verdicts(summary), exceeded=exceeded_limits(summary['limits']),
-            margins=smallest_margins(summary), margin_columns=margin_columns(self._parameters),
-            rejected=sum(each['count'] for each in summary['rejected']),
-            rejections=rejections(summary),
+            cards=cards(summary), margins=smallest_margins(summary),
+            margin_columns=margin_columns(self._parameters), rejections=rejections(summary),
             date=date(summary['setpoints']['first_stamp_ns']), units=units(), plot_of=PLOT_OF,
             most_times=_MOST_TIMES)
         write_files({path: text})

@@ -29,10 +29,9 @@ from urllib.parse import quote
 from stewart_dynamics.bags.find import FLEET_PAGE, FLEET_TABLE
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay.replay_options import LIMIT_MET
-from stewart_dynamics.replay.summary_text import plural
+from stewart_dynamics.replay.statements import MEASURED, MISSING, statements
 from stewart_dynamics.reporting.pages import page
 from stewart_dynamics.reporting.spreadsheet import harmless
-from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 from stewart_dynamics.whole_file import write_files
 
 FOLDER = Path(__file__).with_name('templates')
@@ -51,8 +50,6 @@ NOTHING_ANSWERED = 'nothing answered'
 SEVERITY = (RESULTS[DONE], REJECTED, RESULTS[LIMIT_MET], RESULTS[PARTLY_READ], NOTHING_ANSWERED,
             RESULTS[BAD_INPUT])
 """The results, the most severe last."""
-# Maximum number of reasons of rejection in a row.
-_LISTED = 3
 
 
 class Column(NamedTuple):
@@ -198,23 +195,9 @@ def row_of(code: int, summary: dict[str, Any] | None, error: str) -> dict[str, C
 
 
 def _reasons(summary: dict[str, Any]) -> list[str]:
-    """Return limits, warnings and rejections of a bag that was replayed."""
-    found = [_exceeded(summary)] if summary['limits'] else []
-    found += [f'{name.removeprefix("limits.")} not checked'
-              for name in summary['limits_not_checked']]
-    points, singularity = summary['setpoints'], summary['singularity']
-    if points['base_unknown']:
-        found.append(f'{BASE_NOT_KNOWN} in {plural(points["base_unknown"], "setpoint")}')
-    if singularity['crossings']:
-        found.append(f'{plural(singularity["crossings"], "crossing")} of det(J) = 0')
-    if singularity['warnings']:
-        found.append(plural(singularity['warnings'], 'singularity warning'))
-    most = sorted(summary['rejected'], key=lambda each: -each['count'])
-    found += [f'{each["topic"]}: {each["count"]} rejected: {each["reason"]}'
-              for each in most[:_LISTED]]
-    if len(most) > _LISTED:
-        found.append(f'{sum(each["count"] for each in most[_LISTED:])} rejected for other reasons')
-    return found
+    """Return the warnings about a bag that was replayed; the unread parts are in the error."""
+    return [each.line for each in statements(summary)
+            if each.level in ('warn', 'bad') and each.topic not in (MEASURED, MISSING)]
 
 
 def write_fleet(output: Path, rows: Sequence[Row]) -> None:

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 
-"""The first screen of a report: reading, limits, singularity, measured forces."""
+"""Tables of the report: rejected messages, margins, units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime, timezone
 import re
 from typing import Any, NamedTuple
@@ -26,63 +26,8 @@ from stewart_dynamics.arrays import SECOND
 from stewart_dynamics.mechanics.limits import LIMITS, OF_JOINTS, QUANTITIES
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
-Summary = Mapping[str, Any]
-"""The content of summary.json."""
-Verdict = tuple[str, str]
-"""Level (good, warn, bad or none) and title of a card."""
 
-# Measured forces differ if the residual's RMS is a larger part of theirs.
-_DIFFERENT = 0.05
-
-
-def verdicts(summary: Summary) -> dict[str, Verdict]:
-    """Return the cards of reading, limits, singularity and measured forces."""
-    return {'reading': _reading(summary), 'limits': _limits(summary),
-            'singularity': _singularity(summary['singularity']),
-            'measured': _measured(summary['measured'])}
-
-
-def _reading(summary: Summary) -> Verdict:
-    if not summary['setpoints']['answered']:
-        return 'bad', 'No setpoint could be answered'
-    if not summary['complete']:
-        return 'bad', 'The bag could not be read completely'
-    if summary['setpoints']['base_unknown']:
-        return 'warn', "The base's motion is not always known"
-    if summary['rejected']:
-        return 'warn', 'Some messages were rejected'
-    return 'good', 'The whole bag was read'
-
-
-def _limits(summary: Summary) -> Verdict:
-    if summary['limits']:
-        return 'bad', 'Limits are exceeded'
-    if summary['limits_not_checked']:
-        return 'warn', 'Not all limits could be checked'
-    if not smallest_margins(summary):
-        return 'none', 'No limits are given'
-    return 'good', 'All limits are held'
-
-
-def _singularity(found: Mapping[str, Any]) -> Verdict:
-    if found['crossings'] or found['unsolved']:
-        return 'bad', 'A singularity is reached'
-    if found['warnings']:
-        return 'warn', 'A singularity is near'
-    if found['condition_max'] is None and found['determinant_nearest_m3'] is None:
-        return 'none', 'Singularity'
-    return 'good', 'Clear of singularities'
-
-
-def _measured(measured: Mapping[str, Any] | None) -> Verdict:
-    if not measured or not measured['setpoints_compared']:
-        return 'none', 'Measured forces'
-    if measured['contacts']['count'] or (measured['residual_share'] or 0.0) > _DIFFERENT:
-        return 'warn', 'Measured forces differ'
-    return 'good', 'Measured forces'
-
-
-def rejections(summary: Summary) -> list[dict[str, Any]]:
+def rejections(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the rejected messages, with details that do not repeat the stamp."""
     return [{**each, 'details': re.sub(r'^stamp \d+ ns(: | is )?', '', each['first'])}
             for each in summary['rejected']]
@@ -115,7 +60,7 @@ _MARGINS = [_margin_column(*quantity) for quantity in dict.fromkeys(
     QUANTITIES[limit] for limit in LIMITS)]
 
 
-def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
+def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the smallest margins of length, rate, force and joint angles, each with its leg."""
     found = []
     for name, unit, key, _ in _MARGINS:
@@ -124,19 +69,6 @@ def smallest_margins(summary: Summary) -> list[dict[str, Any]]:
         if of_legs:
             value, joint = min(of_legs, key=lambda each: each[0])
             found.append({'name': name, 'value': value, 'unit': unit, 'leg': joint})
-    return found
-
-
-def exceeded_limits(limits: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return each exceeded limit, with the leg that exceeds it most."""
-    found = []
-    for name in dict.fromkeys(each['limit'] for each in limits):
-        legs = [each for each in limits if each['limit'] == name]
-        worst = max(legs, key=lambda each: abs(abs(each['worst']) - each['bound']))
-        found.append({
-            'name': name, 'bound': worst['bound'], 'unit': QUANTITIES[name][1],
-            'leg': worst['leg'], 'worst': worst['worst'], 'others': len(legs) - 1,
-            'first_at_s': min(each['first_at_s'] for each in legs)})
     return found
 
 

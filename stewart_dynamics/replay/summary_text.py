@@ -18,14 +18,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-import math
 import textwrap
 from typing import Any
 
-from stewart_dynamics.mechanics.limits import FORCE_MAX, LIMITS
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN, Rejection
+from stewart_dynamics.replay.statements import (
+    JOINTS, LIMITS, LOADS, READING, SINGULARITY, statements)
+from stewart_dynamics.setpoints.rejections import Rejection
 
 _LISTED = 5
 _WIDTH = 100
@@ -46,7 +46,7 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     lines = [f'{summary["bag"]}:']
     if summary['measured']:
         lines += _measured_lines(summary['measured'])
-    lines += summary_lines(summary, parameters)
+    lines += summary_lines(summary)
     mistakes = likely_mistakes(parameters)
     lines += [notice for notice in summary['notices'] if notice not in mistakes]
     for each in summary['rejected']:
@@ -57,32 +57,22 @@ def summary_text(summary: Mapping[str, Any], parameters: Parameters) -> str:
     return '\n'.join(lines)
 
 
-def summary_lines(found: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[str]:
-    """
-    Return the lines, no wider than 100 columns.
-
-    Parameters
-    ----------
-    found : mapping
-        The values of Summary.values.
-    parameters : mapping
-        The parameters of the hexapod.
-
-    """
-    if not found['setpoints']['answered']:
+def summary_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return the lines about the motion, no wider than 100 columns, from summary.json."""
+    if not summary['setpoints']['answered']:
         return ['no setpoint could be answered']
-    bounds = parameters[FORCE_MAX]
-    clipped = [bounds is not None and leg['force_peak_n'] is not None
-               and abs(leg['force_peak_n']) >= bounds[n]
-               for n, leg in enumerate(found['legs'].values())]
-    lines = [_heading(found['setpoints']), '', *_legs_table(found['legs'], clipped)]
-    if found['quasi_static']:
+    about = statements(summary)
+    heading, *reading = [each.line for each in about if each.topic == READING]
+    legs = summary['legs'].values()
+    clipped = [leg['force_margin_n'] is not None and leg['force_margin_n'] <= 0.0 for leg in legs]
+    lines = [heading, '', *_legs_table(summary['legs'], clipped)]
+    if summary['quasi_static']:
         lines.append('velocities are not known: the forces are those at rest; rates, power and '
                      'energy are not known')
-    lines += _limit_lines(found, any(clipped), any(name in LIMITS and bound is not None
-                                                   for name, bound in parameters.items()))
-    lines += [*_joint_lines(found['legs']), *_base_lines(found)]
-    lines += ['', *_singularity_lines(found['singularity'])]
+    if any(clipped):
+        lines.append('* reaches limits.force_max: the published force is clipped to it')
+    lines += [each.line for each in about if each.topic in (LIMITS, JOINTS, LOADS)]
+    lines += [*reading, '', *(each.line for each in about if each.topic == SINGULARITY)]
     return [textwrap.fill(line, _WIDTH, subsequent_indent='  ') if len(line) > _WIDTH else line
             for line in lines]
 
@@ -130,86 +120,6 @@ def _span(begin: float, end: float) -> str:
     return f'at t = {first} s' if first == last else f'from t = {first} to {last} s'
 
 
-def _limit_lines(found: Mapping[str, Any], clipped: bool, limits_given: bool) -> list[str]:
-    lines = []
-    if clipped:
-        lines.append('* reaches limits.force_max: the published force is clipped to it')
-    for each in found['limits']:
-        lines.append(f'{each["limit"]}, {each["bound"]:g}, exceeded by {each["leg"]} in '
-                     f'{plural(each["setpoints"], "setpoint")} from t = '
-                     f'{each["first_at_s"]:.2f} s on: {each["worst"]:.6g} at worst')
-    if found['setpoints']['jumps']:
-        lines.append(f'{plural(found["setpoints"]["jumps"], "jump")}, first at t = '
-                     f'{found["setpoints"]["jumps_first_at_s"]:.2f} s: the legs cannot follow '
-                     'within limits.velocity_max')
-    for name in found['limits_not_checked']:
-        lines.append(f'{name} could not be checked' + (
-            ' ' + '; '.join(f'in {plural(number, "setpoint")}: {why}' for number, why in (
-                (found['singularity']['unsolved'], 'J_inv cannot be solved'),
-                (found['setpoints']['base_unknown'], BASE_NOT_KNOWN)) if number)
-            if name == FORCE_MAX else
-            ': velocities are not known; --differentiate computes them from the poses'))
-    if limits_given and not lines:
-        lines.append('all limits held')
-    return lines
-
-
-def _joint_lines(legs: Mapping[str, Mapping[str, float | None]]) -> list[str]:
-    """Return the largest angle of a joint at either end, and the smallest margin."""
-    lines = []
-    for joint in ('base', 'platform'):
-        angle, at, margin = (
-            f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
-        found = {name: leg[angle] for name, leg in legs.items() if leg[angle] is not None}
-        margins = {name: leg[margin] for name, leg in legs.items() if leg[margin] is not None}
-        if found and margins:
-            most = max(found, key=lambda name: found[name] or 0.0)
-            least = min(margins, key=lambda name: margins[name] or 0.0)
-            lines.append(f'{joint} joints: {_angle(found[most])} at most, {most} at t = '
-                         f'{legs[most][at]:.2f} s; margin {_angle(margins[least])}'
-                         + (f', {least}' if least != most else ''))
-    return lines
-
-
-def _angle(radians: float | None) -> str:
-    assert radians is not None
-    return f'{radians:.4g} rad ({math.degrees(radians):.1f} deg)'
-
-
-def _base_lines(found: Mapping[str, Any]) -> list[str]:
-    points, force, moment = (
-        found['setpoints'], found['base_wrench']['force'], found['base_wrench']['moment'])
-    lines = []
-    if force['peak_n'] is not None:
-        lines.append(f'base wrench: at most {force["peak_n"]:.1f} N at t = '
-                     f'{force["peak_at_s"]:.2f} s (RMS {_rounded(force["rms_n"])}) and '
-                     f'{moment["peak_n_m"]:.1f} N m at t = {moment["peak_at_s"]:.2f} s '
-                     f'(RMS {_rounded(moment["rms_n_m"])})')
-    if points['base_unknown']:
-        lines.append(f'{BASE_NOT_KNOWN} in {plural(points["base_unknown"], "setpoint")}, first at '
-                     f't = {points["base_unknown_first_at_s"]:.2f} s: they have no forces')
-    return lines
-
-
-def _rounded(value: float | None) -> str:
-    return '-' if value is None else f'{value:.1f}'
-
-
-def plural(number: int, what: str) -> str:
-    """Return a number with its noun."""
-    return f'{number} {what}' if number == 1 else f'{number} {what}s'
-
-
-def _heading(setpoints: Mapping[str, Any]) -> str:
-    text = f'{plural(setpoints["answered"], "setpoint")} in {setpoints["duration_s"]:.2f} s'
-    if setpoints['gaps']:
-        text += (f', of them {setpoints["gaps_s"]:.2f} s in '
-                 f'{plural(setpoints["gaps"], "gap")}')
-    if setpoints['restarts']:
-        text += f', {plural(setpoints["restarts"], "restart")}'
-    return text
-
-
 # Columns of the table of legs: group, title, key, width, decimals. With the leg's name and the
 # mark, they have the width _WIDTH.
 _COLUMNS = (
@@ -252,33 +162,3 @@ def _fitted(value: float | None, width: int, digits: int) -> str:
         if len(text) < width:
             return f'{text:>{width}}'
     return f'{value:>{width}.1e}'
-
-
-def _singularity_lines(found: Mapping[str, Any]) -> list[str]:
-    crossings, spans = found['crossings_at_s'], found['warnings_from_to_s']
-    lines = ['det(J) did not cross zero']
-    if crossings:
-        times = ', '.join(f't = {time:.3f} s' for time in crossings[:_LISTED])
-        more = found['crossings'] - _LISTED
-        lines = [f'det(J) crossed zero at {times}{f" and {more} times more" if more > 0 else ""}:'
-                 ' forces grow without bound there']
-    lines.append(f'det(J) nearest zero: {found["determinant_nearest_m3"]:.6g} m^3 at t = '
-                 f'{found["determinant_nearest_at_s"]:.2f} s')
-    if found['condition_max'] is not None:
-        lines.append(f'condition number of J_inv: {found["condition_max"]:.4g} at most, at t = '
-                     f'{found["condition_max_at_s"]:.2f} s')
-    if unpublished := found['unsolved'] + found['suppressed']:
-        lines.append(f'no forces were published in {plural(unpublished, "setpoint")}')
-    for begun, ended in spans[:_LISTED]:
-        ahead = [time - begun for time in crossings
-                 if begun <= time and (ended is None or time <= ended)]
-        lines.append(
-            f'singularity warning from t = {begun:.2f} s '
-            + ('to the end' if ended is None else f'to {ended:.2f} s')
-            + (f': {ahead[0]:.2f} s before the crossing' if ahead else ''))
-    if found['warnings'] > _LISTED:
-        lines.append(f'and {found["warnings"] - _LISTED} singularity warnings more, for '
-                     f'{found["warning_s"]:.2f} s in all')
-    if not spans:
-        lines.append('no singularity warning')
-    return lines

@@ -1,0 +1,235 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Statements about a replayed bag, worded once for terminal, report and the table of many bags.
+
+Each has a level; the worst level of a card's statements gives its color and title.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import math
+from typing import Any, NamedTuple
+
+from stewart_dynamics.mechanics.limits import FORCE_MAX, QUANTITIES
+from stewart_dynamics.reporting.plots import PLOT_OF
+from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
+
+Summary = Mapping[str, Any]
+"""The content of summary.json."""
+
+READING, MISSING, REJECTED, LIMITS, JOINTS, LOADS, SINGULARITY, MEASURED = (
+    'reading', 'missing', 'rejected', 'limits', 'joints', 'loads', 'singularity', 'measured')
+LEVELS = ('none', 'good', 'warn', 'bad')
+"""The levels, the worst last; none: information."""
+_CARDS = {
+    (READING, MISSING, REJECTED): {
+        'good': 'The whole bag was read', 'warn': 'Not all messages could be used',
+        'bad': 'The bag could not be read completely'},
+    (LIMITS,): {'none': 'No limits are given', 'good': 'All limits are held',
+                'warn': 'Not all limits could be checked', 'bad': 'Limits are exceeded'},
+    (SINGULARITY,): {'none': 'Singularity', 'good': 'Clear of singularities',
+                     'warn': 'A singularity is near', 'bad': 'A singularity is reached'},
+    (MEASURED,): {'none': 'Measured forces', 'good': 'Measured forces',
+                  'warn': 'Measured forces differ'}}
+# Maximum number of reasons of rejection.
+_LISTED = 3
+# Measured forces differ if the residual's RMS is a larger part of theirs.
+_DIFFERENT = 0.05
+
+
+class Statement(NamedTuple):
+    """A sentence, which may have a time in it."""
+
+    topic: str
+    level: str
+    text: str
+    at: float | None = None
+    """Follows the text [s]."""
+    plot: str = ''
+    """Plot of the report that shows this time."""
+    end: str = ''
+    """Follows the time."""
+
+    @property
+    def line(self) -> str:
+        """Return the whole sentence."""
+        time = '' if self.at is None else f' at t = {self.at:.2f} s'
+        return f'{self.text}{time}{self.end}'
+
+
+def statements(summary: Summary) -> list[Statement]:
+    """Return all statements about a bag; each topic's most important ones first."""
+    of_motion = [] if not summary['setpoints']['answered'] else [
+        *_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
+        *_singularity(summary['singularity'])]
+    return [*of_motion, *_reading(summary), *_measured(summary['measured'])]
+
+
+class Card(NamedTuple):
+    """A card of the report: its level, its title, and the statements on it."""
+
+    level: str
+    title: str
+    statements: list[Statement]
+
+
+def cards(summary: Summary) -> dict[str, Card]:
+    """Return the cards of the report by their first topic."""
+    about, found = statements(summary), {}
+    for topics, titles in _CARDS.items():
+        on_it = [each for each in about if each.topic in topics]
+        level = max((each.level for each in on_it), key=LEVELS.index, default='none')
+        found[topics[0]] = Card(level, titles[level], on_it)
+    return found
+
+
+def plural(number: int, what: str) -> str:
+    """Return a number with its noun."""
+    return f'{number} {what}' if number == 1 else f'{number} {what}s'
+
+
+def _reading(summary: Summary) -> Iterator[Statement]:
+    points = summary['setpoints']
+    yield Statement(READING, 'good', f'{plural(points["answered"], "setpoint")} in '
+                                     f'{points["duration_s"]:.2f} s{_interruptions(points)}')
+    for each in summary['missing']:
+        yield Statement(MISSING, 'bad', f'not read: {each}')
+    if unknown := points['base_unknown']:
+        yield Statement(
+            READING, 'warn', f'{BASE_NOT_KNOWN} in {plural(unknown, "setpoint")}, first',
+            points['base_unknown_first_at_s'], 'base_force', ': they have no forces')
+    rejected = sorted(summary['rejected'], key=lambda each: -each['count'])
+    for each in rejected[:_LISTED]:
+        yield Statement(
+            REJECTED, 'warn', f'{each["topic"]}: {each["count"]} rejected: {each["reason"]}')
+    if others := sum(each['count'] for each in rejected[_LISTED:]):
+        yield Statement(REJECTED, 'warn', f'{others} rejected for other reasons')
+
+
+def _interruptions(points: Summary) -> str:
+    text = ''
+    if points['gaps']:
+        text += f', of them {points["gaps_s"]:.2f} s in {plural(points["gaps"], "gap")}'
+    if points['restarts']:
+        text += f', {plural(points["restarts"], "restart")}'
+    return text
+
+
+def _limits(summary: Summary) -> Iterator[Statement]:
+    points = summary['setpoints']
+    for name in dict.fromkeys(each['limit'] for each in summary['limits']):
+        of_legs = [each for each in summary['limits'] if each['limit'] == name]
+        most = max(of_legs, key=lambda each: abs(abs(each['worst']) - each['bound']))
+        others = f' and {plural(len(of_legs) - 1, "other leg")}' if len(of_legs) > 1 else ''
+        unit = QUANTITIES[name][1]
+        yield Statement(
+            LIMITS, 'bad', f'{name}, {most["bound"]:g} {unit}, exceeded by {most["leg"]}{others}: '
+            f'{most["worst"]:.6g} {unit} at worst, first',
+            min(each['first_at_s'] for each in of_legs), PLOT_OF[name])
+    if points['jumps']:
+        yield Statement(
+            LIMITS, 'bad', f'{plural(points["jumps"], "jump")}, first',
+            points['jumps_first_at_s'], 'lengths',
+            ': the legs cannot follow within limits.velocity_max')
+    for name in summary['limits_not_checked']:
+        why = ': velocities are not known; --differentiate computes them from the poses'
+        if name == FORCE_MAX:
+            causes = ((summary['singularity']['unsolved'], 'J_inv cannot be solved'),
+                      (points['base_unknown'], BASE_NOT_KNOWN))
+            why = ' ' + '; '.join(f'in {plural(number, "setpoint")}: {cause}'
+                                  for number, cause in causes if number)
+        yield Statement(LIMITS, 'warn', f'{name} could not be checked{why}')
+    problems = points['jumps'] or summary['limits'] or summary['limits_not_checked']
+    if not problems and any(leg[key] is not None for leg in summary['legs'].values()
+                            for key in leg if '_margin_' in key):
+        yield Statement(LIMITS, 'good', 'all limits held')
+
+
+def _joints(legs: Summary) -> Iterator[Statement]:
+    """Yield the largest angle of a joint at either end of the legs, and the smallest margin."""
+    for joint in ('base', 'platform'):
+        angle, at, margin = (
+            f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
+        angles = {name: leg[angle] for name, leg in legs.items() if leg[angle] is not None}
+        margins = {name: leg[margin] for name, leg in legs.items() if leg[margin] is not None}
+        if angles and margins:
+            most = max(angles, key=lambda name: angles[name])
+            least = min(margins, key=lambda name: margins[name])
+            yield Statement(
+                JOINTS, 'none', f'{joint} joints: {_angle(angles[most])} at most, {most}',
+                legs[most][at], '', f'; margin {_angle(margins[least])}'
+                + (f', {least}' if least != most else ''))
+
+
+def _angle(radians: float) -> str:
+    return f'{radians:.4g} rad ({math.degrees(radians):.1f} deg)'
+
+
+def _loads(found: Summary) -> Iterator[Statement]:
+    for name, unit, key in (('force', 'N', 'n'), ('moment', 'N m', 'n_m')):
+        each = found[name]
+        if each[f'peak_{key}'] is not None:
+            rms = '-' if each[f'rms_{key}'] is None else f'{each[f"rms_{key}"]:.1f}'
+            yield Statement(LOADS, 'none', f'{name} on the base: {each[f"peak_{key}"]:.1f} {unit} '
+                            'at most', each['peak_at_s'], f'base_{name}', f' (RMS {rms})')
+
+
+def _singularity(found: Summary) -> Iterator[Statement]:
+    crossings, spans = found['crossings_at_s'], found['warnings_from_to_s']
+    if crossings:
+        more = f' and {plural(found["crossings"] - 1, "time")} more' if len(crossings) > 1 else ''
+        yield Statement(SINGULARITY, 'bad', 'det(J) crossed zero', crossings[0], 'determinant',
+                        f'{more}: forces grow without bound there')
+    if found['unsolved']:
+        yield Statement(SINGULARITY, 'bad', 'J_inv cannot be solved in '
+                        f'{plural(found["unsolved"], "setpoint")}: they have no forces')
+    if spans:
+        begun, ended = spans[0]
+        ahead = [time - begun for time in crossings
+                 if begun <= time and (ended is None or time <= ended)]
+        more = f' and {plural(found["warnings"] - 1, "time")} more' if len(spans) > 1 else ''
+        yield Statement(
+            SINGULARITY, 'warn', 'singularity warning', begun, 'condition',
+            (f', {ahead[0]:.2f} s before the crossing' if ahead else '')
+            + f'{more}, for {found["warning_s"]:.2f} s in all')
+    if found['suppressed']:
+        yield Statement(SINGULARITY, 'none', 'forces were suppressed in '
+                        f'{plural(found["suppressed"], "setpoint")}')
+    if not crossings:
+        yield Statement(SINGULARITY, 'good', 'det(J) did not cross zero')
+    if not spans:
+        yield Statement(SINGULARITY, 'good', 'no singularity warning')
+    yield Statement(
+        SINGULARITY, 'none', f'det(J) nearest zero: {found["determinant_nearest_m3"]:.6g} m^3',
+        found['determinant_nearest_at_s'], 'determinant')
+    if found['condition_max'] is not None:
+        yield Statement(
+            SINGULARITY, 'none', f'condition number of J_inv: {found["condition_max"]:.4g} at '
+            'most,', found['condition_max_at_s'], 'condition')
+
+
+def _measured(measured: Summary | None) -> Iterator[Statement]:
+    if not measured:
+        return
+    compared, contacts = measured['setpoints_compared'], measured['contacts']
+    differs = contacts['count'] or (measured['residual_share'] or 0.0) > _DIFFERENT
+    yield Statement(MEASURED, 'none' if not compared else 'warn' if differs else 'good',
+                    measured['headline'])
+    if contacts['count']:
+        yield Statement(MEASURED, 'warn', f'{plural(contacts["count"], "contact")}, first',
+                        contacts['strongest'][0]['from_s'], 'external_force')
