@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -e -o pipefail -c
 .DELETE_ON_ERROR:
-.PHONY: bags bench bench-identify bench-lack-of-fit bench-loop bench-node bench-planned bench-replay \
+.PHONY: bags bench bench-coverage bench-identify bench-lack-of-fit bench-loop bench-node bench-planned bench-replay \
   clean demo demo-identify demo-loop demo-mujoco demo-ship docs docs-site environment lint test
 
 # PYTHON=... chooses another one. The ROS wheels are built for these versions.
@@ -101,6 +101,9 @@ bench-node: $(INSTALLED)
 
 bench-identify: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/identification.py --write
+
+bench-coverage: $(INSTALLED)
+	$(VENV)/bin/python benchmarks/coverage.py --write
 
 bench-lack-of-fit: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/lack_of_fit.py --write

@@ -67,10 +67,10 @@ class Noise(NamedTuple):
 NOISE = Noise()
 
 
-def fourier(seed: int, base: float = 0.1, harmonics: int = 12) -> MotionAt:
+def fourier(seed: int, base: float = 0.1, harmonics: int = 12, size: float = 1.0) -> MotionAt:
     """Return a periodic motion around the home of config/platform.yaml."""
     a = rng(seed).normal(size=(2, harmonics, 6))
-    a *= AMPLITUDES / np.sqrt(np.sum(a ** 2, axis=(0, 1)))
+    a *= size * AMPLITUDES / np.sqrt(np.sum(a ** 2, axis=(0, 1)))
     w = 2.0 * np.pi * base * np.arange(1, harmonics + 1)[:, None]
 
     def at(times: Array) -> Motion:

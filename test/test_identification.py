@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import json
 from pathlib import Path
+import re
 from typing import Any
 
 import numpy as np
@@ -249,13 +250,13 @@ def _swapped(given: Recorded) -> Recorded:
 
 @pytest.mark.parametrize('options', [(), WITH_TILT], ids=['level', 'tilt'])
 @pytest.mark.parametrize(('change', 'named'), [
-    (lambda given: given._replace(efforts=-given.efforts), 'opposite sign: + must push'),
+    (lambda given: given._replace(efforts=-given.efforts), r'opposite sign: \+ must push'),
     (lambda given: given._replace(efforts=1e-3 * given.efforts), 'likely kN in place of N'),
     (lambda given: given._replace(efforts=given.efforts * 0.02 / (2.0 * np.pi)),
      'likely torques of the motors'),
     (_swapped, 'positions and efforts of leg_2 and leg_3 look swapped'),
     (lambda given: given._replace(positions=given.positions - 0.02),
-     'geometry.zero_length looks wrong: another geometry.zero_length, +19'),
+     r'geometry.zero_length looks wrong: another geometry.zero_length, (\+1[89]\S* ){6}mm'),
     (lambda given: given._replace(positions=1e3 * given.positions),
      'lengths belong to no pose of this hexapod'),
 ], ids=['sign', 'kN', 'torque', 'swapped', 'zero length', 'mm'])
@@ -265,7 +266,7 @@ def test_likely_mistakes_are_named_and_nothing_is_written(
     code, result, out, err = identified(
         'tilted' if options else 'fourier', '--no-report', *options, change=change)
     assert (code, result, out) == (2, None, '')
-    assert named in err
+    assert re.search(named, err)
     assert err.startswith('stewart_identify: ')
     assert err.count('\n') == 1
     assert not (tmp_path / 'found').exists()

@@ -17,10 +17,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 import pytest
+from recorded import fourier, HOME, MotionAt, recorded
 from referees import rng
 
-from stewart_dynamics import StewartPlatform
+from stewart_dynamics import Motion, StewartPlatform
 from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.lack_of_fit import deviations
@@ -29,7 +31,10 @@ from stewart_dynamics.identification.text import result_text
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 import wrong_models
-from wrong_models import Case, CAUSES, GIVEN, identify, simulated, true_hexapod
+from wrong_models import (
+    Case, CAUSES, GIVEN, identify, NOISE, RATE, SECONDS, simulated, true_hexapod)
+
+Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize('cause', CAUSES)
@@ -97,6 +102,58 @@ def test_rates_inside_the_coulomb_friction_band_are_reported(velocity: float, sa
     (bag,) = identify(simulated(case, 2), GIVEN.replaced(band)).bags
     assert any('% of the rates are below actuator.coulomb_velocity' in each
                for each in bag.notices) == said
+
+
+@pytest.mark.parametrize('size', [1e-3, 1e3])
+def test_hexapods_of_all_sizes_have_similar_results(size: float) -> None:
+    bags = simulated(Case(true_hexapod(1)), 1)
+    found = [identify(bags, size=each) for each in (1.0, size)]
+    one, other = (np.concatenate([
+        each.fit.values, np.sqrt(np.diag(each.errors.covariance))]) / np.tile(
+            each.unknowns.scales, 2) for each in found)
+    np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
+    assert [(each.likely, each.lack_of_fit) for each in found] == 2 * [((), None)]
+    ratio = found[1].parameters['platform.inertia'] / found[0].parameters['platform.inertia']
+    np.testing.assert_allclose(ratio, size ** 5, rtol=1e-6)
+    wrong = [each._replace(positions=each.positions - 0.02) for each in bags]
+    (mistake,) = identify(wrong, size=size).likely
+    assert mistake.what == 'zero_length'
+
+
+def below(up: MotionAt) -> MotionAt:
+    """Return the motion of a platform that hangs below its base."""
+    def at(times: Array) -> Motion:
+        m = up(times)
+        return Motion(m.position - 2.0 * HOME, m.rotation, m.linear_velocity, m.angular_velocity,
+                      m.linear_acceleration, m.angular_acceleration)
+
+    return at
+
+
+@pytest.mark.parametrize(('motion', 'sign', 'said'), [
+    (below(fourier(1)), 1.0, None),
+    (below(fourier(1)), -1.0, 'opposite sign'),
+    (fourier(1), -1.0, 'or the platform is on the other side of the base'),
+    # in slow motions inertia is not observable
+    (below(fourier(1, base=0.01)), 1.0, 'or the platform is on the other side of the base'),
+], ids=['hangs', 'hangs, sign', 'stands, sign', 'slow'])
+def test_the_side_of_the_base_follows_from_the_efforts(
+        motion: MotionAt, sign: float, said: str | None) -> None:
+    assert GIVEN['geometry.platform_side'] == 'auto'
+    true = true_hexapod(1)
+    times = np.arange(round(SECONDS * RATE)) / RATE - NOISE.delay
+    forces = sign * StewartPlatform(true).inverse_dynamics(motion(times)).forces
+    found = identify([recorded(true, motion, SECONDS, RATE, 1, NOISE, forces)])
+    if said is not None:
+        assert said in found.likely[0].text
+        return
+    assert (found.likely, found.lack_of_fit) == ((), None)
+    assert found.parameters['geometry.platform_side'] == 'negative'
+    assert found.bags[0].notices == [
+        'geometry.platform_side: the efforts are those of a platform on the negative side of its '
+        'base']
+    off = np.abs(found.fit.values - Unknowns(true).start)
+    assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
 
 
 def test_lengths_of_a_platform_below_its_base_have_their_pose() -> None:

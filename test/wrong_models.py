@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from recorded import fourier, Noise, Recorded, recorded
+from recorded import fourier, MotionAt, Noise, Recorded, recorded
 from referees import rng, ROOT, rotation_about
 
 from stewart_dynamics import Parameters, StewartPlatform
@@ -39,6 +39,17 @@ RATE, SECONDS = 250.0, 20.0
 # Noise at 250 samples per second, each the mean of four at 1 kHz.
 NOISE = Noise(length=5e-6, rate=5e-4, effort=2.5, coloured=2.0, delay=3e-3)
 RIGHT = 'right model'
+# Exponents of the size in the parameters of similar hexapods under the same gravity, whose times
+# grow with the square root of the size.
+EXPONENTS = {
+    'geometry.base_joints': 1.0, 'geometry.platform_joints': 1.0, 'geometry.zero_length': 1.0,
+    'platform.mass': 3.0, 'platform.center_of_mass': 1.0, 'platform.inertia': 5.0,
+    **{f'legs.{part}.{name}': exponent for part in ('cylinder', 'piston')
+       for name, exponent in (('mass', 3.0), ('center_of_mass', 1.0), ('inertia', 5.0))},
+    'actuator.reflected_mass': 3.0, 'actuator.viscous_friction': 2.5,
+    'actuator.coulomb_friction': 3.0, 'actuator.coulomb_velocity': 0.5,
+    'limits.length_min': 1.0, 'limits.length_max': 1.0, 'limits.velocity_max': 0.5,
+    'limits.force_max': 3.0, 'singularity.characteristic_length': 1.0}
 
 
 class Case(NamedTuple):
@@ -61,6 +72,12 @@ def true_hexapod(seed: int) -> Parameters:
         'platform.inertia': GIVEN['platform.inertia'] * mass / GIVEN['platform.mass'],
         'actuator.viscous_friction': 250.0 * random.uniform(0.7, 1.7, 6),
         'actuator.coulomb_friction': 30.0 * random.uniform(0.7, 1.7, 6)})
+
+
+def sized(p: Parameters, size: float) -> Parameters:
+    """Return a hexapod of another size."""
+    return p.replaced({name: np.multiply(p[name], size ** exponent).tolist()
+                       for name, exponent in EXPONENTS.items()})
 
 
 def lighter(p: Parameters, kilograms: float) -> Parameters:
@@ -157,9 +174,9 @@ CAUSES: dict[str, tuple[Callable[[Parameters, np.random.Generator], Case], tuple
 }
 
 
-def simulated(case: Case, seed: int) -> list[Recorded]:
+def simulated(case: Case, seed: int, motion: MotionAt | None = None) -> list[Recorded]:
     """Return a recording for each bag."""
-    motion = fourier(seed)
+    motion = motion or fourier(seed)
     bags = []
     for bag in range(case.bags):
         seconds = SECONDS / case.bags
@@ -177,11 +194,14 @@ def simulated(case: Case, seed: int) -> list[Recorded]:
 
 
 def identify(bags: Sequence[Recorded], given: Parameters = GIVEN,
-             kinds: Sequence[str] = DEFAULT) -> Identified:
-    """Return the identification from the recordings of one hexapod."""
-    with closing(Identification(given, Options(kinds=tuple(kinds), hold_out=0.0))) as work:
+             kinds: Sequence[str] = DEFAULT, size: float = 1.0) -> Identified:
+    """Return the identification from the recordings of one hexapod, or of one of another size."""
+    slower = np.sqrt(size)
+    options = Options(kinds=tuple(kinds), hold_out=0.0, cutoff=10.0 / slower)
+    with closing(Identification(sized(given, size), options)) as work:
         for n, each in enumerate(bags):
             work.add(Path(f'bag {n}'), [Window(
-                0, 1.0 / RATE, each.positions, each.rates, each.efforts,
+                0, slower / RATE, size * each.positions,
+                None if each.rates is None else slower * each.rates, size ** 3 * each.efforts,
                 np.zeros(each.efforts.shape, dtype=bool))])
         return work.result()

@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.identification.extraction import BLURS, SLIP
+from stewart_dynamics.identification.extraction import SLIP
 from stewart_dynamics.identification.extracts import Block
 from stewart_dynamics.identification.fit import Fit
 from stewart_dynamics.identification.kinematics import motions
@@ -50,7 +50,7 @@ _MOST_BAGS = 6
 _SATURATED = 0.97
 # Finite-difference step of joint coordinates and zero lengths, relative to the platform's size.
 _STEP = 1e-4
-UNKNOWN, BLUR = 'unknown', 'blur'
+UNKNOWN = 'unknown'
 
 
 class Cause(NamedTuple):
@@ -110,7 +110,6 @@ class Causes:
         whole[unknowns.linear] = self._theta[:len(unknowns.linear)]
         self._whole = whole
         self.all: tuple[Cause, ...] = ()
-        self.blur: Integers = np.zeros(0, dtype=np.int64)
 
     def columns(self, block: Block, first: int) -> Array:
         """Return an array (N, 6, m) for a block that begins with the sample ``first``."""
@@ -119,7 +118,7 @@ class Causes:
             starts = np.cumsum([0, *(each.shape[-1] for each in parts.values())])
             places = {name: np.arange(a, b) for name, (a, b) in zip(
                 parts, pairwise(starts), strict=True)}
-            self.all, self.blur = tuple(self._causes(places)), places[BLUR]
+            self.all = tuple(self._causes(places))
         return np.concatenate(list(parts.values()), axis=-1)
 
     def _parts(self, block: Block, first: int) -> Iterator[tuple[str, Array]]:
@@ -144,10 +143,8 @@ class Causes:
         yield 'viscous_friction', matrix[..., VISCOUS_FRICTION]
         slip = _by_leg(block.slip)
         yield 'coulomb_friction', slip[..., :6]
-        friction = 1 + len(BLURS)
-        yield BLUR, slip[..., 6:6 * friction]
-        for n in range(friction, SLIP):
-            yield f'stribeck_friction {n - friction}', slip[..., 6 * n:6 * n + 6]
+        for n in range(1, SLIP):
+            yield f'stribeck_friction {n}', slip[..., 6 * n:6 * n + 6]
         yield 'load_friction', slip[..., :6] * np.abs(predicted)[..., None]
         yield 'quadratic_friction', _by_leg((rates * np.abs(rates))[..., None])
         yield 'gain', _by_leg(predicted[..., None])
@@ -220,7 +217,7 @@ class Causes:
             ('tilt', 'a base tilted by {} degrees', np.degrees(1.0), np.linalg.norm),
             ('leg_mass', 'other leg masses, cylinders and pistons {} %', 100.0, np.asarray),
             *((f'stribeck_friction {n}', 'Stribeck friction, {} N at low rates', 1.0, np.mean)
-              for n in range(SLIP - 1 - len(BLURS))),
+              for n in range(1, SLIP)),
             ('load_friction', 'friction that depends on the load, {} % of it', 100.0, np.mean),
             ('quadratic_friction', 'friction that grows with the square of the rate, '
              '{} N s^2/m^2', 1.0, np.mean),

@@ -53,7 +53,7 @@ _NOT_TOLD = 100.0
 # Number of iterations that scale a motion to its limits: in the search, and at the end.
 _SCALINGS, _LAST_SCALINGS = 2, 30
 _CLOSE = 1e-3
-# Digits of coefficients in a file [m, rad].
+# Digits of coefficients in a file [rad]; lengths relative to the size of the platform.
 _DIGITS = 7
 
 
@@ -170,7 +170,7 @@ class _Search:
         self._bases = (np.hstack([c, s]), np.hstack([-omega * s, omega * c]),
                        np.hstack([-omega ** 2 * c, -omega ** 2 * s]))
         # Equal ratios give equal velocities, and equal displacements at the joints.
-        size = parameters['singularity.characteristic_length']
+        self._length = size = parameters['singularity.characteristic_length']
         self._units = (1.0 / np.tile(np.arange(1, many + 1), 2)[:, None]
                        / np.array([1.0, 1.0, 1.0, size, size, size]))
         self._first = 0.02 * size
@@ -219,14 +219,16 @@ class _Search:
 
     def _parameters(self, coefficients: Array) -> ReferenceMotionParameters:
         many, options = self._options.harmonics, self._options
+        digits = _DIGITS - round(math.log10(self._length))
+        rounded = np.hstack([coefficients[:, :3].round(digits), coefficients[:, 3:].round(_DIGITS)])
         given: dict[str, Any] = {
             'base_frame': self.platform.parameters['base_frame'], 'rate': options.rate,
             'motion.type': 'fourier', 'motion.duration': options.duration,
             'motion.hold_at_end': False, 'motion.initial': self.limits.center,
             'motion.fourier.frequency': self._base,
             'motion.fourier.fade': min(1.0, options.duration / 4.0),
-            'motion.fourier.cosine': coefficients[:many].round(_DIGITS).ravel(),
-            'motion.fourier.sine': coefficients[many:].round(_DIGITS).ravel()}
+            'motion.fourier.cosine': rounded[:many].ravel(),
+            'motion.fourier.sine': rounded[many:].ravel()}
         return ReferenceMotionParameters(given)
 
 

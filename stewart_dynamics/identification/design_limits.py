@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 
 import numpy as np
 
@@ -68,11 +69,12 @@ class DesignLimits:
                 f'{", ".join(missing)}: missing: a motion is designed within the limits of the '
                 'parameter file, or with --amplitude')
         self._platform, self._amplitude = platform, amplitude
+        self._size = p['singularity.characteristic_length']
         if center is None:
-            center = [*platform.home_pose().position.round(6).tolist(), 0.0, 0.0, 0.0]
+            digits = 6 - round(math.log10(self._size))
+            center = [*platform.home_pose().position.round(digits).tolist(), 0.0, 0.0, 0.0]
         self.center: Array = np.array(center, dtype=float)
         """X Y Z alpha beta gamma."""
-        self._size = p['singularity.characteristic_length']
         low, high = p[LENGTH_MIN], p[LENGTH_MAX]
         stroke = 0.0 if low is None or high is None else high - low
         self._low = np.full(6, -np.inf) if low is None else low + _STROKE * stroke

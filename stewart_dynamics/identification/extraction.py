@@ -46,20 +46,21 @@ WIDE, SAMPLES = 2.5, 4.0
 _TRANSITION = 1.0
 ORDERS = 4
 """Number of columns of an effort: its value and its first ORDERS - 1 derivatives."""
-# Distance from a length limit within which an end stop may be touched [m]; fraction of force_max
-# above which an effort may be saturated.
-_STOP, _SATURATED = 5e-5, 0.999
+# Distance from a length limit within which an end stop may be touched, relative to the platform's
+# size; fraction of force_max above which an effort may be saturated.
+_STOP, _SATURATED = 1e-4, 0.999
+# Least noise of lengths, relative to the platform's size, and of rates per sample.
+_ROUNDING = 1e-12
 # Lags are tried in steps of this fraction of a cut-off period; a lag must reduce the squared
 # residuals to this fraction.
 _LAG_STEP, _LESS = 0.05, 0.8
 # Number of samples for which the regressor is computed at once.
 _TOGETHER = 4096
 # Rates at which Stribeck friction may have fallen to 1/e, relative to the RMS rate of the first
-# window, and at least this multiple of the rate that blurs reversals between samples.
-_STRIBECK, _BLURRED = (0.1, 0.3), 6.0
-BLURS = (1.0, 3.0)
-SLIP = 1 + len(BLURS) + len(_STRIBECK)
-"""Number of friction shapes over the rate: sign, blur of reversals, Stribeck friction."""
+# window, and at least this multiple of the change of the rate between two samples at a reversal.
+_STRIBECK, _RESOLVED = (0.1, 0.3), 4.0
+SLIP = 1 + len(_STRIBECK)
+"""Number of friction shapes over the rate: Coulomb friction, Stribeck friction."""
 
 
 class Extract(NamedTuple):
@@ -88,6 +89,11 @@ class Extract(NamedTuple):
     end: Pose
     """Last pose."""
 
+    @property
+    def columns(self) -> Array:
+        """Return regressor, known force, effort and its derivatives, (N, 6, n + 1 + ORDERS)."""
+        return np.concatenate([self.regressor, self.known[..., None], self.efforts], axis=-1)
+
 
 class Extraction:
     """
@@ -111,6 +117,7 @@ class Extraction:
     def __init__(self, platform: StewartPlatform, unknowns: Unknowns, period: float,
                  cutoff: float, speeds: tuple[float, ...] | None = None) -> None:
         self.platform, self._unknowns, self._period = platform, unknowns, period
+        self._size = float(platform.parameters['singularity.characteristic_length'])
         self._wide = LowPass.of(period, WIDE * cutoff, _TRANSITION * cutoff)
         self._narrow = LowPass.of(period, cutoff, _TRANSITION * cutoff)
         self.cutoff, self.speeds = cutoff, speeds
@@ -146,9 +153,9 @@ class Extraction:
         times = self._period * (self.margin + self.step * np.arange(many)).astype(float)
         if self.speeds is None:
             band = self.platform.parameters['actuator.coulomb_velocity']
-            blur = self._period * _rms(accelerations) + 3.0 * float(np.mean(band))
-            self.speeds = (*(each * blur for each in BLURS), *(
-                max(part * _rms(rates), _BLURRED * blur) for part in _STRIBECK))
+            step = self._period * _rms(accelerations) + float(np.mean(band))
+            self.speeds = tuple(
+                max(part * _rms(rates), _RESOLVED * step) for part in _STRIBECK)
         taps = self._narrow.taps()
         legs = np.stack([decimated(each, taps, self.step)
                          for each in (lengths, rates, accelerations)], axis=-1)
@@ -157,12 +164,13 @@ class Extraction:
                        decimated(self._slip(rates), taps, self.step), found.rows[at][:, POSE],
                        deviations, stops, Pose.of_rows(found.rows[-1]))
 
-    def lag(self, window: Window, guess: Pose, longest: float) -> int:
+    def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
         """
-        Return a coarse lag of the efforts behind the positions, in samples.
+        Return a coarse lag of the efforts behind the positions, in samples, and the squared misfit.
 
         It is the lag with the smallest residual, in steps of a fraction of a cut-off period; 0
-        unless the residual is much smaller than without a lag.
+        unless the residual is much smaller than without a lag. The misfit is relative to the
+        efforts, whatever the values of the linear parameters.
         """
         extract = self(window, guess)
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())
@@ -172,17 +180,21 @@ class Extraction:
         used = at + lags[-1] < len(efforts)
         at = at[used]
         if len(at) < extract.regressor.shape[-1]:
-            return 0
+            return 0, 1.0
         sound = extract.sound[used].reshape(-1)
         columns = extract.regressor[used].reshape(len(sound), -1)[sound]
         sizes = np.linalg.norm(columns, axis=0)
         basis = np.linalg.qr(columns[:, sizes > 0.0] / sizes[sizes > 0.0])[0]
-        left = []
+        misfits = []
         for lag in lags:
             forces = (efforts[at + lag] - extract.known[used]).reshape(-1)[sound]
-            left.append(float(forces @ forces - np.sum((basis.T @ forces) ** 2)))
-        best = int(np.argmin(left))
-        return int(lags[best]) if left[best] < _LESS * left[0] else 0
+            squares = float(forces @ forces)
+            misfits.append(1.0 - float(np.sum((basis.T @ forces) ** 2)) / squares
+                           if squares > 0.0 else 1.0)
+        best = int(np.argmin(misfits))
+        if misfits[best] > _LESS * misfits[0]:
+            best = 0
+        return int(lags[best]), misfits[best]
 
     def _slip(self, rates: Array) -> Array:
         assert self.speeds is not None
@@ -199,7 +211,8 @@ class Extraction:
         off = convolved(window.rates, smooth[1]) - convolved(window.positions, smooth[0])
         in_band = np.sqrt(2.0 * WIDE / SAMPLES / self.step)  # fraction of white noise in the band
         white = float(np.sqrt(np.mean(white_deviation(window.rates) ** 2)))
-        return of_lengths, max(white, float(np.sqrt(np.mean(off ** 2))) / max(in_band, 1e-3), 1e-9)
+        return of_lengths, max(white, _rms(off) / max(in_band, 1e-3),
+                               _ROUNDING * self._size / self._period)
 
     def _filtered(self, window: Window, deviations: tuple[float, float],
                   noise: np.random.Generator | None) -> tuple[Array, Array, Array]:
@@ -215,8 +228,8 @@ class Extraction:
             if rates is None:
                 derivatives.append(convolved(positions, self._wide.taps(order)))
                 continue
-            of_positions, of_rates = self._wide.fused(order, max(deviations[0], 1e-12),
-                                                      deviations[1])
+            of_positions, of_rates = self._wide.fused(
+                order, max(deviations[0], _ROUNDING * self._size), deviations[1])
             derivatives.append(convolved(positions, of_positions) + convolved(rates, of_rates))
         return derivatives[0], derivatives[1], derivatives[2]
 
@@ -242,7 +255,7 @@ class Extraction:
         stopped = np.zeros(lengths.shape, dtype=bool)
         for name, sign in (('limits.length_min', -1.0), ('limits.length_max', 1.0)):
             if p[name] is not None:
-                stopped |= sign * (lengths - p[name]) > -_STOP
+                stopped |= sign * (lengths - p[name]) > -_STOP * self._size
         if p['limits.force_max'] is not None:
             stopped |= np.abs(window.efforts) > _SATURATED * p['limits.force_max']
         bad = (window.outliers | stopped)[self._wide.half:-self._wide.half]

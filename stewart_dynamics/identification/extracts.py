@@ -53,9 +53,7 @@ class Extracts:
 
     def add(self, bag: int, begin: float, extract: Extract) -> None:
         """Add the extract of a window of a bag that begins at a time [s]."""
-        columns = np.concatenate(
-            [extract.regressor, extract.known[..., None], extract.efforts], axis=-1)
-        for array in (begin + extract.times, columns, extract.sound, extract.legs, extract.slip,
+        for array in (begin + extract.times, extract.columns, extract.sound, extract.legs, extract.slip,
                       extract.poses):
             np.save(self._file, array)
         self._bags.append(bag)

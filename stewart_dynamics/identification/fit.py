@@ -36,16 +36,16 @@ from stewart_dynamics.mechanics.least_squares import (
 
 _STEPS = 30
 _DONE = 1e-10
-# Largest change of the delay in one step for which its Taylor series is valid [s].
-LONGEST_DELAY = 0.02
+# Longest delay for which the Taylor series of the efforts is valid, in cut-off periods.
+_LONGEST_DELAY = 0.2
 # A delay is identifiable if the squared derivative of the efforts exceeds that of noise by this
 # factor.
 _TIMES_NOISE = 10.0
 # Unknowns whose identifiable share is smaller are reported as not identifiable.
 LEAST_TOLD = 0.1
 _HELD = 1e-6
-# Lower bound of the residual variance, reached with exact efforts [N^2].
-_SMALLEST_VARIANCE = 1e-12
+# Lower bound of the residuals' deviation, reached with exact efforts, relative to the efforts.
+_SMALLEST_DEVIATION = 1e-8
 
 
 class Fit(NamedTuple):
@@ -120,6 +120,7 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
     values = unknowns.start.copy()
     bags = len(sums.counts)
     delays: Array = np.zeros(bags)
+    longest: Array = np.zeros(bags) if cutoffs is None else _LONGEST_DELAY / cutoffs
     errors: Array = np.zeros(bags)
     variances = _variances(sums, unknowns, values, delays)
     solution = None
@@ -127,7 +128,7 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
         information, steps, of_noise = _information(
             sums, unknowns, values, delays, variances, noise, cutoffs)
         if prior is not None:
-            strength = np.diag((prior * unknowns.scales) ** -2.0)
+            strength = strength_of(unknowns, prior)
             information = information._replace(
                 matrix=information.matrix + strength,
                 vector=information.vector + strength @ unknowns.start)
@@ -141,10 +142,10 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
             change *= 0.5 * values[0] / -change[0]
         values = values + change
         for bag, (step, along, error) in enumerate(steps):
-            delays[bag] += float(np.clip(step + along @ change, -LONGEST_DELAY, LONGEST_DELAY))
+            delays[bag] += float(np.clip(step + along @ change, -longest[bag], longest[bag]))
             delays[bag] *= error > 0.0
             errors[bag] = error
-        delays = np.clip(delays, -LONGEST_DELAY, LONGEST_DELAY)
+        delays = np.clip(delays, -longest, longest)
         variances = _variances(sums, unknowns, values, delays)
         if largest < _DONE:
             break
@@ -155,6 +156,44 @@ def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, pri
     bounded, at_bound = consistent(unknowns, values, information, final.identifiability)
     return Fit(bounded, final.covariance, delays, errors, variances, final.identifiability,
                information.matrix, at_bound)
+
+
+def strength_of(unknowns: Unknowns, prior: float | None) -> Array:
+    """Return the information (k, k) of the file's values; zero without a prior."""
+    return np.diag(np.zeros(len(unknowns.scales)) if prior is None else (
+        prior * unknowns.scales) ** -2.0)
+
+
+def shift_of_noise(clean: Sums, noisy: Sums, unknowns: Unknowns, found: Fit,
+                   cutoffs: Array | None = None, prior: float | None = None) -> Array:
+    """
+    Return the bias (k,) of the unknowns by noise of lengths and rates, to first order.
+
+    Noise in the regressor rounds the friction law where the rate changes its sign, and more noise
+    does so again: the bias is estimated by the change of the unknowns with as much noise added
+    (simulation extrapolation: Cook and Stefanski 1994, doi:10.1080/01621459.1994.10476871).
+
+    Parameters
+    ----------
+    clean, noisy : Sums
+        Sums of the same samples as recorded and with noise added.
+    unknowns : Unknowns
+        Unknowns of the fit.
+    found : Fit
+        Result of the fit.
+    cutoffs, prior
+        As in ``fit``.
+
+    """
+    known, steps = found.identifiability.known, []
+    for sums in (clean, noisy):
+        information, _, _ = _information(
+            sums, unknowns, found.values, found.delays, found.variances, None, cutoffs)
+        inner = known.T @ (information.matrix + strength_of(unknowns, prior)) @ known
+        steps.append(known @ np.linalg.pinv(inner, hermitian=True) @ (
+            known.T @ (information.vector - information.matrix @ found.values)))
+    shift: Array = steps[1] - steps[0]
+    return shift
 
 
 def directions(unknowns: Unknowns, values: Array, delay: float, with_delay: bool = True) -> Array:
@@ -207,5 +246,6 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
 def _variances(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
     squares = sums.squares(unknowns.theta(values), delays)
     used = np.maximum(sums.counts - len(values) / 6.0, 1.0)
-    variances: Array = np.maximum(squares / used, _SMALLEST_VARIANCE)
+    least = _SMALLEST_DEVIATION ** 2 * float(np.mean(sums.effort_squares() / used))
+    variances: Array = np.maximum(squares / used, max(least, np.finfo(float).tiny))
     return variances

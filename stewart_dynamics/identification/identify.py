@@ -32,22 +32,23 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
-from stewart_dynamics.identification.extraction import Extract, Extraction, ORDERS
+from stewart_dynamics.identification.extraction import Extract, Extraction
 from stewart_dynamics.identification.extracts import Block, Extracts
 from stewart_dynamics.identification.filters import LowPass
-from stewart_dynamics.identification.fit import Fit, fit
+from stewart_dynamics.identification.fit import Fit, fit, shift_of_noise
 from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.identification_options import Options
 from stewart_dynamics.identification.intervals import Errors, errors_of
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
-    LikelyMistake, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
+    LikelyMistake, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs, Topics
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import NEGATIVE, Parameters
 
 # Minimum number of samples per cut-off period; slowly sampled bags get a lower cut-off.
 _FEWEST_SAMPLES = 10.0
@@ -57,10 +58,10 @@ _OUTLIER = 8.0
 _MOST_OUTLIERS = 0.2
 # Minimum number of filtered samples.
 _FEWEST = 20
-# Below this duration the correlations of the residuals are not well known [s].
-_SHORT = 10.0
-# Largest delay of the efforts that is estimated [s].
-LONGEST_LAG = 0.1
+# Below this number of cut-off periods the correlations of the residuals are not well known.
+_SHORT = 100.0
+# Squared misfit on one side of the base, relative to the other, below which it is the right side.
+_BETTER = 0.25
 # A notice is given if a larger share of the rates is inside the band of Coulomb friction.
 _MOST_INSIDE = 0.5
 # Seed of the noise that is added to determine the information due to noise alone.
@@ -156,6 +157,7 @@ class Identification:
         self.chosen: list[Flags] = []
         self._first: tuple[Extraction, Window] | None = None
         self._noise: Array | None = None
+        self._with_noise: list[tuple[Sums, Sums]] = []
         self._of_noise = 0
         self._speeds: tuple[float, ...] | None = None
 
@@ -192,16 +194,14 @@ class Identification:
         options, p = self._options, self.parameters
         number, left_out, stops, outliers, samples, lag = len(self.bags), 0, 0, 0, 0, 0
         inside = rows = 0.0
+        notices: list[str] = []
         extraction: Extraction | None = None
         last: Extract | None = None
         begin = end = 0
         before = self.extracts.samples
         for window in windows:
             if extraction is None:
-                cutoff = min(options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
-                extraction = Extraction(self.platform, self.unknowns, window.period, cutoff,
-                                        self._speeds)
-                begin = window.begin
+                extraction, begin = self._extraction(window), window.begin
             if options.motor_torque:
                 window = window._replace(
                     efforts=window.efforts * 2.0 * np.pi / p['actuator.screw_lead'])
@@ -209,8 +209,12 @@ class Identification:
             if len(window.positions) < fewest + lag:
                 left_out += 1
                 continue
+            if last is None and not self.bags and self._is_on_other_side(window):
+                notices.append('geometry.platform_side: the efforts are those of a platform on '
+                               f'the {NEGATIVE} side of its base')
+                extraction = self._extraction(window)
             if last is None and options.delay:
-                lag = self._lag(extraction, window)
+                lag, _ = self._lag(extraction, window)
                 if len(window.positions) < fewest + lag:
                     lag = 0
             window = window.with_lag(lag)
@@ -227,12 +231,12 @@ class Identification:
             rates, period = window.rates is not None, window.period
         if extraction is None or last is None or self.extracts.samples == before:
             return None
-        notices = []
         if extraction.cutoff < options.cutoff:
             notices.append(f'sampled at {1.0 / period:.4g} Hz: the cut-off frequency is '
                            f'{extraction.cutoff:.3g} Hz')
-        if (self.extracts.samples - before) * extraction.step * period < _SHORT:
-            notices.append(f'less than {_SHORT:g} s are left by the filters: intervals are too '
+        short = _SHORT / extraction.cutoff
+        if (self.extracts.samples - before) * extraction.step * period < short:
+            notices.append(f'less than {short:.3g} s are left by the filters: intervals are too '
                            'narrow for so short a recording')
         if inside > _MOST_INSIDE * rows and any(
                 'coulomb_friction' in name for name in self.unknowns.names):
@@ -244,13 +248,39 @@ class Identification:
             rates, lag * period, {}, left_out, stops, outliers, last.deviations, [], notices))
         return self.bags[-1]
 
-    def _lag(self, extraction: Extraction, window: Window) -> int:
-        piece = most_motion(window, extraction)
-        lengths = piece.positions[0] + self.parameters['geometry.zero_length']
+    def _extraction(self, window: Window) -> Extraction:
+        cutoff = min(self._options.cutoff, 1.0 / (_FEWEST_SAMPLES * window.period))
+        return Extraction(self.platform, self.unknowns, window.period, cutoff, self._speeds)
+
+    def _lag(self, extraction: Extraction, window: Window) -> tuple[int, float]:
+        """Return the lag of the efforts in samples, and the squared misfit."""
+        piece, platform = most_motion(window, extraction), extraction.platform
+        lengths = piece.positions[0] + platform.parameters['geometry.zero_length']
         try:
-            return extraction.lag(piece, pose_near(self.platform, lengths), LONGEST_LAG)
+            return extraction.lag(piece, pose_near(platform, lengths),
+                                  LONGEST_LAG if self._options.delay else 0.0)
         except (PoseError, SingularityError):
-            return 0
+            return 0, 1.0
+
+    def _is_on_other_side(self, window: Window) -> bool:
+        """
+        Move the platform to the negative side of its base if the efforts fit there alone.
+
+        Both sides are tried if the parameters leave the side open: lengths are nearly the same on
+        both, but weight and inertia have opposite signs on the wrong one.
+        """
+        parameters, platform = self.parameters, self.platform
+        if reach_of(parameters, shape_of(parameters)).certain:
+            return False
+        _, misfit = self._lag(self._extraction(window), window)
+        self.parameters = parameters.replaced({'geometry.platform_side': NEGATIVE})
+        self.platform = StewartPlatform(self.parameters)
+        _, below = self._lag(self._extraction(window), window)
+        if below < _BETTER * misfit:
+            self.unknowns = Unknowns(self.parameters, self._options.kinds)
+            return True
+        self.parameters, self.platform = parameters, platform
+        return False
 
     def _extract(self, path: Path, number: int, extraction: Extraction, window: Window,
                  begin: float, last: Extract | None) -> Extract:
@@ -273,6 +303,8 @@ class Identification:
             change = noisy.regressor - extract.regressor
             found = np.einsum('nla,nlb->lab', change, change)
             self._noise = found if self._noise is None else self._noise + found
+            self._with_noise.append((Sums.of(extract.columns, extract.sound),
+                                     Sums.of(noisy.columns, extract.sound)))
             self._of_noise += len(change)
             if self._first is None:
                 self._first = extraction, window
@@ -293,14 +325,18 @@ class Identification:
                            'at limits.force_max')
         unsound = sum(int(np.count_nonzero(~each)) for each in self.chosen)
         sums = self._sums()
-        likely = [*of_delay((bag.lag, LONGEST_LAG) for bag in self.bags),
-                  *of_efforts(sums, unknowns, self.parameters, options.motor_torque)]
         found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
         outliers = self._leave_out_outliers(found)
         if outliers:
             sums = self._sums()
             found = fit(sums, unknowns, noise, options.prior, self._cutoffs())
+        likely = [*of_delay(bag.lag + delay for bag, delay in zip(
+                      self.bags, found.delays, strict=True)),
+                  *of_efforts(sums, unknowns, self.parameters, options.motor_torque)]
         errors = errors_of(self.extracts, sums, unknowns, found, self.chosen, options.prior)
+        clean, noisy = (Sums.stacked(each) for each in zip(*self._with_noise, strict=True))
+        shift = shift_of_noise(clean, noisy, unknowns, found, self._cutoffs(), options.prior)
+        errors = errors._replace(covariance=errors.covariance + np.outer(shift, shift))
         after = _rms(sums, unknowns, found.values, found.delays)
         measured = _measured(sums)
         lack = lack_of_fit(self.platform, self.extracts, unknowns, found, self.chosen)
@@ -380,7 +416,5 @@ def _rms(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
 
 
 def _measured(sums: Sums) -> Array:
-    effort = -ORDERS
-    squares = sums.grams[:, :, effort, effort].sum(axis=0)
-    rms: Array = np.sqrt(squares / np.maximum(sums.counts.sum(axis=0), 1))
+    rms: Array = np.sqrt(sums.effort_squares().sum(axis=0) / np.maximum(sums.counts.sum(axis=0), 1))
     return rms

@@ -36,14 +36,14 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.identification.extracts import Extracts
-from stewart_dynamics.identification.fit import directions, Fit, without_delay
+from stewart_dynamics.identification.fit import directions, Fit, strength_of, without_delay
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns
 
-# Half width of the smoothing of spectra [Hz]; length of the blocks of time [s], and their minimum
-# number.
-_SMOOTHING = 0.4
-_BLOCK = 2.5
+# Half width of the smoothing of spectra, relative to the sampling rate; number of samples in the
+# blocks of time, and their minimum number.
+_SMOOTHING = 0.01
+_BLOCK = 100
 _FEWEST_BLOCKS = 15
 
 
@@ -92,22 +92,19 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
         columns = block.columns * which[..., None]
         residuals = columns @ residual_of(theta, fit.delays[bag])
         weighted = columns @ e_of_bags[bag] / fit.variances[bag][:, None]
-        period = float(np.median(np.diff(block.times))) if len(block.times) > 1 else 1.0
         # The delay depends on the unknowns; its own error comes from its own column.
         follow = weighted[..., :-1] + weighted[..., -1:] * alongs[bag]
         both = np.concatenate([follow, weighted[..., -1:]], axis=-1)
-        middle = _by_frequency(both, residuals, period)
+        middle = _by_frequency(both, residuals)
         by_frequency += middle[:-1, :-1]
         own[bag] += middle[-1]
-        size = max(1, min(round(_BLOCK / period), len(residuals) // _FEWEST_BLOCKS))
+        size = max(1, min(_BLOCK, len(residuals) // _FEWEST_BLOCKS))
         products = np.einsum('nlk,nl->nk', follow, residuals)
         scores.append(np.add.reduceat(products, np.arange(0, len(products), size), axis=0))
     score = np.concatenate(scores) if scores else np.zeros((1, many))
     by_blocks = score.T @ score * len(score) / max(len(score) - 1, 1)
     known = fit.identifiability.known
-    inner = known.T @ fit.matrix @ known
-    if prior is not None:
-        inner = inner + known.T @ np.diag((prior * unknowns.scales) ** -2.0) @ known
+    inner = known.T @ (fit.matrix + strength_of(unknowns, prior)) @ known
     bread = known @ np.linalg.pinv(inner, hermitian=True) @ known.T
     candidates = [bread @ middle @ bread for middle in (by_frequency, by_blocks)]
     larger = np.sqrt(np.maximum(*(np.maximum(np.diag(each), 0.0) for each in candidates)))
@@ -122,13 +119,13 @@ def errors_of(extracts: Extracts, sums: Sums, unknowns: Unknowns, fit: Fit,
     return Errors(scale[:, None] * candidates[0] * scale, delays)
 
 
-def _by_frequency(weighted: Array, residuals: Array, period: float) -> Array:
+def _by_frequency(weighted: Array, residuals: Array) -> Array:
     """Return the inner sum of a block from columns (N, 6, k) and residuals (N, 6)."""
     many = len(residuals)
     size = 1 << (2 * many - 1).bit_length()
     r = np.fft.rfft(residuals, size, axis=0)
     spectra = np.einsum('fi,fj->fij', r, r.conj()) / many
-    width = max(1, round(_SMOOTHING * size * period))
+    width = max(1, round(_SMOOTHING * size))
     smooth = _smoothed(spectra, width)
     e = np.fft.rfft(weighted, size, axis=0)
     # one-sided: all frequencies except the first and the last count twice

@@ -53,9 +53,9 @@ _CAUSES = 3
 _IN_THE_FIT = 1e-8
 # Standard deviations above which the slower causes are tested as well.
 _SUSPICIOUS = 4.0
-# Highest frequency used, relative to the cut-off; half width of the smoothing of spectra [Hz], and
-# its minimum in frequencies.
-_BAND, _SMOOTHING, _FEWEST = 0.9, 0.5, 8
+# Highest frequency used, relative to the cut-off; half width of the smoothing of spectra, relative
+# to the sampling rate, and its minimum in frequencies.
+_BAND, _SMOOTHING, _FEWEST = 0.9, 0.0125, 8
 _COLLINEAR = 1e-7
 # The form of a cause, as that of Stribeck's curve, is known less well than its amount: intervals
 # are widened by this multiple of the change of each unknown.
@@ -183,8 +183,6 @@ def _lack_of_fit(platform: StewartPlatform, extracts: Extracts, unknowns: Unknow
     for geometry in (False, True):
         causes = _causes(platform, extracts, unknowns, fit, numbers, geometry)
         scores, follow, squares = _scores(causes, extracts, unknowns, fit, chosen, numbers)
-        # The shape of friction at a reversal is unknown because samples are too far apart.
-        scores = scores.without(causes.blur)
         if not geometry and max(each.deviations for each in _tested(causes.all, scores)) < (
                 _SUSPICIOUS):
             return None
@@ -272,14 +270,13 @@ def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
             sizes = np.sqrt(fit.variances[block.bag])[:, None]
             whole /= sizes
             first += len(residuals)
-            period = float(np.median(np.diff(block.times))) if len(block.times) > 1 else 1.0
-            spectra = _spectra(whole, period)
+            spectra = _spectra(whole)
             flat = spectra.reshape(-1, spectra.shape[-1])
             gram = flat.T @ flat if gram is None else gram + flat.T @ flat
             flat = (sizes * spectra).reshape(flat.shape)
             plain = flat.T @ flat if plain is None else plain + flat.T @ flat
             np.save(file, spectra)
-            np.save(file, period * len(whole))
+            np.save(file, len(whole))
         assert gram is not None and plain is not None
         # First weight by leg alone, as in the fit, then by the spectra of the residuals.
         inverse = _inverse(gram[:-1, :-1])
@@ -287,8 +284,8 @@ def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
         file.seek(0)
         weighted = np.zeros_like(gram)
         for _ in numbers:
-            spectra, seconds = np.load(file), float(np.load(file))
-            flat = _whitened(spectra, rest, inverse, seconds).reshape(-1, len(gram))
+            spectra, samples = np.load(file), int(np.load(file))
+            flat = _whitened(spectra, rest, inverse, samples).reshape(-1, len(gram))
             weighted += flat.T @ flat
     follow = -_inverse(gram[:inner, :inner]) @ gram[:inner, inner:-1]
 
@@ -300,10 +297,10 @@ def _scores(causes: Causes, extracts: Extracts, unknowns: Unknowns, fit: Fit,
     return (beside_the_fit(weighted), known @ follow[:known.shape[1]], beside_the_fit(plain))
 
 
-def _spectra(columns: Array, period: float) -> Array:
+def _spectra(columns: Array) -> Array:
     """Return real and imaginary parts (F, 2, 6, m) at frequencies below the cut-off."""
     many = len(columns)
-    spectra = np.fft.rfft(columns, axis=0)[:int(many * period * _BAND / (SAMPLES * period)) + 1]
+    spectra = np.fft.rfft(columns, axis=0)[:int(many * _BAND / SAMPLES) + 1]
     # one-sided: all frequencies except the first count twice
     spectra *= np.sqrt(2.0 / many)
     spectra[0] *= np.sqrt(0.5)
@@ -311,13 +308,13 @@ def _spectra(columns: Array, period: float) -> Array:
     return parts
 
 
-def _whitened(spectra: Array, rest: Array, inverse: Array, seconds: float) -> Array:
+def _whitened(spectra: Array, rest: Array, inverse: Array, samples: int) -> Array:
     """Return the columns (F, 2, 6, m), whitened by the residuals of a fit with all causes."""
     left = spectra[..., -1] - spectra[..., :-1] @ rest
     # The fit of the columns reduces the variance of a residual below the noise variance.
     flat = spectra[..., :-1].reshape(-1, len(rest))
     free = 1.0 - np.sum((flat @ inverse) * flat, axis=1).reshape(left.shape)
-    width = max(_FEWEST, round(_SMOOTHING * seconds))
+    width = max(_FEWEST, round(_SMOOTHING * samples))
     power, share = (_smoothed(each.sum(axis=1), width) for each in (left ** 2, free))
     deviations = np.sqrt(power / np.maximum(share, 1e-3 * 4 * width) + 1e-30)
     white = left / deviations[:, None]

@@ -55,8 +55,13 @@ _UNEXPLAINED = 0.3
 _BETTER = 0.5
 # Minimum fraction of valid samples for a comparison.
 _FEWEST = 0.5
-# Duration of the part that is searched [s], longer if the filters need it.
-_PIECE = 5.0
+# Length of the part that is searched, in cut-off periods, longer if the filters need it.
+_PIECE = 50.0
+# Largest delay of the efforts that is estimated [s]: delays come from buses and computers, and do
+# not scale with the hexapod.
+LONGEST_LAG = 0.1
+# Tolerance of limits of length, relative to them.
+_TOLERANCE = 1e-3
 
 
 class LikelyMistake(NamedTuple):
@@ -76,21 +81,19 @@ def of_no_pose(p: Parameters, positions: Array) -> str:
             f'they are {low:.4g} to {high:.4g} m')
     least, most = p['limits.length_min'], p['limits.length_max']
     if least is not None and most is not None and (
-            low < least.min() - 1e-3 or high > most.max() + 1e-3):
+            low < (1.0 - _TOLERANCE) * least.min() or high > (1.0 + _TOLERANCE) * most.max()):
         return (f'{text}, and limits.length_min and length_max are {least.min():g} and '
                 f'{most.max():g} m: likely geometry.zero_length is wrong, or positions are in '
                 'another unit')
     return f'{text}: likely geometry.zero_length or the geometry is wrong, or legs are swapped'
 
 
-def of_delay(bags: Iterable[tuple[float, float]]) -> Iterator[LikelyMistake]:
-    """Yield a likely mistake for bags, given as delay and its upper limit [s]."""
-    for delay, limit in bags:
-        if delay >= limit:
-            yield LikelyMistake(
-                'delay', f'the efforts are later than the positions by {limit:g} s or '
-                'more: stamps of both must be of one clock')
-            return
+def of_delay(delays: Iterable[float]) -> Iterator[LikelyMistake]:
+    """Yield a likely mistake for bags with these delays of the efforts [s]."""
+    if max(delays) >= LONGEST_LAG:
+        yield LikelyMistake(
+            'delay', f'the efforts are later than the positions by {LONGEST_LAG:g} s or more: '
+            'stamps of both must be of one clock')
 
 
 def of_efforts(sums: Sums, unknowns: Unknowns, p: Parameters, motor_torque: bool,
@@ -226,7 +229,7 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
                 continue
             # efforts = scale known + Y theta'
             columns = np.zeros((len(gram), many + 1))
-            columns[:many, :many] = np.eye(many)
+            columns[:many, :many] = np.diag(unknowns.linear_scales)
             columns[known, many] = 1.0
             if platform_too:
                 columns[:known, many] = theta
@@ -254,7 +257,8 @@ def _scale(sums: Sums, unknowns: Unknowns, platform_too: bool) -> tuple[float, f
 
 def most_motion(window: Window, extraction: Extraction) -> Window:
     """Return the part of a window with the most motion, long enough for the filters."""
-    many = min(len(window.positions), max(round(_PIECE / window.period), 4 * extraction.margin))
+    seconds = _PIECE / extraction.cutoff + LONGEST_LAG
+    many = min(len(window.positions), max(round(seconds / window.period), 4 * extraction.margin))
     moved = np.cumsum(np.abs(np.diff(window.positions, axis=0, prepend=window.positions[:1])
                              ).sum(axis=1))
     first = int(np.argmax(moved[many - 1:] - moved[:len(moved) - many + 1]))

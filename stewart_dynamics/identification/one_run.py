@@ -99,7 +99,7 @@ def _rounded(found: Identified) -> Parameters:
     for n, (value, error) in enumerate(zip(values, errors, strict=True)):
         if error > 0.0 and math.isfinite(error):
             # to a hundredth of the standard error
-            values[n] = round(value, int(np.clip(2 - math.floor(math.log10(error)), 0, 15)))
+            values[n] = round(value, max(0, 2 - math.floor(math.log10(error))))
     try:
         return found.unknowns.parameters(values)
     except StewartError:  # a body at its bound may not be rounded

@@ -83,18 +83,21 @@ def _held(matrix: Array, values: Array, free: Flags) -> Array:
 
 def _as_body(unknowns: Unknowns, values: Array, matrix: Array) -> Array:
     """Return the nearest values with a physical platform, in the metric of information."""
+    units = unknowns.inertial_scales
+
     def candidate(eta: Array) -> Array:
-        return unknowns.with_inertial(values, from_log_cholesky(eta))
+        return unknowns.with_inertial(values, units * from_log_cholesky(eta))
 
     many = unknowns.many_of_platform
+    scales = unknowns.scales[:many]
     metric = matrix[:many, :many]
-    eta = log_cholesky(unknowns.inertial(unknowns.start))
+    eta = log_cholesky(unknowns.inertial(unknowns.start) / units)
     found = candidate(eta)
     damping = 1e-3
     for _ in range(_STEPS):
         off = (found - values)[:many]
-        derivative = np.linalg.pinv(unknowns.derivative(found)[:10, :many]) @ (
-            log_cholesky_derivative(eta))
+        scaled = unknowns.derivative(found)[:10, :many] * scales / units[:, None]
+        derivative = scales[:, None] * np.linalg.pinv(scaled) @ log_cholesky_derivative(eta)
         normal = derivative.T @ metric @ derivative
         step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12),
                                -derivative.T @ metric @ off)

@@ -22,7 +22,7 @@ combination of these columns; so are its derivatives by theta and by d.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import math
 from typing import NamedTuple
 
@@ -49,6 +49,20 @@ class Sums(NamedTuple):
     grams: Array
     counts: Integers
 
+    @classmethod
+    def of(cls, columns: Array, which: Flags) -> Sums:
+        """Return the sums of one bag from columns (N, 6, q) and the efforts (N, 6) to use."""
+        grams = np.empty((1, 6, *2 * columns.shape[-1:]))
+        for leg in range(6):
+            used = columns[which[:, leg], leg]
+            grams[0, leg] = used.T @ used
+        return cls(grams, np.count_nonzero(which, axis=0)[None])
+
+    @classmethod
+    def stacked(cls, of_bags: Sequence[Sums]) -> Sums:
+        """Return the sums of several bags together."""
+        return cls(*(np.concatenate(each) for each in zip(*of_bags, strict=True)))
+
     def plus(self, other: Sums) -> Sums:
         """Return the sums of both."""
         return Sums(self.grams + other.grams, self.counts + other.counts)
@@ -61,21 +75,19 @@ class Sums(NamedTuple):
             found[bag] = np.einsum('i,lij,j->l', c, self.grams[bag], c)
         return np.maximum(found, 0.0)
 
+    def effort_squares(self) -> Array:
+        """Return the sums of squared efforts (B, 6)."""
+        squares: Array = self.grams[:, :, -ORDERS, -ORDERS]
+        return squares
+
 
 def sums_of(extracts: Extracts, bags: int, chosen: Callable[[Block], Flags]) -> Sums:
     """Return the sums of the efforts (N, 6) that a function chooses in each block."""
-    grams: Array | None = None
-    counts = np.zeros((bags, 6), dtype=np.int64)
+    of_bags: dict[int, Sums] = {}
     for block in extracts:
-        if grams is None:
-            many = block.columns.shape[-1]
-            grams = np.zeros((bags, 6, many, many))
-        which = chosen(block)
-        for leg in range(6):
-            columns = block.columns[which[:, leg], leg]
-            grams[block.bag, leg] += columns.T @ columns
-        counts[block.bag] += np.count_nonzero(which, axis=0)
-    return Sums(np.zeros((bags, 6, 0, 0)) if grams is None else grams, counts)
+        found = Sums.of(block.columns, chosen(block))
+        of_bags[block.bag] = of_bags[block.bag].plus(found) if block.bag in of_bags else found
+    return Sums.stacked([of_bags[bag] for bag in range(bags)])
 
 
 def residual_of(theta: Array, delay: float) -> Array:

@@ -62,10 +62,10 @@ _WEIGHING = np.concatenate([[0], *(np.arange(LINEAR)[part] for part in (
 
 # Scale of a tilt [rad].
 _TILT = 0.1
-# Rate at which the scale of friction equals a leg's share of the weight [m/s].
-_RATE = 0.25
-# Acceleration at which the scale of inertial effects equals that share [m/s^2].
+# Acceleration at which the scale of inertial effects equals a leg's share of the weight [m/s^2].
 _ACCELERATION = 10.0
+# Rate at which the scale of friction equals that share, relative to sqrt(acceleration size).
+_RATE = 0.1
 
 
 class Unknowns:
@@ -89,6 +89,8 @@ class Unknowns:
         Relevant change of each parameter.
     linear : (m,)
         Indices of the LINEAR parameters that depend on them; the platform's ten come first.
+    inertial_scales, linear_scales : (10,), (m,)
+        Mass of the platform with powers of its size; scales of ``linear``.
     weighing : (w,)
         Elements of ``linear`` whose forces depend on gravity.
     legs : range
@@ -131,6 +133,9 @@ class Unknowns:
         self.scales: Array = np.concatenate([
             _platform_scales(p)[self._platform], _leg_scales(p)[legs],
             np.full(len(of_tilt), _TILT)])
+        mass, size = p['platform.mass'], _size(p)
+        self.inertial_scales: Array = mass * np.repeat([1.0, size, size ** 2], [1, 3, 6])
+        self.linear_scales: Array = np.concatenate([self.inertial_scales, _leg_scales(p)[legs]])
 
     @property
     def many_of_platform(self) -> int:
@@ -237,7 +242,7 @@ class Unknowns:
 
 
 def _alike(value: Any, other: Any) -> bool:
-    return bool(np.allclose(value, other, rtol=1e-9, atol=1e-12))
+    return bool(np.allclose(value, other, rtol=1e-9, atol=1e-12 * np.abs(other).max()))
 
 
 def _inertial(platform: Array) -> Array:
@@ -275,12 +280,12 @@ def _platform_scales(p: Parameters) -> Array:
 def _leg_scales(p: Parameters) -> Array:
     """Return scales of the linear parameters; only the leg parameters are set."""
     mass, length = p['platform.mass'] / 6.0, 2.0 * _size(p)
-    weight = _ACCELERATION * mass
+    weight, rate = _ACCELERATION * mass, _RATE * np.sqrt(_ACCELERATION * _size(p))
     scales: Array = np.empty(LINEAR)
     for kind, scale in ((CYLINDER_FIRST, mass * length), (CYLINDER_SECOND, mass * length ** 2),
                         (PISTON_MASS, mass), (PISTON_FIRST, mass * length),
                         (PISTON_SECOND, mass * length ** 2), (REFLECTED_MASS, mass),
-                        (VISCOUS_FRICTION, weight / _RATE), (COULOMB_FRICTION, weight),
+                        (VISCOUS_FRICTION, weight / rate), (COULOMB_FRICTION, weight),
                         (OFFSET, weight)):
         scales[kind] = scale
     return scales
