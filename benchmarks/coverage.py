@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Study of how often the 95 % intervals of stewart_identify contain the truth, from motions of 0.1 mm.
+Study of how often the intervals of stewart_identify contain the truth, from motions of 0.1 mm.
 
 The noise is the same for all motions. Run by hand, ``make bench-coverage``; see README.md in this
 folder.

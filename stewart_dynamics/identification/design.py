@@ -220,7 +220,8 @@ class _Search:
     def _parameters(self, coefficients: Array) -> ReferenceMotionParameters:
         many, options = self._options.harmonics, self._options
         digits = _DIGITS - round(math.log10(self._length))
-        rounded = np.hstack([coefficients[:, :3].round(digits), coefficients[:, 3:].round(_DIGITS)])
+        rounded = np.hstack([
+            coefficients[:, :3].round(digits), coefficients[:, 3:].round(_DIGITS)])
         given: dict[str, Any] = {
             'base_frame': self.platform.parameters['base_frame'], 'rate': options.rate,
             'motion.type': 'fourier', 'motion.duration': options.duration,

@@ -166,11 +166,11 @@ class Extraction:
 
     def lag(self, window: Window, guess: Pose, longest: float) -> tuple[int, float]:
         """
-        Return a coarse lag of the efforts behind the positions, in samples, and the squared misfit.
+        Return a coarse lag of the efforts behind the positions, and the squared misfit.
 
-        It is the lag with the smallest residual, in steps of a fraction of a cut-off period; 0
-        unless the residual is much smaller than without a lag. The misfit is relative to the
-        efforts, whatever the values of the linear parameters.
+        It is the lag in samples with the smallest residual, in steps of a fraction of a cut-off
+        period; 0 unless the residual is much smaller than without a lag. The misfit is relative
+        to the efforts, whatever the values of the linear parameters.
         """
         extract = self(window, guess)
         efforts = convolved(window.efforts[self._wide.half:-self._wide.half], self._narrow.taps())

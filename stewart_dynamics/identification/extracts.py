@@ -53,8 +53,8 @@ class Extracts:
 
     def add(self, bag: int, begin: float, extract: Extract) -> None:
         """Add the extract of a window of a bag that begins at a time [s]."""
-        for array in (begin + extract.times, extract.columns, extract.sound, extract.legs, extract.slip,
-                      extract.poses):
+        for array in (begin + extract.times, extract.columns, extract.sound, extract.legs,
+                      extract.slip, extract.poses):
             np.save(self._file, array)
         self._bags.append(bag)
         self.samples += len(extract.times)

@@ -416,5 +416,6 @@ def _rms(sums: Sums, unknowns: Unknowns, values: Array, delays: Array) -> Array:
 
 
 def _measured(sums: Sums) -> Array:
-    rms: Array = np.sqrt(sums.effort_squares().sum(axis=0) / np.maximum(sums.counts.sum(axis=0), 1))
+    squares = sums.effort_squares().sum(axis=0)
+    rms: Array = np.sqrt(squares / np.maximum(sums.counts.sum(axis=0), 1))
     return rms
