@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
+from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
@@ -43,6 +44,9 @@ from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 # Names of the codes of ``travel``.
 _ENDS = np.array(['length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max',
                   'singularity', ''])
+# Rounds in which the least tilt between two azimuths is found.
+_ZOOMS = 6
+_AROUND: Array = np.linspace(-1.0, 1.0, 33, dtype=np.float64)
 
 
 class Extent(NamedTuple):
@@ -67,6 +71,17 @@ class Extent(NamedTuple):
     limit: Any
     leg: Any
     sample: int | None = None
+
+
+class Tilt(NamedTuple):
+    """How far a platform can tilt."""
+
+    azimuths: Array
+    """Angles of the axes from the base's x axis (N,) [rad]."""
+    extents: Extent
+    """Travel about each axis (N,) [rad]."""
+    total: Extent
+    """The smallest about all axes [rad], between the azimuths, too."""
 
 
 class Capability:
@@ -184,13 +199,95 @@ class Capability:
         factor, worst = self._boxes(pose, pivot).factor(ranges)
         return Extent(factor, worst.limit, worst.leg)
 
+    def smallest(self, quantity: Callable[[Pose], ArrayLike], box: ArrayLike,
+                 pose: Pose | Motion | None = None, pivot: ArrayLike | None = None) -> InBox:
+        """
+        Return the smallest value of a quantity over a box of ranges, and its pose: searched.
+
+        Corners, random poses and a search along the coordinates; not a proof.
+        ``capability.smallest(capability.force, box)`` is the force that can be exerted everywhere.
+
+        Parameters
+        ----------
+        quantity : callable
+            Takes poses of shape (N,), returns (N,).
+        box, pose, pivot
+            As in ``reachable``.
+
+        """
+        ranges, boxes = checked_ranges(box), self._boxes(pose, pivot)
+        return smallest(lambda poses: np.asarray(quantity(poses), dtype=float), boxes.poses,
+                        ranges)
+
+    def section(self, pose: Pose | Motion | None = None, normal: str = 'z') -> Section:
+        """
+        Return the reachable positions in a plane through a pose, at its rotation.
+
+        The curves on which lengths and joint angles end are exact; holes are holes. Boundaries at
+        singularities, if there are any, are exact at points of a grid of 128 x 128.
+
+        Parameters
+        ----------
+        pose : Pose or Motion of one sample, optional
+            By default the home pose.
+        normal : 'x', 'y' or 'z'
+            Base axis normal to the plane: the platform's origin has the pose's coordinate there.
+
+        """
+        self._required(limits.LENGTH_MAX)
+        if normal not in ('x', 'y', 'z'):
+            raise wrong_type('normal', normal, "'x', 'y' or 'z'")
+        return section(self.platform, self._axes, self._single(pose), 'xyz'.index(normal))
+
+    def tilt(self, pose: Pose | Motion | None = None, pivot: ArrayLike | None = None,
+             azimuths: int = 360) -> Tilt:
+        """
+        Return how far the platform can tilt about every horizontal axis, and about all of them.
+
+        Parameters
+        ----------
+        pose : Pose or Motion of one sample, optional
+            By default the home pose.
+        pivot : (3,), optional
+            Point that the platform turns about, platform frame [m]; by default its origin.
+        azimuths : int
+            Number of axes, in the base's x-y plane, at equal angles from x.
+
+        """
+        start = self._single(pose)
+        if azimuths < 3:
+            raise wrong_type('azimuths', azimuths, 'at least 3')
+
+        def about(angles: Array) -> Extent:
+            directions = np.zeros((len(angles), 6))
+            directions[:, 3], directions[:, 4] = np.cos(angles), np.sin(angles)
+            return self.travel(start, directions, pivot)
+
+        step = 2.0 * math.pi / azimuths
+        angles: Array = step * np.arange(azimuths, dtype=float)
+        found = about(angles)
+        middle = angles[int(np.argmin(found.value))]
+        for _ in range(_ZOOMS):  # toward the least one between two azimuths
+            near: Array = middle + step * _AROUND
+            close = about(near)
+            at = int(np.argmin(close.value))
+            middle, step = near[at], step / 16.0
+        total = Extent(float(close.value[at]), str(close.limit[at]), int(close.leg[at]))
+        return Tilt(angles, found, total)
+
+    def _single(self, pose: Pose | Motion | None) -> Motion:
+        """Return one pose at rest, by default home."""
+        start = self.platform.home_pose() if pose is None else pose
+        row = motion_rows(start)
+        if start.shape:
+            raise MotionError(f'pose: shape {start.shape}: must be a single one')
+        return Motion.of_rows(row[0])
+
     def _boxes(self, pose: Pose | Motion | None, pivot: ArrayLike | None) -> Boxes:
-        pose = self.platform.home_pose() if pose is None else pose
         center = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
-        for name, shape in (('pose', pose.shape), ('pivot', center.shape[:-1])):
-            if shape:
-                raise MotionError(f'{name}: shape {shape}: must be a single one')
-        return Boxes(self.platform, self._axes, self._bounds, motion_rows(pose)[0], center)
+        if center.ndim > 1:
+            raise MotionError(f'pivot: shape {center.shape}: must be (3,)')
+        return Boxes(self.platform, self._axes, self._bounds, self._single(pose).rows, center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
                ) -> Extent:

@@ -116,7 +116,7 @@ class Boxes:
             certain, singular if not certain or part_of_condition > part else worst)
 
     def factor(self, ranges: Array) -> tuple[float, Worst]:
-        """Return the largest factor by which a box can be scaled, and what limits it."""
+        """Return the largest factor by which a box can be scaled, and the limit that ends it."""
         # rotation vectors of more than a turn add nothing
         turned = float(np.abs(ranges[3:]).max())
         most = 2.0 * math.pi / turned if turned > 0.0 else math.inf
@@ -139,7 +139,7 @@ class Boxes:
         parts = np.where(limited, found[:, boxes.EXCESS] / sizes, -math.inf)
         at = int(parts.argmax())
         certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * sizes))
-        return _Proof(Worst(self._pose(found[at, boxes.POINT]), at % 6, _CODES[at // 6],
+        return _Proof(Worst(self.poses(found[at, boxes.POINT]), at % 6, _CODES[at // 6],
                             float(found[at, boxes.EXCESS])), certain, float(parts[at]))
 
     def _worst_condition(self, box: Array) -> _Proof:
@@ -149,17 +149,18 @@ class Boxes:
             self._platform.constants, self._axes, self._row, self._pivot, box, self._stop,
             _MOST_OF_CONDITION, self._legs, self._cells, self._rows, found, count)
         excess = float(found[boxes.EXCESS])
-        return _Proof(Worst(self._pose(found[boxes.POINT]), -1, 'singularity', excess),
+        return _Proof(Worst(self.poses(found[boxes.POINT]), -1, 'singularity', excess),
                       bool(found[boxes.UPPER] == 0.0), excess / self._stop)
 
-    def _pose(self, point: Array) -> Pose:
-        """Return the pose of translation and rotation vector (6,)."""
+    def poses(self, points: Array) -> Pose:
+        """Return the poses of translations and rotation vectors (..., 6)."""
         start = Pose.of_rows(self._row[POSE].copy())
-        angle = float(np.linalg.norm(point[3:]))
-        turn = Pose.from_quaternion(np.zeros(3), np.append(
-            0.5 * np.sinc(angle / (2.0 * math.pi)) * point[3:], math.cos(0.5 * angle)))
-        rotation = turn.rotation @ start.rotation
-        return Pose(start.position + start.rotation @ self._pivot + point[:3]
+        angle = np.linalg.norm(points[..., 3:], axis=-1, keepdims=True)
+        quaternions = np.concatenate([0.5 * np.sinc(angle / (2.0 * math.pi)) * points[..., 3:],
+                                      np.cos(0.5 * angle)], axis=-1)
+        turn = Pose.from_quaternion(points[..., :3], quaternions).rotation
+        rotation = turn @ start.rotation
+        return Pose(start.position + start.rotation @ self._pivot + points[..., :3]
                     - rotation @ self._pivot, rotation)
 
 

@@ -1,0 +1,324 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Sections of the workspace at a fixed rotation.
+
+At a fixed rotation a platform joint moves with the platform, so the end of leg i is at ``x - e_i``
+from its base joint with a constant ``e_i``: a limit of its length is a sphere around ``e_i``, a
+limit of an angle at one of its joints a cone with the tip ``e_i``. A plane cuts them in circles
+and conics. The boundary of the section are the parts of these curves where all other limits are
+kept: holes stay holes. Where circles cross is known in closed form, so no arc is missed; where an
+arc crosses another limit is found by bisection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array, Flags
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.limits import (
+    BASE_ANGLE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS)
+from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS, MOTION, POSITION
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+
+# Points of a curve at least, and steps of a bisection.
+_POINTS, _STEPS = 360, 50
+# Random poses and starts of the search in a box, and its last step relative to the ranges.
+_TRIALS, _STARTS, _FINEST = 1000, 8, 1e-6
+# Circles that differ by less, relative to their radius, are one.
+_SAME = 1e-9
+# Lines of the grid on which boundaries at singularities are found.
+_GRID = 129
+
+_Curve = Callable[[Array], Array]
+
+
+class Boundary(NamedTuple):
+    """A part of the boundary of a section, which one limit of one leg forms."""
+
+    limit: str
+    """Name of the limit without ``limits.``, or ``singularity``."""
+    leg: int
+    """Index of the leg; -1 at a singularity."""
+    points: Array
+    """Positions of the platform's origin (M, 3) in order, base frame [m]; of a closed curve the
+    first one again at the end."""
+
+
+class Section(NamedTuple):
+    """Reachable positions of the platform's origin in a plane, at a fixed rotation."""
+
+    boundary: tuple[Boundary, ...]
+    """Parts of the boundary, in no order; empty where nothing is reachable."""
+    loops: tuple[Array, ...]
+    """
+    The same joined to closed curves (M, 3).
+
+    A position is reachable where a line from it crosses them an odd number of times.
+    """
+
+
+def section(platform: StewartPlatform, axes: Array, start: Motion, normal: int) -> Section:
+    """
+    Return the section through a pose, at its rotation, in a plane.
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        With ``limits.length_max``.
+    axes : (12, 3)
+        As in ``travel.travels``.
+    start : Motion of one sample
+        det(J) has the same sign in all of the section.
+    normal : int
+        Index of the base axis that is normal to the plane.
+
+    """
+    plane = _Plane(platform, start, normal)
+    found = [each for name, leg, curve, crossings in _curves(platform, axes, start, normal)
+             for each in plane.parts(name, leg, curve, crossings)]
+    found += plane.singular(found)
+    return Section(tuple(found), tuple(_joined([each.points for each in found])))
+
+
+class _Plane:
+    """A plane of positions at the rotation of a pose."""
+
+    def __init__(self, platform: StewartPlatform, start: Motion, normal: int) -> None:
+        self._platform, self._row, self._normal = platform, start.rows, normal
+        self._limits = Limits(platform.parameters)
+        self._side = float(platform.solve(start.rows[None])[0, DETERMINANT])
+        self._stop = platform.parameters['singularity.stop_condition']
+
+    def regular(self, points: Array) -> Flags:
+        """Return at which positions (N, 3) the condition number and the sign of det(J) hold."""
+        solved = self._platform.solve(self._rows(points))
+        with np.errstate(all='ignore'):
+            regular: Flags = (solved[:, CONDITION] < self._stop) & (
+                solved[:, DETERMINANT] * self._side > 0.0)
+        return regular
+
+    def within(self, points: Array) -> Flags:
+        """Return at which positions (N, 3) lengths and angles of the joints keep their limits."""
+        kept: Flags = np.asarray(np.isfinite(points).all(axis=1))
+        rows = self._rows(points[kept])
+        lengths = self._platform.solve(rows)[:, LENGTHS]
+        exceeded = self._limits.exceeds(LENGTH_MAX, lengths).any(axis=1)
+        if LENGTH_MIN in self._limits.bounds:
+            exceeded |= self._limits.exceeds(LENGTH_MIN, lengths).any(axis=1)
+        if self._limits.of_joints and len(rows):
+            angles = self._platform.joint_angles(Motion.of_rows(rows))
+            for name, each in zip(OF_JOINTS, angles, strict=True):
+                if name in self._limits.of_joints:
+                    exceeded |= self._limits.exceeds(name, each).any(axis=1)
+        kept[kept] = ~exceeded
+        return kept
+
+    def parts(self, name: str, leg: int, curve: _Curve, crossings: Array,
+              ) -> Iterator[Boundary]:
+        """Yield the parts of a closed curve of an angle that keep all limits."""
+        edges = np.unique(np.concatenate([
+            np.linspace(0.0, 2.0 * math.pi, _POINTS, endpoint=False),
+            np.mod(crossings, 2.0 * math.pi)]))
+        # between two edges at most one circle begins or ends
+        at = 0.5 * (edges + np.append(edges[1:], edges[0] + 2.0 * math.pi))
+
+        def good(angles: Array) -> Flags:
+            points = curve(angles)
+            kept = self.within(points)
+            kept[kept] = self.regular(points[kept])
+            return kept
+
+        kept = good(at)
+        if kept.all():
+            yield Boundary(name, leg, curve(np.append(at, at[0])))
+        if kept.all() or not kept.any():
+            return
+        first = int(np.argmin(kept))
+        at = np.concatenate([at[first:], at[:first + 1] + 2.0 * math.pi])
+        kept = np.concatenate([kept[first:], kept[:first + 1]])
+        changes = np.flatnonzero(kept[1:] != kept[:-1])
+        low, high = at[changes], at[changes + 1]
+        for _ in range(_STEPS):
+            middle = 0.5 * (low + high)
+            same = good(middle) == kept[changes]
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        ends = np.where(kept[changes], low, high)
+        for n in range(0, len(changes), 2):
+            between = at[changes[n] + 1:changes[n + 1] + 1]
+            yield Boundary(name, leg, curve(np.concatenate([
+                ends[n:n + 1], between, ends[n + 1:n + 2]])))
+
+    def singular(self, others: list[Boundary]) -> Iterator[Boundary]:
+        """Yield the boundary at singularities, in the range that the other limits leave."""
+        # the curves of the other limits end there as well, or enclose it
+        rows = np.array([self._row[POSITION]])
+        points = np.concatenate([rows, *(each.points for each in others)])
+        i, j = (n for n in range(3) if n != self._normal)
+        low, high = points.min(axis=0), points.max(axis=0)
+        x, y = (np.linspace(low[n], high[n], _GRID) for n in (i, j))
+        grid = np.tile(rows, (_GRID * _GRID, 1))
+        grid[:, i], grid[:, j] = (each.ravel() for each in np.meshgrid(x, y, indexing='ij'))
+        regular = self.regular(grid)
+        if regular.all():
+            return
+        index = np.arange(_GRID * _GRID).reshape(_GRID, _GRID)
+        regular = regular.reshape(_GRID, _GRID)
+        edges = np.concatenate([
+            np.stack([index[:-1][regular[1:] != regular[:-1]],
+                      index[1:][regular[1:] != regular[:-1]]], axis=1),
+            np.stack([index[:, :-1][regular[:, 1:] != regular[:, :-1]],
+                      index[:, 1:][regular[:, 1:] != regular[:, :-1]]], axis=1)])
+        start, end = grid[edges[:, 0]], grid[edges[:, 1]]
+        begins = regular.ravel()[edges[:, 0]]
+        for _ in range(_STEPS):
+            middle = 0.5 * (start + end)
+            same = (self.regular(middle) == begins)[:, None]
+            start, end = np.where(same, middle, start), np.where(same, end, middle)
+        on = dict(zip(map(tuple, edges.tolist()), start, strict=True))
+        corners = index[:-1, :-1].ravel()[:, None] + np.array([0, _GRID, _GRID + 1, 1])
+        for a, b, c, d in corners.tolist():
+            crossed = [on[edge] for edge in ((a, b), (b, c), (d, c), (a, d)) if edge in on]
+            for n in range(0, len(crossed) - 1, 2):
+                piece = np.array(crossed[n:n + 2])
+                if self.within(piece).all():
+                    yield Boundary('singularity', -1, piece)
+
+    def _rows(self, points: Array) -> Array:
+        rows = np.zeros((len(points), MOTION))
+        rows[:] = self._row
+        rows[:, POSITION] = points
+        return rows
+
+
+def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
+            ) -> Iterator[tuple[str, int, _Curve, Array]]:
+    """Yield the curve of each limit of each leg in a plane, and where circles cross it."""
+    p = platform.parameters
+    bounds = Limits(p).bounds
+    rotation, height = start.rotation, start.position[normal]
+    tips = p['geometry.base_joints'] - p['geometry.platform_joints'] @ rotation.T
+    i, j = (n for n in range(3) if n != normal)
+    above = height - tips[:, normal]
+    circles: list[tuple[str, int, float]] = []
+    for name in (LENGTH_MIN, LENGTH_MAX):
+        for leg, square in enumerate(bounds.get(name, np.zeros(6)) ** 2 - above ** 2):
+            radius = math.sqrt(max(square, 0.0))
+            # two legs that mirror each other have one circle
+            if radius > 0.0 and not any(
+                    math.hypot(*(tips[other] - tips[leg])[[i, j]]) + abs(its - radius)
+                    < _SAME * radius for _, other, its in circles):
+                circles.append((name, leg, radius))
+    for name, leg, radius in circles:
+        center = tips[leg]
+        crossings: list[float] = []
+        for _, other, its in circles:
+            across = tips[other] - center
+            distance = math.hypot(across[i], across[j])
+            if distance > 0.0:
+                cosine = (distance ** 2 + radius ** 2 - its ** 2) / (2.0 * distance * radius)
+                if abs(cosine) <= 1.0:
+                    toward = math.atan2(across[j], across[i])
+                    crossings += [toward - math.acos(cosine), toward + math.acos(cosine)]
+
+        def circle(angles: Array, center: Array = center, radius: float = radius) -> Array:
+            points = np.tile(center, (len(angles), 1))
+            points[:, i] += radius * np.cos(angles)
+            points[:, j] += radius * np.sin(angles)
+            points[:, normal] = height
+            return points
+
+        yield name.removeprefix('limits.'), leg, circle, np.array(crossings)
+    for name in OF_JOINTS:
+        for leg, bound in enumerate(bounds.get(name, ())):
+            axis = axes[leg] if name == BASE_ANGLE_MAX else rotation @ axes[6 + leg]
+            across = np.eye(3)[np.argmin(np.abs(axis))]
+            first = np.cross(axis, across) / np.linalg.norm(np.cross(axis, across))
+            frame = np.stack([first, np.cross(axis, first), axis])
+            tip, up = tips[leg], above[leg]
+
+            def conic(angles: Array, tip: Array = tip, up: float = up, frame: Array = frame,
+                      bound: float = bound) -> Array:
+                lines = np.stack([math.sin(bound) * np.cos(angles),
+                                  math.sin(bound) * np.sin(angles),
+                                  np.full(len(angles), math.cos(bound))], axis=1) @ frame
+                with np.errstate(all='ignore'):
+                    by = up / lines[:, normal]
+                    points: Array = tip + np.where(by > 0.0, by, math.nan)[:, None] * lines
+                points[:, normal] = np.where(by > 0.0, height, math.nan)
+                return points
+
+            yield name.removeprefix('limits.'), leg, conic, np.empty(0)
+
+
+def _joined(pieces: list[Array]) -> Iterator[Array]:
+    """Yield closed curves of pieces, each of whose ends is joined to the nearest other one."""
+    waiting = [each for each in pieces if len(each)]
+    while waiting:
+        loop = waiting.pop(0)
+        while waiting:
+            ends = np.array([(each[0], each[-1]) for each in waiting])
+            distances = np.linalg.norm(ends - loop[-1], axis=2)
+            at, side = divmod(int(distances.argmin()), 2)
+            if np.linalg.norm(loop[0] - loop[-1]) <= distances[at, side]:
+                break
+            following = waiting.pop(at)
+            loop = np.concatenate([loop, following[::-1] if side else following])
+        yield np.concatenate([loop, loop[:1]])
+
+
+class InBox(NamedTuple):
+    """The smallest value of a quantity that was found in a box, and its pose."""
+
+    value: float
+    pose: Pose
+
+
+def smallest(quantity: Callable[[Pose], Array], poses: Callable[[Array], Pose], ranges: Array,
+             ) -> InBox:
+    """
+    Return the smallest value of a quantity that a search finds in a box (6, 2).
+
+    Its corners, random poses, and from the smallest of them a search along the coordinates with
+    smaller and smaller steps.
+    """
+    random = np.random.default_rng(0)
+    low, high = ranges.T
+    bits = (np.arange(64)[:, None] >> np.arange(6)) & 1
+    corners = np.where(bits == 1, high, low)
+    inside = random.uniform(low, high, (_TRIALS, 6))
+    on_sides = np.where(random.random((_TRIALS, 6)) < 0.3, inside,
+                        corners[random.integers(64, size=_TRIALS)])
+    points = np.concatenate([corners, inside, on_sides])
+    values = quantity(poses(points))
+    best = np.argsort(values)[:_STARTS]
+    points, values, step = points[best], values[best], 0.25
+    moves = np.concatenate([np.eye(6), -np.eye(6)])
+    while step > _FINEST:
+        trials = np.clip(points[:, None] + step * (high - low) * moves, low, high)
+        found = quantity(poses(trials.reshape(-1, 6))).reshape(len(points), -1)
+        at = found.argmin(axis=1)
+        better = found.min(axis=1) < values
+        points = np.where(better[:, None], trials[np.arange(len(points)), at], points)
+        values = np.where(better, found.min(axis=1), values)
+        if not better.any():
+            step *= 0.5
+    at = int(values.argmin())
+    return InBox(float(values[at]), poses(points[at:at + 1])[0])
