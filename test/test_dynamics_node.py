@@ -491,10 +491,13 @@ def test_a_pose_in_millimetres_is_answered_without_forces(fresh: Fresh) -> None:
     node.until_counted()
 
 
-def test_angles_of_joints_above_their_limit_are_reported(shared: NodeProcess) -> None:
+def test_joint_angles_and_clearance_outside_limits_are_reported(shared: NodeProcess) -> None:
     tilted = HOME._replace(quaternion=(math.sin(0.2), 0.0, 0.0, math.cos(0.2)))
     limits = {'limits.base_joint_angle_max': 0.1, 'limits.platform_joint_angle_max': 0.3}
-    with closing(DynamicsNode(shared, *(f'{k}:={v}' for k, v in limits.items()))) as node:
+    legs = {'limits.leg_clearance_min': 0.2, 'legs.cylinder.radius': 0.05,
+            'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}
+    with closing(DynamicsNode(
+            shared, *(f'{k}:={v}' for k, v in (limits | legs).items()))) as node:
         node.until_active()
         angles = node.platform.joint_angles(
             Pose.from_quaternion(tilted.position, tilted.quaternion))
@@ -511,8 +514,8 @@ def test_angles_of_joints_above_their_limit_are_reported(shared: NodeProcess) ->
                 assert (words in message) is bool(angle > bound)
                 assert node.values('limits')[
                     f'leg_{leg + 1}: {joint} joint angle (rad)'] == f'{angle:.6g}'
-        node.answer(HOME, stamp=node.stamp(LATER))
-        node.until_status('limits', OK, '')
+        assert 'm below limits.leg_clearance_min' in message
+        assert float(node.values('limits')['leg_1: clearance (m)']) < 0.2
 
 
 def test_a_warning_states_its_reason(node: DynamicsNode) -> None:

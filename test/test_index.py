@@ -58,6 +58,7 @@ def summary(peaks: list[float | None], **changes: Any) -> dict[str, Any]:
         'length_margin_m': None, 'rate_margin_m_s': 0.1 * n,
         **{f'{joint}_joint_angle_{key}': None for joint in ('base', 'platform')
            for key in ('max_rad', 'max_at_s', 'margin_rad')},
+        'clearance_min_m': None, 'clearance_min_at_s': None, 'clearance_margin_m': None,
         'force_rms_n': None if peak is None else 0.5 * abs(peak),
         'power_peak_w': None if peak is None else -peak} for n, peak in enumerate(peaks)}
     return {'software': 'stewart_dynamics 9', 'complete': True,
@@ -101,7 +102,7 @@ def test_a_row_has_the_worst_of_all_legs(tmp_path: Path) -> None:
         'force_worst_leg': 'leg_1',
         'force_worst_at_s': '1.0', 'force_margin_n': '-20.5', 'length_margin_m': '',
         'rate_margin_m_s': '0.0', 'base_joint_angle_margin_rad': '',
-        'platform_joint_angle_margin_rad': '',
+        'platform_joint_angle_margin_rad': '', 'clearance_margin_m': '',
         'limits_exceeded': 'length_max: leg_2; force_max: leg_1, leg_3',
         'force_rms_n': '60.25', 'power_peak_w': '120.5', 'determinant_nearest_m3': '-1e-07',
         'crossings': '2', 'condition_max': '8000.0', 'warnings': '1', 'rejected': '7',
@@ -151,8 +152,8 @@ def test_a_row_has_the_result_of_the_comparison_with_measured_forces(tmp_path: P
     write_fleet(tmp_path, [row('a', 0, summary([1.0], measured=measured)), row('b')])
     cells, without = table(tmp_path)
     keys = [column.key for column in COLUMNS if column.optional]
-    assert [cells[key] for key in keys] == ['', '', '50.0', '0.25', '2', 'they differ']
-    assert [without[key] for key in keys] == [''] * 6
+    assert [cells[key] for key in keys] == ['', '', '', '50.0', '0.25', '2', 'they differ']
+    assert [without[key] for key in keys] == [''] * 7
 
 
 def test_a_bag_without_numbers_has_empty_cells(tmp_path: Path) -> None:

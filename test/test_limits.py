@@ -22,7 +22,8 @@ import pytest
 from referees import rng, symmetric_parameters
 
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, any_exceeded, BASE_ANGLE_MAX, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS,
+    ANGLES, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX,
+    LENGTH_MIN, LIMITS,
     Limits, OF_JOINTS, OF_RESULTS, PLATFORM_ANGLE_MAX, TOLERANCE, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, RATES, RESULT
 
@@ -98,6 +99,8 @@ def test_unknown_forces_exceed_no_limit() -> None:
     (Exceedance(LENGTH_MIN, 0, 0.9, 0.95), 'a: length 0.9 m is 0.05 m below limits.length_min'),
     (Exceedance(PLATFORM_ANGLE_MAX, 2, 0.75, 0.5),
      'c: platform joint angle 0.75 rad is 0.25 rad above limits.platform_joint_angle_max'),
+    (Exceedance(CLEARANCE_MIN, 3, -0.25, 0.5),
+     'd: clearance -0.25 m is 0.75 m below limits.leg_clearance_min'),
     (Exceedance(LENGTH_MAX, 1, 1.75, 1.5), 'b: length 1.75 m is 0.25 m above limits.length_max'),
     (Exceedance(VELOCITY_MAX, 2, -0.75, 0.5),
      'c: rate -0.75 m/s is 0.25 m/s above limits.velocity_max'),

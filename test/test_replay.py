@@ -56,6 +56,8 @@ from stewart_dynamics import BagError, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.description.model import JOINT_STATES, TF
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.platform_arguments import motion_rows
 from stewart_dynamics.program import BAD_INPUT, DONE, PARTLY_READ
 from stewart_dynamics.replay import main
 from stewart_dynamics.replay.one_bag import replay, Replayed
@@ -1048,9 +1050,11 @@ def test_exceeded_limits_are_named(
         assert text in capsys.readouterr().out
 
 
-def test_angles_of_joints_are_in_the_results_where_they_have_limits(
+def test_joint_angles_and_clearance_are_in_the_results_where_they_have_limits(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    platform = StewartPlatform(PARAMETERS.replaced({'limits.base_joint_angle_max': 0.5}))
+    platform = StewartPlatform(PARAMETERS.replaced({
+        'limits.base_joint_angle_max': 0.5, 'limits.leg_clearance_min': 0.1,
+        'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}))
     file = tmp_path / 'hexapod.yaml'
     platform.parameters.to_yaml(file)
     code = main([str(ROOT / 'bags' / 'clear'), '--params', str(file), '--strict',
@@ -1062,6 +1066,7 @@ def test_angles_of_joints_are_in_the_results_where_they_have_limits(
         [[float(row[f'{name}_{axis}{unit}']) for axis in axes] for row in rows])
         for name, axes, unit in (('position', 'xyz', '_m'), ('orientation', 'xyzw', ''))))
     angles, _ = platform.joint_angles(poses)
+    clearances = LegClearance(platform.parameters)(motion_rows(poses))
     summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
     text = capsys.readouterr().out
     for leg, name in enumerate(PARAMETERS['joints']):
@@ -1072,13 +1077,20 @@ def test_angles_of_joints_are_in_the_results_where_they_have_limits(
         assert found['base_joint_angle_max_rad'] == max(of_leg)
         assert found['base_joint_angle_margin_rad'] == 0.5 - max(of_leg)
         assert found['platform_joint_angle_max_rad'] is None
-        assert (name in [each['leg'] for each in summary['limits']]) is (max(of_leg) > 0.5)
+        assert (name in [each['leg'] for each in summary['limits']
+                         if 'joint' in each['limit']]) is (max(of_leg) > 0.5)
+        clearance = [float(row[f'{name}_clearance_m']) for row in rows]
+        np.testing.assert_allclose(clearance, clearances[:, leg], rtol=0.0, atol=1e-14)
+        assert found['clearance_min_m'] == min(clearance)
+        assert found['clearance_margin_m'] == min(clearance) - 0.1
     assert 'limits.base_joint_angle_max, 0.5 rad, exceeded by leg_4' in text
+    assert 'clearance between legs: ' in text
     assert 'base joints: 0.5846 rad (33.5 deg) at most, leg_4 at t = 10.00 s; margin' in text
     assert 'platform joints:' not in text
     report = (folder / 'report.html').read_text(encoding='utf-8')
     assert 'Angles of the base joints' in report
     assert 'Angles of the platform joints' not in report
+    assert 'Clearance between the legs' in report
 
 
 # Topics under other names

@@ -31,6 +31,7 @@ from stewart_dynamics.arrays import NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.limits import Exceedance, JITTER, JUMP
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
+from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
 
 PARAMETERS = symmetric_parameters()
@@ -203,7 +204,7 @@ def jumped(output: Output) -> bool:
 @pytest.mark.parametrize(('limit', 'values'), [
     ('limits.length_min', (1.2, 0.8)), ('limits.length_max', (0.9, 1.2)),
     ('limits.velocity_max', (1e-3, 1.0)), ('limits.base_joint_angle_max', (1e-3, 1.0)),
-    ('limits.platform_joint_angle_max', (1e-3, 1.0))])
+    ('limits.platform_joint_angle_max', (1e-3, 1.0)), ('limits.leg_clearance_min', (0.9, 0.1))])
 def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
         limit: str, values: tuple[float, float]) -> None:
     moving = HOME._replace(motion=(*HOME.motion[:12], 0.0, 0.0, 0.1, *REST[3:]))
@@ -213,7 +214,8 @@ def test_forces_are_suppressed_while_a_limit_of_motion_is_exceeded(
     for bound, suppressed in ((exceeded, True), (held, False)):
         for action in ('warn', 'suppress_forces'):
             step = Step(PARAMETERS.replaced({
-                'geometry.zero_length': leg, limit: bound, 'limits.action': action}))
+                'geometry.zero_length': leg, limit: bound, 'limits.action': action,
+                **dict.fromkeys(LEG_SHAPE, 0.01)}))
             output, = both_ways(step, [tilted])
             assert bool(output.exceedances) is suppressed
             assert (output.forces is None) is (suppressed and action == 'suppress_forces')

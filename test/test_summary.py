@@ -54,7 +54,9 @@ LIMITS = {
     'limits.velocity_max': [0.9, 0.8, 0.7, 0.9, 0.8, 9.0],
     'limits.force_max': [90.0, 80.0, 70.0, 90.0, 80.0, 900.0],
     'limits.base_joint_angle_max': [0.5, 0.4, 0.3, 0.5, 0.4, 3.0],
-    'limits.platform_joint_angle_max': [0.9, 0.8, 0.7, 0.9, 0.8, 3.0]}
+    'limits.platform_joint_angle_max': [0.9, 0.8, 0.7, 0.9, 0.8, 3.0],
+    'limits.leg_clearance_min': 0.05, 'legs.cylinder.radius': 0.02, 'legs.cylinder.length': 0.4,
+    'legs.piston.radius': 0.01}
 
 
 def hexapod(**changes: Any) -> Parameters:
@@ -93,6 +95,7 @@ class Samples:
         self.forces = numbers('forces', 6, default=math.nan)
         self.forces = np.where(np.isnan(self.forces), self.demanded, self.forces)
         self.joint_angles = numbers('joint_angles', 12, default=0.1)
+        self.clearances = numbers('clearances', 6, default=0.1)
         self.forces[numbers('suppressed', default=0.0) > 0.0] = math.nan
         self.unit_load = numbers('unit_load', 6)
         self.det, self.condition = numbers('det'), numbers('condition')
@@ -114,7 +117,7 @@ class Samples:
         states[:, CAUSE], states[:, TIME] = self.warnings, self.time_to_crossing
         flags = np.zeros(many, dtype=bool)
         outputs = Outputs(~flags, self.stamps, results, self.forces, states, flags, flags,
-                          flags, self.joint_angles)
+                          flags, self.joint_angles, self.clearances)
         np.testing.assert_array_equal(outputs.warnings, self.warnings)
         np.testing.assert_array_equal(outputs.times_to_crossing, self.time_to_crossing)
         return outputs
@@ -185,7 +188,8 @@ def random_samples(seed: int, many: int) -> Samples:
         condition=condition, base_wrenches=base_wrenches, base_unknown=base_unknown,
         warnings=random.random(many) < 0.4,
         time_to_crossing=random.choice([0.1, 0.2, 3.0, math.inf], many),
-        joint_angles=random.integers(0, 12, (many, 12)) * 0.1)
+        joint_angles=random.integers(0, 12, (many, 12)) * 0.1,
+        clearances=random.integers(-2, 9, (many, 6)) * 0.01)
 
 
 # The same again, sample by sample
@@ -255,6 +259,11 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
                 f'{joint}_joint_angle_max_rad': widest, f'{joint}_joint_angle_max_at_s': at,
                 f'{joint}_joint_angle_margin_rad':
                     p[f'limits.{joint}_joint_angle_max'][leg] - widest}
+        nearest = min(s.clearances[:, leg].tolist())
+        legs[name] |= {
+            'clearance_min_m': nearest,
+            'clearance_min_at_s': t[s.clearances[:, leg].tolist().index(nearest)],
+            'clearance_margin_m': nearest - p['limits.leg_clearance_min']}
         breakdown[name] = {}
         for n, source in enumerate(SOURCES[:7 if p['base.source'] != 'fixed' else 6]):
             forces = s.breakdown[:, n, leg].tolist()
@@ -269,12 +278,16 @@ def plain(p: Parameters, s: Samples) -> dict[str, Any]:
             ('limits.base_joint_angle_max', lambda x, bound: x > bound * (1.0 + 1e-9),
              s.joint_angles[:, :6]),
             ('limits.platform_joint_angle_max', lambda x, bound: x > bound * (1.0 + 1e-9),
-             s.joint_angles[:, 6:])):
+             s.joint_angles[:, 6:]),
+            ('limits.leg_clearance_min', lambda x, bound: x < bound * (1.0 - 1e-9),
+             s.clearances)):
         for leg, name in enumerate(p['joints']):
-            bound = p[limit][leg]
+            bound = np.broadcast_to(p[limit], 6)[leg]
             found = [n for n, x in enumerate(numbers[:, leg]) if broken(x, bound)]
             if found:
-                far = max(found, key=lambda n: (abs(abs(numbers[n, leg]) - bound), -n))
+                far = max(found, key=lambda n: (
+                    abs(numbers[n, leg] - bound if 'min' in limit
+                        else abs(numbers[n, leg]) - bound), -n))
                 limits.append({
                     'limit': limit, 'leg': name, 'setpoints': len(found),
                     'worst': numbers[far, leg], 'bound': bound, 'first_at_s': t[found[0]]})

@@ -26,14 +26,15 @@ from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS, OF_RESULTS, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS, OF_RESULTS, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, FORCES, LENGTHS, MOTION, POSE, POSITION, RATES, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Margins, as fractions of the stroke (at each end), rates, forces and joint angles: the masses
-# are not known yet, and a controller overshoots.
+# Margins, as fractions of the stroke (at each end), rates, forces, and of joint angles and
+# clearance: the masses are not known yet, and a controller overshoots.
 _STROKE, _RATE, _FORCE, _ANGLE = 0.02, 0.1, 0.2, 0.1
 # Largest condition number, relative to singularity.warn_condition.
 _CONDITION = 0.5
@@ -94,11 +95,15 @@ class DesignLimits:
         self._angles = angles_to_check(p, tuple(bounds))
         angles = self._angles(row)[0] if self._angles else np.zeros(0)
         self._joints = {name: (angles[ANGLES[name]], bound) for name, bound in bounds.items()}
+        self._clearance = clearance_to_check(p)
+        self._clearance_min = (1.0 + _ANGLE) * (p[CLEARANCE_MIN] or 0.0)
+        self._clearance_there = self._clearance(row).min() if self._clearance else np.inf
         for name, wrong in (
                 (LENGTH_MIN, self._lengths <= self._low),
                 (LENGTH_MAX, self._lengths >= self._high),
                 (FORCE_MAX, self._weights >= self._force),
                 ('singularity.warn_condition', self._condition_there >= self._condition),
+                (CLEARANCE_MIN, self._clearance_there <= self._clearance_min),
                 *((name, at >= bound) for name, (at, bound) in self._joints.items())):
             if np.any(wrong):
                 raise ParameterError(f'{name}: at the center of the motion the hexapod exceeds '
@@ -135,6 +140,10 @@ class DesignLimits:
             angles = self._angles(rows.reshape(-1, MOTION)).reshape(many, samples, -1)
             for name, (at, bound) in self._joints.items():
                 parts[name] = (angles[..., ANGLES[name]] - at) / (bound - at)
+        if self._clearance:
+            clearances = self._clearance(rows.reshape(-1, MOTION)).reshape(many, samples, 6)
+            parts[CLEARANCE_MIN] = (self._clearance_there - clearances) / (
+                self._clearance_there - self._clearance_min)
         if self._amplitude is not None:
             moved = np.linalg.norm(rows[..., POSITION] - self.center[:3], axis=-1)
             turned = self._size * np.linalg.norm(

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The limits of the legs and their joints: which there are, and when one is exceeded."""
+"""The limits of the legs, their joints and clearance: which there are, when one is exceeded."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ LENGTH_MIN, LENGTH_MAX, VELOCITY_MAX, FORCE_MAX = OF_RESULTS = (
     'limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX = OF_JOINTS = (
     'limits.base_joint_angle_max', 'limits.platform_joint_angle_max')
-LIMITS = OF_RESULTS + OF_JOINTS
+CLEARANCE_MIN = 'limits.leg_clearance_min'
+LIMITS = (*OF_RESULTS, *OF_JOINTS, CLEARANCE_MIN)
+_MINIMA = LENGTH_MIN, CLEARANCE_MIN
 # Not a limit with a parameter of its own: a setpoint too far from the last one for VELOCITY_MAX.
 JUMP = 'jump'
 
@@ -51,6 +53,7 @@ QUANTITIES = {LENGTH_MIN: ('length', 'm'), LENGTH_MAX: ('length', 'm'),
               VELOCITY_MAX: ('rate', 'm/s'), FORCE_MAX: ('force', 'N'),
               BASE_ANGLE_MAX: ('base joint angle', 'rad'),
               PLATFORM_ANGLE_MAX: ('platform joint angle', 'rad'),
+              CLEARANCE_MIN: ('clearance', 'm'),
               JUMP: ('mean rate from the last setpoint', 'm/s')}
 """Quantity and unit of each limit."""
 
@@ -67,14 +70,19 @@ class Exceedance(NamedTuple):
     value: float
     bound: float
 
+    @property
+    def excess(self) -> float:
+        """Return by how much the limit is exceeded."""
+        return (self.bound - self.value if self.limit in _MINIMA
+                else abs(self.value) - self.bound)
+
     def words(self, joints: Sequence[str]) -> str:
         """Return which leg exceeds the limit, and by how much."""
         quantity, unit = QUANTITIES[self.limit]
-        excess = abs(abs(self.value) - self.bound)
-        how = 'below' if self.limit == LENGTH_MIN else 'above'
+        how = 'below' if self.limit in _MINIMA else 'above'
         limit = VELOCITY_MAX if self.limit == JUMP else self.limit
-        return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {excess:.6g} {unit} '
-                f'{how} {limit}')
+        return (f'{joints[self.leg]}: {quantity} {self.value:.6g} {unit} is {self.excess:.6g} '
+                f'{unit} {how} {limit}')
 
 
 class Limits:
@@ -90,7 +98,7 @@ class Limits:
     ----------
     bounds : dict of str to (6,)
         Values of each limit that is given [m, m/s, N, rad].
-    thresholds : (6, 6)
+    thresholds : (7, 6)
         Values above (or below) which each of LIMITS is exceeded; infinite if not given.
     of_joints : tuple of str
         Names in OF_JOINTS that are given.
@@ -100,11 +108,13 @@ class Limits:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self.bounds = {name: parameters[name] for name in LIMITS if parameters[name] is not None}
+        self.bounds: dict[str, Array] = {
+            name: np.broadcast_to(parameters[name], 6)
+            for name in LIMITS if parameters[name] is not None}
         self.thresholds = np.array([
-            np.full(6, -math.inf if name == LENGTH_MIN else math.inf)
+            np.full(6, -math.inf if name in _MINIMA else math.inf)
             if name not in self.bounds else self.bounds[name] * (
-                1.0 - TOLERANCE if name == LENGTH_MIN else 1.0 + TOLERANCE) for name in LIMITS])
+                1.0 - TOLERANCE if name in _MINIMA else 1.0 + TOLERANCE) for name in LIMITS])
         self.of_joints = tuple(name for name in OF_JOINTS if name in self.bounds)
         self.force_max: Array = self.bounds.get(FORCE_MAX, np.full(6, math.inf))
         self._of_samples = [
@@ -146,6 +156,13 @@ class Limits:
             _add_exceeding(found, limit, angles[where], bounds, thresholds)
         return tuple(found)
 
+    def exceeded_clearance(self, clearances: Sequence[float]) -> tuple[Exceedance, ...]:
+        """Return the legs whose clearance (6,) is below CLEARANCE_MIN, which is given."""
+        found: list[Exceedance] = []
+        _add_exceeding(found, CLEARANCE_MIN, clearances, self.bounds[CLEARANCE_MIN].tolist(),
+                       self.thresholds[LIMITS.index(CLEARANCE_MIN)].tolist())
+        return tuple(found)
+
 
 def _add_exceeding(found: list[Exceedance], limit: str, values: Sequence[float],
                    bounds: Sequence[float], thresholds: Sequence[float]) -> None:
@@ -156,7 +173,7 @@ def _add_exceeding(found: list[Exceedance], limit: str, values: Sequence[float],
 
 def _exceeds(limit: str, value: Any, threshold: Any) -> Any:
     """Return whether a value, or where an array, is past the threshold of a limit."""
-    return value < threshold if limit == LENGTH_MIN else abs(value) > threshold
+    return value < threshold if limit in _MINIMA else abs(value) > threshold
 
 
 @inlined

@@ -63,6 +63,8 @@ AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'
 """Values of geometry.platform_side."""
 IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'
 """Values of trajectory.approach."""
+LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
+"""Parameters that the clearance between legs needs."""
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
@@ -102,11 +104,17 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
           'm'),
     _legs('legs.cylinder.inertia', 'transverse inertia about its center of mass', 'kg m^2',
           minimum=0.0),
+    _legs('legs.cylinder.radius', 'outer radius of a cylinder, for limits.leg_clearance_min', 'm',
+          (), minimum=0.0),
+    _legs('legs.cylinder.length', 'length of a cylinder from the base joint, for '
+          'limits.leg_clearance_min', 'm', (), minimum=0.0),
     _legs('legs.piston.mass', 'mass of a piston, the upper part of a leg', 'kg', minimum=0.0),
     _legs('legs.piston.center_of_mass', 'distance of its center of mass from the platform joint',
           'm'),
     _legs('legs.piston.inertia', 'transverse inertia about its center of mass', 'kg m^2',
           minimum=0.0),
+    _legs('legs.piston.radius', 'outer radius of a piston, for limits.leg_clearance_min; at most '
+          'that of the cylinder', 'm', (), minimum=0.0),
     _legs('actuator.reflected_mass', 'inertia of rotor and screw along the leg, J (2 pi / lead)^2',
           'kg', minimum=0.0),
     _legs('actuator.viscous_friction', 'viscous friction along the leg', 'N s/m', minimum=0.0),
@@ -134,10 +142,13 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     _legs('limits.platform_joint_angle_max', 'maximum angle between a leg and its '
           'geometry.platform_joint_axes; unlimited if not set', 'rad', (), minimum=0.0, above=True,
           maximum=math.pi),
-    Parameter('limits.action', 'string', 'action while a length, rate or joint angle limit is '
-              'exceeded, or a setpoint is too far from the last one for limits.velocity_max: warn '
-              'only, or publish no forces', '', 'warn', choices=('warn', 'suppress_forces'),
-              while_active=True),
+    Parameter('limits.leg_clearance_min', 'double', 'minimum distance between the surfaces of two '
+              'legs, a cylinder and a thinner piston each; unlimited if not set', 'm',
+              minimum=0.0),
+    Parameter('limits.action', 'string', 'action while a length, rate, joint angle or clearance '
+              'limit is exceeded, or a setpoint is too far from the last one for '
+              'limits.velocity_max: warn only, or publish no forces', '', 'warn',
+              choices=('warn', 'suppress_forces'), while_active=True),
     Parameter('singularity.characteristic_length', 'double', 'length by which moments are '
               'divided in the condition number; default: mean distance of the platform joints '
               'from their center', 'm', minimum=0.0, above=True),
@@ -235,6 +246,15 @@ class Parameters(ParameterSet):
             raise ParameterError(
                 f'{source}: limits.length_min: {low.tolist()}: must be less than '
                 f'limits.length_max, {high.tolist()}')
+        missing = [name for name in LEG_SHAPE if self[name] is None]
+        if self['limits.leg_clearance_min'] is not None and missing:
+            raise ParameterError(
+                f'{source}: {", ".join(missing)}: not set: needed by limits.leg_clearance_min')
+        outer, inner = self['legs.cylinder.radius'], self['legs.piston.radius']
+        if outer is not None and inner is not None and np.any(inner > outer):
+            raise ParameterError(
+                f'{source}: legs.piston.radius: {inner.tolist()}: must be at most '
+                f'legs.cylinder.radius, {outer.tolist()}')
         warn, stop = self['singularity.warn_condition'], self['singularity.stop_condition']
         if stop < warn:
             raise ParameterError(

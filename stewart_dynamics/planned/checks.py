@@ -16,7 +16,8 @@
 The checks of a planned trajectory: limits and singularities, at samples and between them.
 
 Between two samples, lengths and rates of the legs, det(J) and sin^2(angle / 2) of the joints are
-cubics in time through their values and derivatives at both.
+cubics in time through their values and derivatives at both. The clearance between the legs falls
+by no more than the platform joints move.
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.dynamics import friction
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import (
     CONDITION, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, RATES, UNIT_LOAD_FORCES)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
@@ -41,6 +44,9 @@ from stewart_dynamics.setpoints.rejections import OUT_OF_RANGE
 # Where |det(J)| falls below this part of its values at two samples, the samples between them are
 # made closer.
 DIP = 0.9
+# Between two samples the clearance between the legs may be below its limit by less than this part
+# of the characteristic length.
+_CLEARANCE = 1e-4
 
 LIMIT = 'a limit is exceeded'
 SINGULAR = 'a singularity is met'
@@ -87,6 +93,8 @@ class Checks:
         self._joints = parameters['joints']
         self._limits = Limits(parameters)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
+        self._clearance = clearance_to_check(parameters)
+        self._clearance_tolerance = _CLEARANCE * parameters['singularity.characteristic_length']
         self._stop = min(parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
         self._coulomb = parameters['actuator.coulomb_friction']
         self._coulomb_velocity = parameters['actuator.coulomb_velocity']
@@ -161,6 +169,42 @@ class Checks:
             for fraction in between.extrema():
                 self._check_limit(
                     limit, _angle(between.at(fraction)), begin + fraction * duration)
+
+    def check_clearance(self, times: Array, motions: Array, joined: Flags, ways: Array,
+                        ) -> list[int]:
+        """
+        Check the clearance between the legs at samples, and between those that are joined.
+
+        Parameters
+        ----------
+        times, joined : (M,), (M - 1,)
+            As in ``check``.
+        motions : (M, MOTION)
+            Rows of motion.
+        ways : (M - 1,)
+            Bound of how far a platform joint moves from each sample to the next [m].
+
+        Returns
+        -------
+        list of int
+            Indices of samples after which closer samples are needed.
+
+        """
+        if self._clearance is None:
+            return []
+        with np.errstate(all='ignore'):  # numbers that overflow are found by ``check``
+            clearances = self._clearance(motions)
+            # Two legs approach each other by no more than both of their joints move.
+            nearest = clearances.min(axis=1)
+            lowest = 0.5 * (nearest[:-1] + nearest[1:]) - ways
+        self._check_limit(CLEARANCE_MIN, clearances,
+                          np.broadcast_to(times[:, None], clearances.shape))
+        bound = float(self._limits.bounds[CLEARANCE_MIN][0])
+        held = np.minimum(nearest[:-1], nearest[1:]) >= self._limits.thresholds[
+            LIMITS.index(CLEARANCE_MIN), 0]
+        unclear: list[int] = np.flatnonzero(
+            joined & held & (lowest < bound - self._clearance_tolerance)).tolist()
+        return unclear
 
     def check_singularities(self, times: Array, durations: Array, results: Array, near: Flags,
                             ) -> list[int]:

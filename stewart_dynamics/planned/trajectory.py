@@ -38,8 +38,11 @@ from stewart_dynamics.mechanics.arguments import as_array, optional_array, wrong
 from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.kinematics import forward_kinematics, joint_angles
-from stewart_dynamics.mechanics.rows import consecutive, FORCES, LENGTHS, RATES, WRENCH
+from stewart_dynamics.mechanics.kinematics import (
+    forward_kinematics, joint_angles, leg_clearance)
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_VELOCITY, consecutive, FORCES, LENGTHS, LINEAR_VELOCITY, RATES, WRENCH)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.planned.checks import Checks, Violation
 from stewart_dynamics.planned.interpolation import Cubics, Interpolation
@@ -91,7 +94,7 @@ class PlannedTrajectory:
 # The machine code that a check needs.
 FUNCTIONS = (
     inverse_dynamics.solve, forward_kinematics.twists, forward_kinematics.poses,
-    joint_angles.joint_haversines, friction.friction)
+    joint_angles.joint_haversines, leg_clearance.leg_clearances, friction.friction)
 
 # Points and samples between them that a trajectory may need.
 MOST_SAMPLES = 1_000_000
@@ -106,6 +109,9 @@ _TIMES_END = 2 ** 31
 # Number of parts into which closer samples divide an interval, and the smallest part
 # relative to the interval between two points.
 _PARTS = 16
+# The legs' cubics move a platform joint between two samples by no more than this factor times the
+# larger of its speeds there.
+_SPEED = 2.0
 _CLOSEST = 1e-6
 
 NOT_INCREASING = 'time_from_start is not strictly increasing'
@@ -244,6 +250,10 @@ class _Work:
         self._legs_checks = Checks(self._parameters)
         self._sampling = Sampling(self._parameters)
         self._samples = 0
+        self._checks_clearance = self._parameters[CLEARANCE_MIN] is not None
+        # Distance of the farthest platform joint from the platform's origin [m].
+        self._reach = float(np.linalg.norm(
+            self._parameters['geometry.platform_joints'], axis=1).max())
 
     def check(self) -> Iterator[None]:
         """Compute motion and forces of the legs; raise _RejectedError at a violation."""
@@ -264,10 +274,14 @@ class _Work:
         with np.errstate(all='ignore'):
             between = Interpolation(durations, motions)
             many = self._parts_between(first, durations, between, results)
+            speeds = (between.bounds(self._reach).speed if self._checks_clearance
+                      else np.zeros_like(many))
         legs = Cubics.between(results[:, LENGTHS], results[:, RATES], durations[:, None])
         near = many == 1.0
         dips = self._checks.check(times, durations, results, np.ones_like(near), near)
         self._checks.check_joints(times, durations, motions, near)
+        dips = sorted({*dips, *self._checks.check_clearance(
+            times, motions, near, speeds * durations)})
         self._count(_PARTS * len(dips))
         closer: deque[_Samples] = deque((np.full(_PARTS + 1, n), _IN_PARTS) for n in dips)
         coarse = _samples(many, self._piece)
@@ -280,10 +294,13 @@ class _Work:
             step = np.diff(fraction)
             at, after = times[which] + fraction * durations[which], step * durations[which[1:]]
             self._checks.check_joints(at, after, rows, joined)
-            self._check_legs_path(
-                at, after, legs.selected(which), fraction, durations[which], rows)
-            for n in self._checks.check(
-                    at, after, self._solve(rows, first + which, fraction), joined, joined):
+            unclear = {
+                *self._checks.check_clearance(at, rows, joined, speeds[which[1:]] * after),
+                *self._check_legs_path(
+                    at, after, legs.selected(which), fraction, durations[which], rows),
+                *self._checks.check(
+                    at, after, self._solve(rows, first + which, fraction), joined, joined)}
+            for n in sorted(unclear):
                 if step[n] > _CLOSEST:
                     self._count(_PARTS)
                     closer.append(
@@ -304,9 +321,11 @@ class _Work:
         return self._platform.solve(rows, self._wrench, bases)
 
     def _check_legs_path(self, times: Array, after: Array, legs: Cubics, fraction: Array,
-                         durations: Array, rows: Array) -> None:
+                         durations: Array, rows: Array) -> list[int]:
         """
-        Check singularities and joint angles along the platform motion due to the legs' cubics.
+        Check singularities and joints along the platform motion due to the legs' cubics.
+
+        Return the indices of samples after which the clearance needs closer samples.
 
         Parameters
         ----------
@@ -327,15 +346,23 @@ class _Work:
         found = int(lost[0]) if len(lost) else many
         if found < many:
             self._legs_checks.no_pose(float(times[found]))
-        if found:
-            poses = poses[:found]
-            forward_kinematics.twists(
-                constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
-                poses)
-            joined = after[:found - 1] > 0.0
-            self._legs_checks.check_singularities(
-                times[:found], after[:found - 1], self._platform.solve(poses), joined)
-            self._legs_checks.check_joints(times[:found], after[:found - 1], poses, joined)
+        if not found:
+            return []
+        poses = poses[:found]
+        forward_kinematics.twists(
+            constants, legs.rate_at(fraction[:, None])[:found] / durations[:found, None],
+            poses)
+        joined = after[:found - 1] > 0.0
+        self._legs_checks.check_singularities(
+            times[:found], after[:found - 1], self._platform.solve(poses), joined)
+        self._legs_checks.check_joints(times[:found], after[:found - 1], poses, joined)
+        if not self._checks_clearance:
+            return []
+        with np.errstate(all='ignore'):
+            speeds = (np.linalg.norm(poses[:, LINEAR_VELOCITY], axis=1)
+                      + self._reach * np.linalg.norm(poses[:, ANGULAR_VELOCITY], axis=1))
+            ways = _SPEED * np.maximum(speeds[:-1], speeds[1:]) * after[:found - 1]
+        return self._legs_checks.check_clearance(times[:found], poses, joined, ways)
 
     def _parts_between(self, first: int, durations: Array, between: Interpolation,
                        results: Array) -> Array:

@@ -119,6 +119,7 @@ class Report:
         parts = rows[channels.BREAKDOWN.start:channels.joint_angles_of(self._parameters).start]
         parts[:] = breakdown.reshape(len(seconds), -1).T[:len(parts)]
         rows[channels.joint_angles_of(self._parameters)] = np.degrees(outputs.joint_angles).T
+        rows[channels.clearances_of(self._parameters)] = outputs.clearances.T
         self._curves.add(seconds, rows)
         self._spectrum.add(seconds, rows[channels.BASE_WRENCH])
         self._frames.add(seconds, np.concatenate(

@@ -146,6 +146,8 @@ COLUMNS = (
            _legs('base_joint_angle_margin_rad', min), optional=True),
     Column('platform_joint_angle_margin_rad', 'platform joint margin', 'rad',
            _legs('platform_joint_angle_margin_rad', min), optional=True),
+    Column('clearance_margin_m', 'clearance margin', 'm', _legs('clearance_margin_m', min),
+           optional=True),
     Column('limits_exceeded', 'limits exceeded', '', _exceeded, number=False),
     Column('force_rms_n', 'RMS force', 'N', _legs('force_rms_n', max)),
     Column('power_peak_w', 'peak power', 'W', _legs('power_peak_w', _largest), size=True),

@@ -59,9 +59,11 @@ class Table(Protocol):
         """Complete the file."""
 
 
-def column_names(legs: Sequence[str], joint_angles: bool = False) -> list[str]:
+def column_names(legs: Sequence[str], joint_angles: bool = False, clearance: bool = False,
+                 ) -> list[str]:
     """Return the names of the columns; a name ends with its unit."""
-    angles = ('base_joint_angle_rad', 'platform_joint_angle_rad') if joint_angles else ()
+    limited = (*(('base_joint_angle_rad', 'platform_joint_angle_rad') if joint_angles else ()),
+               *(('clearance_m',) if clearance else ()))
     return ['stamp_ns', 'time_s',
             *(f'position_{axis}_m' for axis in 'xyz'),
             *(f'orientation_{part}' for part in 'xyzw'),
@@ -70,12 +72,12 @@ def column_names(legs: Sequence[str], joint_angles: bool = False) -> list[str]:
             'determinant_m3', 'determinant_rate_m3_s', 'condition',
             *(f'base_force_{axis}_n' for axis in 'xyz'),
             *(f'base_moment_{axis}_n_m' for axis in 'xyz'),
-            *(f'{leg}_{quantity}' for quantity in angles for leg in legs), 'warning']
+            *(f'{leg}_{quantity}' for quantity in limited for leg in legs), 'warning']
 
 
 def _numbers(seconds: Array, motions: Array, outputs: Outputs, base_wrenches: Array,
              quasi_static: bool) -> Array:
-    """Return the columns between stamp and warning (N, 41 or 53); nan: not known."""
+    """Return the columns between stamp and warning (N, 41 to 59); nan: not known."""
     rates, determinant_rates = outputs.rates, outputs.determinant_rates
     if quasi_static:
         rates = np.full_like(rates, np.nan)
@@ -84,7 +86,7 @@ def _numbers(seconds: Array, motions: Array, outputs: Outputs, base_wrenches: Ar
         seconds, motions[:, :3], to_quaternion(motions[:, 3:12].reshape(-1, 3, 3)),
         outputs.lengths, rates, outputs.forces, outputs.demanded_forces,
         outputs.determinants, determinant_rates, outputs.conditions, base_wrenches,
-        outputs.joint_angles])
+        outputs.joint_angles, outputs.clearances])
 
 
 class CsvTable:
@@ -99,8 +101,8 @@ class CsvTable:
         Names of the six legs.
     quasi_static : bool
         Velocities are not known: columns that depend on them are empty.
-    joint_angles : bool
-        There are columns of the joints' angles.
+    joint_angles, clearance : bool
+        There are columns of the joints' angles, and of the clearance between the legs.
 
     """
 
@@ -108,12 +110,12 @@ class CsvTable:
 
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
-            joint_angles: bool = False) -> None:
+            joint_angles: bool = False, clearance: bool = False) -> None:
         self._quasi_static = quasi_static
         self._rows = 0
         self._process: RowsProcess | None = None
         self._file = (folder / self.FILE).open('wb')
-        names = [_quoted(harmless(name)) for name in column_names(legs, joint_angles)]
+        names = [_quoted(harmless(name)) for name in column_names(legs, joint_angles, clearance)]
         self._file.write(','.join(names).encode() + b'\n')
 
     def write(self, seconds: Array, motions: Array, outputs: Outputs,
@@ -154,7 +156,7 @@ class ParquetTable:
 
     def __init__(
             self, folder: Path, legs: Sequence[str], quasi_static: bool = False,
-            joint_angles: bool = False) -> None:
+            joint_angles: bool = False, clearance: bool = False) -> None:
         self._quasi_static = quasi_static
         try:
             import pyarrow
@@ -163,7 +165,7 @@ class ParquetTable:
             raise StewartError(
                 "--parquet needs pyarrow: pip install 'stewart_dynamics[parquet]'") from exc
         self._arrow = pyarrow
-        names = column_names(legs, joint_angles)
+        names = column_names(legs, joint_angles, clearance)
         self._schema = pyarrow.schema([
             (names[0], pyarrow.int64()), *((name, pyarrow.float64()) for name in names[1:-1]),
             (names[-1], pyarrow.bool_())])

@@ -35,7 +35,7 @@ from stewart_dynamics.arrays import Array, Flags, SECOND, Stamps
 from stewart_dynamics.bags import blocks, mcap_scan
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows
-from stewart_dynamics.mechanics.limits import OF_JOINTS
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, OF_JOINTS
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
@@ -190,7 +190,8 @@ class _Run:
         stack.callback(self._bag.abandon)
         self._table: Table = kind_of_table(options.parquet)(
             folder, parameters['joints'], self._quasi_static,
-            any(parameters[name] is not None for name in OF_JOINTS))
+            any(parameters[name] is not None for name in OF_JOINTS),
+            parameters[CLEARANCE_MIN] is not None)
         stack.callback(self._table.close)
         self._writer = WriterThread()
         stack.callback(self._writer.abandon)

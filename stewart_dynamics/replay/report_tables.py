@@ -23,7 +23,7 @@ import re
 from typing import Any, NamedTuple
 
 from stewart_dynamics.arrays import SECOND
-from stewart_dynamics.mechanics.limits import LIMITS, OF_JOINTS, QUANTITIES
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN, LIMITS, OF_JOINTS, QUANTITIES
 from stewart_dynamics.parameters.table import PARAMETERS, Parameters
 
 
@@ -44,9 +44,12 @@ class MarginColumn(NamedTuple):
 
 
 def margin_columns(parameters: Parameters) -> list[MarginColumn]:
-    """Return the quantities with limits; angles of joints only if one of them has a limit."""
-    of_joints = any(parameters[name] is not None for name in OF_JOINTS)
-    return [column for column in _MARGINS if of_joints or column.limits[0] not in OF_JOINTS]
+    """Return the quantities with limits; joint angles and clearance only if theirs are given."""
+    left_out: set[str] = set()
+    for names in (OF_JOINTS, (CLEARANCE_MIN,)):
+        if all(parameters[name] is None for name in names):
+            left_out.update(names)
+    return [column for column in _MARGINS if column.limits[0] not in left_out]
 
 
 def _margin_column(name: str, unit: str) -> MarginColumn:
@@ -61,7 +64,7 @@ _MARGINS = [_margin_column(*quantity) for quantity in dict.fromkeys(
 
 
 def smallest_margins(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the smallest margins of length, rate, force and joint angles, each with its leg."""
+    """Return the smallest margins of all quantities with a limit, each with its leg."""
     found = []
     for name, unit, key, _ in _MARGINS:
         of_legs = [(leg[key], joint) for joint, leg in summary['legs'].items()

@@ -25,7 +25,7 @@ from collections.abc import Iterator, Mapping
 import math
 from typing import Any, NamedTuple
 
-from stewart_dynamics.mechanics.limits import FORCE_MAX, QUANTITIES
+from stewart_dynamics.mechanics.limits import Exceedance, FORCE_MAX, QUANTITIES
 from stewart_dynamics.reporting.plots import PLOT_OF
 from stewart_dynamics.setpoints.rejections import BASE_NOT_KNOWN
 
@@ -134,7 +134,8 @@ def _limits(summary: Summary) -> Iterator[Statement]:
     points = summary['setpoints']
     for name in dict.fromkeys(each['limit'] for each in summary['limits']):
         of_legs = [each for each in summary['limits'] if each['limit'] == name]
-        most = max(of_legs, key=lambda each: abs(abs(each['worst']) - each['bound']))
+        most = max(of_legs, key=lambda each: Exceedance(
+            name, 0, each['worst'], each['bound']).excess)
         others = f' and {plural(len(of_legs) - 1, "other leg")}' if len(of_legs) > 1 else ''
         unit = QUANTITIES[name][1]
         yield Statement(
@@ -161,7 +162,7 @@ def _limits(summary: Summary) -> Iterator[Statement]:
 
 
 def _joints(legs: Summary) -> Iterator[Statement]:
-    """Yield the largest angle of a joint at either end of the legs, and the smallest margin."""
+    """Yield the largest angles of the joints at both ends, and the smallest clearance."""
     for joint in ('base', 'platform'):
         angle, at, margin = (
             f'{joint}_joint_angle_{key}' for key in ('max_rad', 'max_at_s', 'margin_rad'))
@@ -174,6 +175,14 @@ def _joints(legs: Summary) -> Iterator[Statement]:
                 JOINTS, 'none', f'{joint} joints: {_angle(angles[most])} at most, {most}',
                 legs[most][at], '', f'; margin {_angle(margins[least])}'
                 + (f', {least}' if least != most else ''))
+    clearances = {name: leg['clearance_min_m'] for name, leg in legs.items()
+                  if leg['clearance_min_m'] is not None}
+    if clearances:
+        least = min(clearances, key=lambda name: clearances[name])
+        yield Statement(
+            JOINTS, 'none', f'clearance between legs: {clearances[least]:.4g} m at least, {least}',
+            legs[least]['clearance_min_at_s'], '',
+            f'; margin {legs[least]["clearance_margin_m"]:.4g} m')
 
 
 def _angle(radians: float) -> str:

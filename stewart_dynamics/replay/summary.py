@@ -30,7 +30,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.mechanics.dynamics.force_breakdown import sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, QUANTITIES, VELOCITY_MAX)
+    ANGLES, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, QUANTITIES,
+    VELOCITY_MAX)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.block_statistics import (
@@ -104,6 +105,7 @@ class Summary:
         self._rate, self._force, self._published, self._power = (
             Extreme(6, np.abs) for _ in range(4))
         self._angles = {name: Extreme(6, np.positive) for name in ANGLES}
+        self._clearance = Extreme(6, np.negative)
         # squares of the forces; driving power; braking power
         self._means = Integral(18)
         self._nearest = Extreme(1, lambda det: -np.abs(det))
@@ -193,6 +195,9 @@ class Summary:
         for name in self._limits.of_joints:
             values[name] = outputs.joint_angles[:, ANGLES[name]]
             self._angles[name].add(seconds, values[name])
+        if CLEARANCE_MIN in self._limits.bounds:
+            values[CLEARANCE_MIN] = outputs.clearances
+            self._clearance.add(seconds, outputs.clearances)
         for name, exceeded in self._exceeded.items():
             exceeded.add(seconds, self._limits.exceeds(name, values[name]))
         self._nearest.add(seconds, outputs.determinants[:, None])
@@ -258,7 +263,7 @@ class Summary:
         shortest, longest = self._shortest.values[leg], self._longest.values[leg]
         rate, force = self._rate.values[leg], self._force.values[leg]
         bounds = self._limits.bounds
-        least, most, fastest, strongest, *widest = (
+        least, most, fastest, strongest, *widest, nearest = (
             bounds[name][leg] if name in bounds else None for name in LIMITS)
         length_margins = [*([] if least is None else [shortest - least]),
                           *([] if most is None else [most - longest])]
@@ -282,11 +287,16 @@ class Summary:
             found |= {f'{key}_max_rad': _number(angle),
                       f'{key}_max_at_s': _number(angles.at[leg]),
                       f'{key}_margin_rad': None if bound is None else _number(bound - angle)}
+        clearance = self._clearance.values[leg]
+        found |= {
+            'clearance_min_m': _number(clearance),
+            'clearance_min_at_s': _number(self._clearance.at[leg]),
+            'clearance_margin_m': None if nearest is None else _number(clearance - nearest)}
         return found | (dict.fromkeys(_OF_VELOCITY) if self._quasi_static else {})
 
     def _exceeded_limits(self) -> list[dict[str, Any]]:
         farthest = dict(zip(LIMITS, (self._shortest, self._longest, self._rate, self._force,
-                                     *self._angles.values()), strict=True))
+                                     *self._angles.values(), self._clearance), strict=True))
         return [{'limit': name, 'leg': self._legs[leg], 'setpoints': int(limit.setpoints[leg]),
                  'worst': _number(farthest[name].values[leg]),
                  'bound': float(self._limits.bounds[name][leg]),

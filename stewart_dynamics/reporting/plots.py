@@ -25,8 +25,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.mechanics.dynamics.force_breakdown import SOURCES, sources_of
 from stewart_dynamics.mechanics.limits import (
-    ANGLES as ANGLES_OF, BASE_ANGLE_MAX, FORCE_MAX, LENGTH_MAX, LENGTH_MIN, OF_JOINTS,
-    VELOCITY_MAX)
+    ANGLES as ANGLES_OF, BASE_ANGLE_MAX, CLEARANCE_MIN, FORCE_MAX, LENGTH_MAX, LENGTH_MIN,
+    OF_JOINTS, VELOCITY_MAX)
 from stewart_dynamics.mechanics.rows import JOINT_ANGLES
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.colors import AXIS_COLORS, LEG_COLORS, ROLES
@@ -41,13 +41,15 @@ POSITION, ANGLES, VELOCITY, OMEGA, ACCELERATION, ALPHA = (
 LENGTHS, RATES, FORCES, POWERS = (slice(n, n + 6) for n in range(18, 42, 6))
 DETERMINANT, CONDITION = 42, 43
 BASE_WRENCH = slice(44, 50)
-# How many there are depends on the sources. Last, where they have limits, the joints' angles.
+# How many there are depends on the sources. Last, where they have limits, the joints' angles
+# and the clearances.
 BREAKDOWN = slice(50, 50 + 6 * len(SOURCES))
 
 BASE_SECTION = 'base_wrench'
 
 # The plot that shows the quantity of a limit.
 PLOT_OF = {
+    CLEARANCE_MIN: 'clearance',
     LENGTH_MIN: 'lengths', LENGTH_MAX: 'lengths', VELOCITY_MAX: 'rates', FORCE_MAX: 'forces',
     **{name: name.removeprefix('limits.').removesuffix('_max') for name in OF_JOINTS}}
 
@@ -58,7 +60,7 @@ COMPARED = 24
 
 def channels_of(parameters: Parameters) -> int:
     """Return the number of channels of a sample."""
-    stop: int = joint_angles_of(parameters).stop
+    stop: int = clearances_of(parameters).stop
     return stop
 
 
@@ -67,6 +69,12 @@ def joint_angles_of(parameters: Parameters) -> slice:
     first = BREAKDOWN.start + 6 * len(sources_of(parameters))
     limited = any(parameters[name] is not None for name in OF_JOINTS)
     return slice(first, first + JOINT_ANGLES * limited)
+
+
+def clearances_of(parameters: Parameters) -> slice:
+    """Return the channels of the clearances between the legs; empty without limit."""
+    first: int = joint_angles_of(parameters).stop
+    return slice(first, first + 6 * (parameters[CLEARANCE_MIN] is not None))
 
 
 class Curve(NamedTuple):
@@ -144,6 +152,10 @@ def motion_plots(parameters: Parameters, velocities_known: bool) -> list[Plot]:
                  *_bounds('length_min', p['limits.length_min']),
                  *_bounds('length_max', p['limits.length_max'])]),
         *(_of_joints(p, limit) for limit in OF_JOINTS if p[limit] is not None),
+        *([] if p[CLEARANCE_MIN] is None else [Plot(
+            PLOT_OF[CLEARANCE_MIN], '', 'Clearance between the legs', 'm',
+            _of_legs(joints, clearances_of(p)), 'from each leg to the nearest other leg',
+            [Bound(p[CLEARANCE_MIN], 'leg_clearance_min')])]),
         Plot('determinant', '17', 'det(J)', 'm³',
              {'': [Curve('det(J)', LEG_COLORS[0], DETERMINANT)]},
              'zero at a singularity', [Bound(0.0, 'singular', ROLES['singular'])],

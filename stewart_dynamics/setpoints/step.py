@@ -32,8 +32,9 @@ from stewart_dynamics.compilation.functions import entry_point, inlined
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, any_exceeded, Exceedance, JITTER, jumps, Limits, OF_RESULTS)
+    ANGLES, any_exceeded, CLEARANCE_MIN, Exceedance, JITTER, jumps, Limits, OF_RESULTS)
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
@@ -96,6 +97,8 @@ class Output(NamedTuple):
     exceedances: tuple[Exceedance, ...]
     joint_angles: tuple[float, ...] = ()
     """Row of joint angles [rad], nan for those without a limit; empty without any limit."""
+    clearances: tuple[float, ...] = ()
+    """Distance of the surface of each leg to the nearest other leg [m]; empty without limit."""
     state: State = State()
     """For the next setpoint."""
 
@@ -156,6 +159,8 @@ class Outputs(NamedTuple):
     """(N,): the legs cannot follow from the last setpoint that was not a jump."""
     joint_angles: Array
     """Rows of joint angles (N, 12) [rad], or (N, 0), as in Output."""
+    clearances: Array
+    """(N, 6) [m], or (N, 0), as in Output."""
     state: State = State()
     """For the next setpoint."""
 
@@ -342,6 +347,9 @@ class Step:
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._angles_of_one = (
             None if self._angles is None else self._angles.of_one(self._numbers[_MOTION]))
+        self._clearance = clearance_to_check(parameters)
+        self._clearance_of_one = (
+            None if self._clearance is None else self._clearance.of_one(self._numbers[_MOTION]))
 
     def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
@@ -386,11 +394,19 @@ class Step:
             exceedances += exceeded
             if exceeded and self._limits_suppress:
                 forces = None
+        clearances: tuple[float, ...] = ()
+        if self._clearance_of_one is not None:
+            clearances = self._clearance_of_one()
+            exceeded = self._limits.exceeded_clearance(clearances)
+            exceedances += exceeded
+            if exceeded and self._limits_suppress:
+                forces = None
         return Output(
             stamp, lengths, rates, demanded if solved else None, forces,
             written[UNIT_LOAD_FORCES], written[DETERMINANT], written[DETERMINANT_RATE],
             written[CONDITION], after,
             singularity is None or after.warning != singularity.warning, exceedances, angles,
+            clearances,
             State(after, followed_at, followed) if jumped else State(after, stamp, lengths))
 
     def many(self, setpoints: Batch, before: State | None) -> Outputs:
@@ -419,8 +435,13 @@ class Step:
         changed[:1] = singularity is None or warnings[:1] != singularity.warning
         changed[1:] = warnings[1:] != warnings[:-1]
         angles = np.empty((len(states), 0)) if self._angles is None else self._angles(motions)
-        for name in self._limits.of_joints:
-            exceeded = self._limits.exceeds(name, angles[:, ANGLES[name]]).any(axis=1)
+        clearances = (
+            np.empty((len(states), 0)) if self._clearance is None else self._clearance(motions))
+        of_poses = {name: angles[:, ANGLES[name]] for name in self._limits.of_joints}
+        if self._clearance is not None:
+            of_poses[CLEARANCE_MIN] = clearances
+        for name, values in of_poses.items():
+            exceeded = self._limits.exceeds(name, values).any(axis=1)
             exceeding |= exceeded
             if self._limits_suppress:
                 forces[exceeded] = np.nan
@@ -429,4 +450,5 @@ class Step:
         a, b, c, d, e, f = followed.tolist()
         return Outputs(
             answered, stamps, results, forces, states, changed, exceeding, jumped, angles,
+            clearances,
             State(singularity, int(followed_at[0]), None if a != a else (a, b, c, d, e, f)))

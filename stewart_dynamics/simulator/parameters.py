@@ -92,8 +92,10 @@ _OWN = (
 
 # Beginnings of names.
 _OF_THE_NODE = ('autostart', 'external_wrench.', 'geometry.base_joint_axes',
-                'geometry.platform_joint_axes', 'joint_states.', 'limits.base_joint_angle_max',
-                'limits.platform_joint_angle_max', 'limits.velocity_max', 'meshes.',
+                'geometry.platform_joint_axes', 'joint_states.', 'legs.cylinder.length',
+                'legs.cylinder.radius', 'legs.piston.radius', 'limits.base_joint_angle_max',
+                'limits.leg_clearance_min', 'limits.platform_joint_angle_max',
+                'limits.velocity_max', 'meshes.',
                 'platform_frame', 'publish_tf', 'setpoint.', 'singularity.', 'trajectory.',
                 'visualization_rate')
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import Counter
 
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
+    ANGLES, CLEARANCE_MIN, Exceedance, FORCE_MAX, JUMP, LENGTH_MAX, LIMITS, QUANTITIES)
 from stewart_dynamics.node.diagnostics.periodic_report import (
     Answers, ERROR, Level, LogLine, OK_LEVEL, StatusPart)
 from stewart_dynamics.parameters.table import Parameters
@@ -75,7 +75,7 @@ class LimitsDiagnostics(StatusPart):
                 self.held.see(Level(ERROR, words), now, name)
                 self._setpoints[name] += 1
                 known = [self._worst[name]] if name in self._worst else []
-                self._worst[name] = max(exceeded + known, key=_amount)
+                self._worst[name] = max(exceeded + known, key=lambda each: each.excess)
 
     def state(self, now: float) -> Level:
         """Return the present level and all causes."""
@@ -99,6 +99,9 @@ class LimitsDiagnostics(StatusPart):
                        for quantity, unit in [QUANTITIES[limit]]
                        for leg, angle in zip(
                            self._joints, output.joint_angles[where], strict=True)]
+        values += [(f'{leg}: {quantity} ({unit})', f'{clearance:.6g}')
+                   for quantity, unit in [QUANTITIES[CLEARANCE_MIN]]
+                   for leg, clearance in zip(self._joints, output.clearances, strict=False)]
         if self._largest_force:
             values += [
                 ('largest force demanded since activation (N)', f'{self._largest_force:.6g}'),
@@ -135,7 +138,3 @@ class LimitsDiagnostics(StatusPart):
     def _words(self, exceedance: Exceedance) -> str:
         clipped = ', clipped' if exceedance.limit == FORCE_MAX else ''
         return exceedance.words(self._joints) + clipped
-
-
-def _amount(exceedance: Exceedance) -> float:
-    return abs(abs(exceedance.value) - exceedance.bound)

@@ -1,0 +1,193 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Clearance between the legs: its definition, and where a limit of it is checked."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import (
+    Array, random_motion, random_parameters, rng, rotation_about, symmetric_parameters)
+from scipy.optimize import lsq_linear
+
+from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
+from stewart_dynamics.parameters.table import LEG_SHAPE
+from stewart_dynamics.planned.checks import LIMIT
+from stewart_dynamics.planned.trajectory import check_planned_trajectory
+from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
+
+SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
+SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1, **SHAPE})
+
+
+def expected(p: Parameters, pose: Pose | Motion) -> Array:
+    """Return the clearances (6,): each pair of capsules by bounded least squares."""
+    legs = (pose.position + p['geometry.platform_joints'] @ pose.rotation.T
+            - p['geometry.base_joints'])
+    lengths = np.linalg.norm(legs, axis=1)
+    directions = legs / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    found = np.full(6, np.inf)
+    for i, j in combinations(range(6), 2):
+        gap = p['geometry.base_joints'][j] - p['geometry.base_joints'][i]
+        matrix = np.column_stack([directions[i], -directions[j]])
+        ends = [[(min(p['legs.cylinder.length'][n], lengths[n]), p['legs.cylinder.radius'][n]),
+                 (lengths[n], p['legs.piston.radius'][n])] for n in (i, j)]
+        for (u, thick), (v, other) in product(*ends):
+            # bounds of a width of zero are not accepted
+            nearest = lsq_linear(matrix, gap, (0.0, np.maximum([u, v], 1e-15)), 'bvls', tol=1e-15)
+            clearance = np.linalg.norm(matrix @ nearest.x - gap) - thick - other
+            found[[i, j]] = np.minimum(found[[i, j]], clearance)
+    return found
+
+
+def upright(tilt: float, **changes: Any) -> tuple[Parameters, Pose]:
+    """Return a hexapod whose legs are parallel but for a small tilt of its platform."""
+    p = symmetric_parameters()
+    p = p.replaced({**SHAPE, 'geometry.platform_joints': p['geometry.base_joints'], **changes})
+    return p, Pose([0.0, 0.0, 1.0], rotation_about(np.array([2.0, 3.0, 6.0]) / 7.0, tilt))
+
+
+def cases() -> list[Any]:
+    found: list[Any] = []
+    for seed in range(8):
+        random = rng(seed)
+        p = random_parameters(random).replaced({
+            'legs.cylinder.radius': random.uniform(0.03, 0.06, 6),
+            'legs.cylinder.length': random.uniform(0.0, 1.5, 6),
+            'legs.piston.radius': random.uniform(0.0, 0.03, 6)})
+        motion = random_motion(p, random, 3)
+        found += [pytest.param(p, Pose(motion.position[n], motion.rotation[n]),
+                               id=f'random {seed} {n}') for n in range(3)]
+    for tilt in (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-4, 0.3):
+        found.append(pytest.param(*upright(tilt), id=f'parallel but for {tilt:g}'))
+    found.append(pytest.param(*upright(0.0, **{'legs.cylinder.length': 0.0}), id='no cylinder'))
+    p, pose = upright(0.0)
+    return [*found, pytest.param(p, Pose(np.zeros(3), pose.rotation), id='legs of no length')]
+
+
+@pytest.mark.parametrize(('p', 'pose'), cases())
+def test_clearance_is_the_least_distance_of_the_capsules(p: Parameters, pose: Pose) -> None:
+    np.testing.assert_allclose(
+        LegClearance(p)(Motion.from_pose(pose).rows[None])[0], expected(p, pose), rtol=0.0,
+        atol=1e-12)
+
+
+def test_legs_that_cross_overlap_by_both_radii() -> None:
+    p, pose = upright(0.0)
+    b = p['geometry.base_joints'].copy()
+    b[[0, 1]] = b[[1, 0]]  # legs 1 and 2 cross in the middle, above their cylinders
+    p = p.replaced({'geometry.platform_joints': b, 'legs.cylinder.length': 0.1})
+    assert LegClearance(p)(Motion.from_pose(pose).rows[None])[0, :2] == pytest.approx(
+        [-0.04, -0.04], abs=1e-15)
+
+
+@pytest.mark.parametrize(('changes', 'words'), [
+    ({CLEARANCE_MIN: 0.01}, 'legs.cylinder.radius, legs.cylinder.length, legs.piston.radius: not '
+     'set: needed by limits.leg_clearance_min'),
+    ({**SHAPE, CLEARANCE_MIN: -1.0}, 'limits.leg_clearance_min: -1.0 m: must be at least 0'),
+    ({**SHAPE, 'legs.piston.radius': 0.05}, 'legs.piston.radius: [0.05, 0.05, 0.05, 0.05, 0.05, '
+     '0.05]: must be at most legs.cylinder.radius, [0.04')])
+def test_parameters_that_do_not_fit_are_rejected(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=re.escape(words)):
+        symmetric_parameters().replaced(changes)
+    with pytest.raises(ParameterError, match=r'legs\.piston\.radius: not set'):
+        LegClearance(symmetric_parameters())
+
+
+# Where it is checked
+
+# The cylinders of legs 1 and 2 approach each other as the platform comes down.
+LOWERING = SYMMETRIC.replaced({
+    'legs.cylinder.radius': [0.15, 0.15, 0.01, 0.01, 0.01, 0.01], 'legs.cylinder.length': 0.9,
+    'legs.piston.radius': 0.005})
+HOME = StewartPlatform(LOWERING).home_pose()
+
+
+def lowered(depths: Array, rates: Any = 0.0, accelerations: Any = 0.0) -> Motion:
+    """Return a motion downward from home."""
+    position, velocity, acceleration = (
+        np.outer(np.broadcast_to(each, len(depths)), [0.0, 0.0, -1.0])
+        for each in (depths, rates, accelerations))
+    return Motion(HOME.position + position, np.broadcast_to(HOME.rotation, (len(depths), 3, 3)),
+                  velocity, np.zeros(3), acceleration, np.zeros(3))
+
+
+def least(motion: Motion) -> float:
+    return float(LegClearance(LOWERING)(motion.rows).min())
+
+
+def test_the_step_reports_a_clearance_below_its_limit_for_one_and_for_many() -> None:
+    motion = lowered(np.linspace(0.0, 0.2, 51))
+    clearances = LegClearance(LOWERING)(motion.rows)
+    bound = 0.1
+    setpoints = Batch(np.arange(51), motion.rows, np.zeros((1, 6)), np.zeros(51, dtype=bool),
+                      np.arange(51))
+    step = Step(LOWERING.replaced({CLEARANCE_MIN: bound}))
+    many = step.many(setpoints, None)
+    assert np.array_equal(many.clearances, clearances)
+    assert np.array_equal(many.exceeding, (clearances < bound).any(axis=1))
+    assert 5 < many.exceeding.sum() < 46
+    for n, row in enumerate(motion.rows.tolist()):
+        output = step(Setpoint(n, tuple(row)), None)
+        assert output is not None
+        assert output.clearances == tuple(clearances[n].tolist())
+        assert [(each.limit, each.leg, each.value, each.bound) for each in output.exceedances] == [
+            (CLEARANCE_MIN, leg, clearances[n, leg], bound) for leg in range(6)
+            if clearances[n, leg] < bound]
+    without = Step(LOWERING).many(setpoints, None)
+    assert np.array_equal(without.forces, many.forces)
+    assert without.clearances.shape == (51, 0)
+    assert not without.exceeding.any()
+
+
+@pytest.mark.parametrize('points', [4, 12])
+def test_the_least_clearance_between_the_points_of_a_trajectory_is_found(points: int) -> None:
+    def at(times: Array) -> Motion:
+        # the lowest pose, at 0.5 s, is between two points
+        w = 2.0 * np.pi
+        return lowered(0.07 * (1.0 - np.cos(w * times)), 0.07 * w * np.sin(w * times),
+                       0.07 * w * w * np.cos(w * times))
+
+    times = np.linspace(0.0, 1.0, points)
+    lowest = least(at(np.array([0.5])))
+    # The motion between few points is not quite the given one.
+    slack = {4: 5e-3, 12: 2e-4}[points]
+    assert least(at(times)) > lowest + 2.0 * slack
+    for bound, accepted in ((lowest + slack, False), (lowest - slack, True)):
+        result = check_planned_trajectory(
+            StewartPlatform(LOWERING.replaced({CLEARANCE_MIN: bound})), times, at(times))
+        assert result.accepted is accepted, result.message
+        if not accepted:
+            assert (result.reason, result.limit) == (LIMIT, CLEARANCE_MIN)
+            assert 'below limits.leg_clearance_min' in result.message
+            assert result.time == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_small_loss_of_clearance_between_close_points_is_found() -> None:
+    # Down by 2.5 mm and up again: too little for samples between the two points.
+    motion = lowered(np.array([0.14, 0.14]), [0.1, -0.1], [-2.0, -2.0])
+    here, there = least(motion), least(lowered(np.array([0.1425])))
+    assert there < here - 2e-3
+    for bound, accepted in ((there + 1e-4, False), (there - 1e-5, True)):
+        result = check_planned_trajectory(
+            StewartPlatform(LOWERING.replaced({CLEARANCE_MIN: bound})), [0.0, 0.1], motion)
+        assert result.accepted is accepted, result.message
