@@ -55,7 +55,7 @@ PARAMETERS = HERE.parent / 'config' / 'platform.yaml'
 
 ROUNDS = 3
 SETPOINTS = 1_000_000
-LONG = 4_000_000
+LONG = 2_000_000
 STEP = 1_000_000  # between setpoints [ns]: 1 kHz
 # As the recorder of ROS 2 does by default.
 CHUNK_BYTES = 768 * 1024

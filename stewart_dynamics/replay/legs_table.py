@@ -31,7 +31,7 @@ from stewart_dynamics.reporting.spreadsheet import harmless
 from stewart_dynamics.setpoints.step import Outputs
 
 # Rows from which on a second process formats them: it takes 0.1 s to start.
-_LONG = 100_000
+_LONG = 30_000
 
 
 class Table(Protocol):

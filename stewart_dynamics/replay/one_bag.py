@@ -308,18 +308,18 @@ class _Run:
         seconds = self._seconds(setpoints.stamps)
         breakdown = None if self._breakdown is None else self._breakdown(
             setpoints.motions, setpoints.wrenches, setpoints.bases)
-        self._writer.call(self._write, seconds, setpoints, outputs, base_wrenches, breakdown)
+        self._writer.call(self._write, seconds, setpoints, outputs, base_wrenches)
         self._summary.add(seconds, setpoints, outputs, base_wrenches, breakdown)
+        if self.report is not None and breakdown is not None:
+            self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
         if self._comparison is not None:
             self._compared(self._comparison.add_setpoints(seconds, setpoints, outputs))
         return len(setpoints.stamps)
 
-    def _write(self, seconds: Array, setpoints: Batch, outputs: Outputs, base_wrenches: Array,
-               breakdown: Array | None) -> None:
+    def _write(self, seconds: Array, setpoints: Batch, outputs: Outputs,
+               base_wrenches: Array) -> None:
         self._bag.write(setpoints.times, setpoints.motions, outputs, base_wrenches)
         self._table.write(seconds, setpoints.motions, outputs, base_wrenches)
-        if self.report is not None and breakdown is not None:
-            self.report.add(seconds, setpoints, outputs, base_wrenches, breakdown)
 
     def _seconds(self, stamps: Stamps) -> Array:
         """Return the time since the first setpoint, never decreasing [s]."""
