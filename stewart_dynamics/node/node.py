@@ -83,7 +83,9 @@ class _Models(NamedTuple):
 
     @classmethod
     def of(cls, parameters: Parameters) -> _Models:
-        return cls(Step(parameters), ExternalWrench(parameters), BaseWrench(parameters))
+        step = Step(parameters)
+        step.prepare()  # no setpoint waits for a compilation
+        return cls(step, ExternalWrench(parameters), BaseWrench(parameters))
 
 
 class DynamicsNode(LifecycleNode):

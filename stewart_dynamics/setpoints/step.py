@@ -21,6 +21,8 @@ setpoints and for batches.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 import math
 from struct import Struct
 from typing import Any, NamedTuple
@@ -28,22 +30,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, NO_WRENCH, Six, Stamps
-from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.compilation.functions import entry_point
 from stewart_dynamics.mechanics.dynamics import inverse_dynamics
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import CONSTANTS
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    ANGLES, any_exceeded, CLEARANCE_MIN, Exceedance, JITTER, jumps, Limits, OF_RESULTS)
+    ANGLES, CLEARANCE_MIN, Exceedance, JITTER, Limits, OF_RESULTS)
 from stewart_dynamics.mechanics.rows import (
     BASE, CONDITION, consecutive, DETERMINANT, DETERMINANT_RATE, FORCES, LENGTHS, MOTION, NO_BASE,
     RATES, RESULT, UNIT_LOAD_FORCES, WRENCH)
 from stewart_dynamics.mechanics.singularity_warning import (
-    advance, CAUSE, forget, Singularity, STATE, STOPPED, THRESHOLDS, thresholds, TIME,
-    UNSOLVABLE_CONDITION)
+    CAUSE, Singularity, STATE, STOPPED, thresholds, TIME, UNSOLVABLE_CONDITION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.setpoints.check import (
+    check, check_many, FORCE_MAX, LIMITS, LIMITS_SUPPRESS, OF_WARNING, SUPPRESS)
 
 
 class Setpoint(NamedTuple):
@@ -215,85 +218,19 @@ class Outputs(NamedTuple):
         return self.states[:, STOPPED] > 0.0
 
 
-# Layout of the settings: thresholds of the warning, whether to suppress forces inside
-# stop_condition and while a limit is exceeded, thresholds of the limits, limits.force_max.
-_THRESHOLDS, _SUPPRESS, _LIMITS_SUPPRESS, _LIMITS, _FORCE_MAX = consecutive(
-    THRESHOLDS, 1, 1, 24, 6)
-
 # Layout of one setpoint in memory, inputs and results: packing is faster than passing arrays.
 _RESULT, _FORCES, _AFTER, _ANSWERED, _EXCEEDING, _JUMPED = consecutive(RESULT, 6, STATE, 1, 1, 1)
 (_PLATFORM, _SETTINGS, _MOTION, _WRENCH, _BASE, _BEFORE, _FOLLOWED, _ELAPSED, _RESTART, _IS_STAMP,
  _BASE_KNOWN, _WRITTEN, _TILE) = consecutive(
-     CONSTANTS, _FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 6, 1, 1, 1, 1, _JUMPED.stop,
+     CONSTANTS, FORCE_MAX.stop, MOTION, WRENCH, BASE, STATE, 6, 1, 1, 1, 1, _JUMPED.stop,
      inverse_dynamics.TILE)
 _GIVEN = Struct(f'{_WRITTEN.start - _MOTION.start}d')
 _GIVES = Struct(f'{_JUMPED.stop}d')
 
 
-@inlined
-def _check(settings: Array, limits: Array, is_stamp: bool, base_known: bool, state: Array,
-           restart: bool, followed: Array, elapsed: float, result: Array, forces: Array,
-           ) -> tuple[bool, bool, bool]:
-    """
-    Check a result and write the forces to publish.
-
-    Return whether it is answered, exceeds a limit, and is a jump; see Outputs.
-    """
-    finite = is_stamp
-    for k in range(RESULT):
-        finite = finite and math.isfinite(result[k])
-    if not finite:
-        return False, False, False
-    if restart:
-        forget(state)
-    condition = result[CONDITION]
-    advance(state, settings, result[DETERMINANT], result[DETERMINANT_RATE],
-            condition)
-    solved = condition < UNSOLVABLE_CONDITION and base_known
-    for leg in range(6):
-        if not solved:
-            result[FORCES.start + leg] = np.nan
-    moving, loaded = any_exceeded(limits, result)
-    jumped = jumps(limits, result[LENGTHS], followed, elapsed)
-    suppressed = ((state[STOPPED] > 0.0 and settings[_SUPPRESS.start] > 0.0)
-                  or ((moving or jumped) and settings[_LIMITS_SUPPRESS.start] > 0.0))
-    for leg in range(6):
-        force, most = result[FORCES.start + leg], settings[_FORCE_MAX.start + leg]
-        forces[leg] = min(max(force, -most), most) if solved and not suppressed else np.nan
-    return True, moving or loaded or jumped, jumped
-
-
-@entry_point('f8[::1]', 'i8[::1]', 'b1[::1]', 'b1[::1]', 'f8[::1]', 'f8[::1]', 'i8[::1]',
-             'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'b1[::1]', 'b1[::1]', 'b1[::1]')
-def _check_many(settings: Array, stamps: Stamps, bases_known: Flags, restarts: Flags,
-                slack: Array, state: Array, followed_at: Stamps, followed: Array, results: Array,
-                forces: Array, states: Array, answered: Flags, exceeding: Flags, jumped: Flags,
-                ) -> None:
-    """Check results in order, see Outputs; update ``followed`` and its stamp."""
-    limits = settings[_LIMITS]
-    restart = False
-    for n in range(len(results)):
-        # If this one cannot be answered, the next one is the restart.
-        restart = restart or restarts[n]
-        is_stamp = -STAMPS_END <= stamps[n] < STAMPS_END
-        elapsed = math.inf
-        if is_stamp and not restart and stamps[n] > followed_at[0]:
-            elapsed = (stamps[n] - followed_at[0]) * 1e-9 + slack[n]
-        answered[n], exceeding[n], jumped[n] = _check(
-            settings, limits, is_stamp, bases_known[n], state, restart, followed, elapsed,
-            results[n], forces[n])
-        restart = restart and not answered[n]
-        if answered[n] and not jumped[n]:
-            followed_at[0] = stamps[n]
-            for leg in range(6):
-                followed[leg] = results[n, LENGTHS.start + leg]
-        for k in range(STATE):
-            states[n, k] = state[k]
-
-
 @entry_point('f8[::1]')
 def _one(numbers: Array) -> None:
-    """Solve and check one setpoint, as ``solve`` and ``_check_many`` do for a batch."""
+    """Solve and check one setpoint, as ``solve`` and ``check_many`` do for a batch."""
     settings, written = numbers[_SETTINGS], numbers[_WRITTEN]
     state, result = written[_AFTER], written[_RESULT]
     for n in range(STATE):
@@ -301,14 +238,14 @@ def _one(numbers: Array) -> None:
     inverse_dynamics.solve_one(
         numbers[_PLATFORM], numbers[_MOTION], numbers[_WRENCH], numbers[_BASE], result,
         numbers[_TILE])
-    written[_ANSWERED.start], written[_EXCEEDING.start], written[_JUMPED.start] = _check(
-        settings, settings[_LIMITS], numbers[_IS_STAMP.start] > 0.0,
+    written[_ANSWERED.start], written[_EXCEEDING.start], written[_JUMPED.start] = check(
+        settings, settings[LIMITS], numbers[_IS_STAMP.start] > 0.0,
         numbers[_BASE_KNOWN.start] > 0.0, state, numbers[_RESTART.start] > 0.0,
         numbers[_FOLLOWED], numbers[_ELAPSED.start], result, written[_FORCES])
 
 
 # Compiled functions required for a batch.
-FUNCTIONS = inverse_dynamics.solve, _check_many
+FUNCTIONS = inverse_dynamics.solve, check_many
 
 _FIRST = Singularity()
 _NO_LENGTHS = (math.nan,) * 6  # no setpoint is a jump from these
@@ -334,22 +271,29 @@ class Step:
         self._memory = self._numbers.data  # the same as bytes
         self._numbers[_PLATFORM] = self._platform.constants
         self._settings = settings = self._numbers[_SETTINGS]
-        settings[_THRESHOLDS] = thresholds(parameters)
-        settings[_SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
+        settings[OF_WARNING] = thresholds(parameters)
+        settings[SUPPRESS] = parameters['singularity.action'] == 'suppress_forces'
         self._limits_suppress = parameters['limits.action'] == 'suppress_forces'
-        settings[_LIMITS_SUPPRESS] = self._limits_suppress
-        settings[_LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
-        settings[_FORCE_MAX] = self._limits.force_max
+        settings[LIMITS_SUPPRESS] = self._limits_suppress
+        settings[LIMITS] = self._limits.thresholds[:len(OF_RESULTS)].ravel()
+        settings[FORCE_MAX] = self._limits.force_max
         # Margin by which the time between two setpoints may exceed that between their stamps [s].
         self._slack = JITTER + parameters['setpoint.sync_tolerance']
         self._slack_of_arrival = JITTER + parameters['setpoint.timeout']
-        self._solve = _one.bound(self._numbers)
         self._angles = angles_to_check(parameters, self._limits.of_joints)
         self._angles_of_one = (
             None if self._angles is None else self._angles.of_one(self._numbers[_MOTION]))
         self._clearance = clearance_to_check(parameters)
         self._clearance_of_one = (
             None if self._clearance is None else self._clearance.of_one(self._numbers[_MOTION]))
+
+    def prepare(self) -> None:
+        """Load or compile the function of single setpoints; else the first call does."""
+        _ = self._solve
+
+    @cached_property
+    def _solve(self) -> Callable[[], object]:
+        return _one.bound(self._numbers)
 
     def __call__(self, setpoint: Setpoint, before: State | None) -> Output | None:
         """
@@ -422,9 +366,9 @@ class Step:
         slack = np.full(n_setpoints, self._slack)
         if setpoints.stamped is not None:
             slack[~setpoints.stamped] = self._slack_of_arrival
-        _check_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
-                    slack, state, followed_at, followed, results, forces, states, answered,
-                    exceeding, jumped)
+        check_many(self._settings, setpoints.stamps, setpoints.base_known, setpoints.restarts,
+                   slack, state, followed_at, followed, results, forces, states, answered,
+                   exceeding, jumped)
         stamps, motions = setpoints.stamps, setpoints.motions
         if not answered.all():
             stamps, motions, results, forces = (
