@@ -32,10 +32,12 @@ from pathlib import Path
 import re
 from typing import Any
 
+from stewart_dynamics.node.node import BACKLOG
 from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
+from stewart_dynamics.setpoints.batch_joining import WAITING
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 HERE = Path(__file__).resolve().parent
@@ -80,6 +82,13 @@ def topics(title: str, table: Sequence[Topic], details: bool = True) -> str:
         lines.append(
             f'| `{topic.ros_name}` | {topic.kind.replace("/msg", "")} | {meaning} |')
     return '\n'.join(lines)
+
+
+def queues() -> str:
+    """Return the lengths of the node's queues."""
+    return (f'At most {WAITING} samples of each topic wait for those of the other topics, and '
+            f'{WAITING} messages\nin the middleware; at most {BACKLOG} setpoints wait for an '
+            'answer.')
 
 
 def granted() -> str:
@@ -224,6 +233,7 @@ def pages() -> dict[Path, dict[str, str]]:
         ROOT / 'docs' / 'node.md': {
             'subscribed topics': topics('subscribed', SUBSCRIBED),
             'published topics': topics('published', PUBLISHED)},
+        ROOT / 'docs' / 'faults.md': {'queues': queues()},
         ROOT / 'security' / 'policy.xml': {'topics of stewart_dynamics': granted()},
         ROOT / 'docs' / 'parameters.md': {
             'parameters of stewart_dynamics': parameters_of(Parameters),
