@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from stewart_dynamics.compilation.functions import Preparation
-from stewart_dynamics.node.planned_queue import LENGTH, PlannedTrajectoryQueue
+from stewart_dynamics.node.tasks import LENGTH, TaskQueue
 from stewart_dynamics.planned.messages import PlannedOutcome
 
 
@@ -30,7 +30,7 @@ class Timed:
         self.running = False
         self.pieces: list[str] = []
         self.done: list[tuple[str, float]] = []
-        self.queue = PlannedTrajectoryQueue(
+        self.queue = TaskQueue(
             self._start, Preparation(),
             lambda outcome, came: self.done.append((outcome.message, came)))
 

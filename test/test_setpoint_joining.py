@@ -37,13 +37,13 @@ from scipy.spatial.transform import Rotation
 
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.messages.recorded import Messages
-from stewart_dynamics.setpoints.batch_joining import WAITING
 from stewart_dynamics.setpoints.inputs import (
     ACCEL, COMBINED, POSE, SampleReader, TWIST, WRENCH, WrenchInput)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
     DROPPED, MALFORMED, NOT_FINITE, NOT_JOINED, NOT_UNIT, Rejection, Rejections, TOO_OLD, TWICE,
     WRONG_FRAME)
+from stewart_dynamics.setpoints.sample_joining import WAITING
 from stewart_dynamics.setpoints.step import Setpoint
 
 PARAMETERS = symmetric_parameters().replaced({'setpoint.timeout': 0.1})

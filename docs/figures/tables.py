@@ -37,7 +37,7 @@ from stewart_dynamics.node.topics import PUBLISHED, SUBSCRIBED, Topic
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
-from stewart_dynamics.setpoints.batch_joining import WAITING
+from stewart_dynamics.setpoints.sample_joining import WAITING
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 
 HERE = Path(__file__).resolve().parent

@@ -38,18 +38,17 @@ from stewart_dynamics.external_wrench.measured_legs import (
     LegHistory, MEASURED_LEGS, MeasuredLegs, NOT_COMPILED)
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.node import parameter_changes
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TICK, WARN
 from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
-from stewart_dynamics.node.payload_service import inertia_message, PayloadService
-from stewart_dynamics.node.planned_queue import LENGTH, PAUSE, PlannedTrajectoryQueue
+from stewart_dynamics.node.tasks import (
+    inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
 from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD
 from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
-from stewart_dynamics.ros.declared_parameters import declare_parameters
+from stewart_dynamics.ros.declared_parameters import changed, declare_parameters, log_changes
 from stewart_dynamics.ros.rclpy_workarounds import (
     answer_impossible_transitions, OneShotTimer)
 from stewart_dynamics.ros.repeated_log import RepeatedLog
@@ -109,7 +108,7 @@ class DynamicsNode(LifecycleNode):
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
         self._base_wrench_read = False  # it has a subscriber
-        self._planned: PlannedTrajectoryQueue = PlannedTrajectoryQueue(
+        self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
             OneShotTimer(self, PAUSE, lambda: self._planned.tick()).start,
             self._planned_code, self._on_outcome)
         self._payload = PayloadService(self, self._identify_payload, self._on_payload)
@@ -439,12 +438,12 @@ class DynamicsNode(LifecycleNode):
         """Change all of these parameters between two setpoints, or reject all."""
         ours = {change.name: change.value for change in changes if not is_of_ros(change.name)}
         try:
-            parameters = parameter_changes.changed(self._settings, ours, self._configured)
+            parameters = changed(self._settings, ours, self._configured)
             models = _Models.of(parameters)
         except ParameterError as exc:
             return SetParametersResult(
                 successful=False, reason=str(exc).removeprefix('parameters: '))
-        self._log.write(parameter_changes.log_lines(self._settings, parameters))
+        self._log.write(log_changes(self._settings, parameters))
         self._settings, self._models = parameters, models
         if self._active:
             self._measured_legs.step = models.external_wrench

@@ -36,15 +36,15 @@ from stewart_dynamics.description.model import JOINT_STATES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
-from stewart_dynamics.node.planned_queue import LENGTH
+from stewart_dynamics.node.tasks import LENGTH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned import messages as planned
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
-from stewart_dynamics.setpoints.batch_joining import WAITING
 from stewart_dynamics.setpoints.inputs import (
     ACCEL, BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, COMBINED, INPUT_TYPES, POSE,
     SOURCES, TWIST, WRENCH)
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
+from stewart_dynamics.setpoints.sample_joining import WAITING
 
 DIAGNOSTICS, MARKERS, PAYLOAD = '/diagnostics', 'markers', 'payload'
 

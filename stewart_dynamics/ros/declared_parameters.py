@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node's parameters in ROS: checked by the table, described, and no others."""
+"""A node's parameters in ROS: checked by the table, described, changed, and no others."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 import math
@@ -31,9 +31,12 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
+from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros, other_nodes, read_value
 from stewart_dynamics.ros.console_scripts import given_parameters, parameter_files
+from stewart_dynamics.ros.repeated_log import INFO, WARNING
 
 _TYPES = {
     'string': (ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_STRING_ARRAY),
@@ -220,3 +223,47 @@ def _is_present(node: Node, parameter: RosParameter) -> bool:
     if isinstance(parameter.value, str) or not hasattr(parameter.value, '__len__'):
         return bool(parameter.value == present.value)
     return list(parameter.value) == list(present.value)
+
+
+def changed(parameters: Parameters, changes: Mapping[str, Any], configured: bool) -> Parameters:
+    """
+    Return the parameters with changes applied.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        The present parameters.
+    changes : mapping of name to value
+        New values, as given by ROS.
+    configured : bool
+        Whether the node is configured: then only some parameters may change.
+
+    Raises
+    ------
+    ParameterError
+        A change breaks a rule.
+
+    """
+    for name, value in changes.items():
+        if value is None:
+            raise ParameterError(f'{name}: cannot be unset')
+    if configured:
+        fixed = [name for name in changes
+                 if name in Parameters.table and not Parameters.table[name].while_active]
+        if fixed:
+            raise ParameterError(
+                f'{", ".join(fixed)}: only changed while the node is unconfigured, because its '
+                'topics and its model depend on it: deactivate and clean up first')
+    return parameters.replaced(changes, exact_types=True)
+
+
+def log_changes(before: Parameters, after: Parameters) -> Iterator[tuple[int, str, None]]:
+    """Yield log lines for changed values and for new likely mistakes, as ``RepeatedLog`` takes."""
+    changes = [f'{name}: {before.given.get(name)} -> {value}'
+               for name, value in after.given.items() if value != before.given.get(name)]
+    if changes:
+        yield INFO, '; '.join(changes), None
+    known = likely_mistakes(before, geometry=False)
+    for mistake in likely_mistakes(after, geometry=False):
+        if mistake not in known:
+            yield WARNING, mistake, None

@@ -26,7 +26,7 @@ import math
 import time
 from typing import Any
 
-_INFO, _WARNING = 0, 1  # levels of diagnostic_msgs/DiagnosticStatus
+INFO, WARNING = 0, 1  # levels of diagnostic_msgs/DiagnosticStatus
 
 # Time without an event after which a series ends, and interval of the lines while it lasts [s].
 SECONDS = 5.0
@@ -84,9 +84,9 @@ class RepeatedLog:
 
     def write(self, lines: Iterable[tuple[int, str, Hashable]]) -> None:
         """
-        Write lines, each a level, a text, and the kind of repeated event or None.
+        Write lines, each a level of diagnostics, a text, and the kind of repeated event or None.
 
-        Levels are those of diagnostic_msgs/DiagnosticStatus: 0 information, 1 warning, 2 error.
+        Lines of one kind are written at most every few seconds.
         """
         for level, text, kind in lines:
             if kind is None:
@@ -104,9 +104,9 @@ class RepeatedLog:
 
     def _write(self, level: int, text: str) -> None:
         # One call for each level: rclpy requires the level of a call to be constant.
-        if level == _INFO:
+        if level == INFO:
             self._logger.info(text)
-        elif level == _WARNING:
+        elif level == WARNING:
             self._logger.warning(text)
         else:
             self._logger.error(text)

@@ -37,10 +37,9 @@ from stewart_dynamics.mechanics.frames.rotation import from_quaternion
 from stewart_dynamics.mechanics.rows import BASE, GRAVITY, NO_BASE
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.batch_joining import Joined
 from stewart_dynamics.setpoints.inputs import BASE_SOURCES
 from stewart_dynamics.setpoints.rejections import Rejections
-from stewart_dynamics.setpoints.sample_joining import SampleJoining
+from stewart_dynamics.setpoints.sample_joining import Joined, SampleJoining
 
 # Maximum number of samples kept, for setpoints that had to wait.
 _KEPT = 1000

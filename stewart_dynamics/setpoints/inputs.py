@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +33,6 @@ from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
 from stewart_dynamics.parameters.table import is_unit, Parameters, unit_rule
-from stewart_dynamics.setpoints.batch_joining import TopicSamples
 from stewart_dynamics.setpoints.rejections import (
     frame_details, MALFORMED, NOT_FINITE, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE,
     Rejections, WRONG_FRAME)
@@ -76,6 +76,17 @@ _OF_IMU = (13, 14, 15, 25, 26, 27)
 _COVARIANCES = {16: 'angular_velocity_covariance', 28: 'linear_acceleration_covariance'}
 # Bound on numbers of the base's motion [SI units]: larger ones would disturb filters for long.
 LARGEST = 1e9
+
+
+class TopicSamples(NamedTuple):
+    """New samples of a topic, N of them."""
+
+    stamps: Stamps
+    """(N,) [ns]"""
+    values: Array
+    """(N, ...)"""
+    places: Integers
+    """(N,): index of each message in the order of all messages."""
 
 
 class SampleReader:

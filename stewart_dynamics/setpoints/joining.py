@@ -34,8 +34,7 @@ from stewart_dynamics.mechanics.rows import BASE, MOTION
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.base import BaseInput
-from stewart_dynamics.setpoints.batch_joining import TopicSamples
-from stewart_dynamics.setpoints.inputs import SOURCES, WRENCH, WrenchInput
+from stewart_dynamics.setpoints.inputs import SOURCES, TopicSamples, WRENCH, WrenchInput
 from stewart_dynamics.setpoints.rejections import Rejection, Rejections
 from stewart_dynamics.setpoints.sample_joining import NO_SAMPLES, SampleJoining
 from stewart_dynamics.setpoints.step import Batch, Setpoint

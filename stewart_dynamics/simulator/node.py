@@ -38,7 +38,7 @@ from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.ros.declared_parameters import declare_parameters
-from stewart_dynamics.ros.repeated_log import RepeatedLog
+from stewart_dynamics.ros.repeated_log import RepeatedLog, WARNING
 from stewart_dynamics.ros.run import run
 from stewart_dynamics.ros.signals import SIGNALS
 from stewart_dynamics.setpoints.inputs import WrenchInput
@@ -65,7 +65,6 @@ _BEGIN = SECOND
 _ANNOUNCE_SECONDS = 0.1
 _BACKLOG = 100_000_000  # [ns]
 _WATCH_SECONDS = 1.0
-_WARN = 1  # level of diagnostics
 
 NOT_SIX = 'not six numbers'
 
@@ -266,7 +265,7 @@ class SimulatorNode(Node):
         self._say(rejection, rejection.words(details))
 
     def _say(self, kind: Hashable, text: str) -> None:
-        self._log.write([(_WARN, text, kind)])
+        self._log.write([(WARNING, text, kind)])
 
     def _on_watch(self) -> None:
         self._log.write_last(time.monotonic())

@@ -12,13 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The service that identifies mass, center of mass and inertia of platform and payload."""
+"""
+Work in pieces between setpoints: checks of planned trajectories, identification of the payload.
+
+The service identifies mass, center of mass and inertia of platform and payload.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
 import time
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from geometry_msgs.msg import Inertia, InertiaStamped, Vector3
 from rclpy.node import Node
@@ -29,6 +34,76 @@ from std_srvs.srv import Trigger
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.external_wrench.payload import FUNCTIONS, Payload, PayloadOutcome
 from stewart_dynamics.ros.rclpy_workarounds import create_later_service, OneShotTimer
+
+Outcome = TypeVar('Outcome')
+
+# Maximum number of trajectories in work or waiting.
+LENGTH = 5
+
+# Pause between two pieces of the work [s]. While other programs need the processor as well, the
+# operating system would suspend a node that computes all the time, and delay its setpoints.
+PAUSE = 0.001
+
+
+class TaskQueue(Generic[Outcome]):
+    """
+    Works on tasks in order and in pieces, one at each tick of a timer.
+
+    Parameters
+    ----------
+    start : callable
+        Starts the timer; it ticks once after each start.
+    code : Preparation
+        Compilation of the functions that a task calls; tasks wait until it is ready.
+    done : callable
+        Called with an outcome and the time of arrival of its task [s].
+
+    """
+
+    def __init__(self, start: Callable[[], None], code: Preparation,
+                 done: Callable[[Outcome, float], None]) -> None:
+        self._start = start
+        self._code = code
+        self._done = done
+        self._waiting: deque[tuple[Iterator[Outcome | None], float]] = deque()
+
+    @property
+    def full(self) -> bool:
+        """Whether the queue is full."""
+        return len(self._waiting) >= LENGTH
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is no task."""
+        return not self._waiting
+
+    def add(self, work: Iterator[Outcome | None], came: float) -> None:
+        """Add a task that arrived at a time [s]."""
+        self._code.begin()
+        self._waiting.append((work, came))
+        self._start()
+
+    def tick(self) -> None:
+        """Do one piece of the first task."""
+        if not self._waiting:  # dropped
+            return
+        if not self._code.ready:
+            self._start()
+            return
+        work, came = self._waiting[0]
+        outcome = next(work)
+        if outcome is not None:
+            self._waiting.popleft()
+            self._done(outcome, came)
+        if self._waiting:
+            self._start()
+
+    def drop(self) -> int:
+        """Drop all tasks and return their number."""
+        number = len(self._waiting)
+        self._waiting.clear()
+        return number
+
 
 IDENTIFY_PAYLOAD = 'identify_payload'
 
@@ -59,9 +134,8 @@ class PayloadService:
             done: Callable[[PayloadOutcome, float], None]) -> None:
         self.code = Preparation(*FUNCTIONS)
         self._begin, self._done = work, done
-        self._timer = OneShotTimer(node, _PAUSE, self._on_timer)
-        self._work: Iterator[PayloadOutcome | None] | None = None
-        self._begun = 0.0
+        self._timer = OneShotTimer(node, _PAUSE, lambda: self._tasks.tick())
+        self._tasks: TaskQueue[PayloadOutcome] = TaskQueue(self._timer.start, self.code, self._end)
         self._waiting: list[Callable[[Any], None]] = []
         # Never destroyed before the node: a waiting request would get no answer.
         create_later_service(node, Trigger, f'~/{IDENTIFY_PAYLOAD}', self._on_request)
@@ -69,34 +143,26 @@ class PayloadService:
     def drop(self, reason: str) -> None:
         """End the task in progress, if any, without result."""
         self._timer.stop()
+        self._tasks.drop()
         self._answer(PayloadOutcome(reason))
 
     def _on_request(self, answer: Callable[[Any], None]) -> None:
         self._waiting.append(answer)
-        if self._work is not None:
+        if not self._tasks.empty:
             return
-        self._begun = time.monotonic()
+        now = time.monotonic()
         work = self._begin()
         if isinstance(work, PayloadOutcome):
-            self._end(work)
-            return
-        self._work = work
-        self.code.begin()
-        self._timer.start()
+            self._end(work, now)
+        else:
+            self._tasks.add(work, now)
 
-    def _on_timer(self) -> None:
-        outcome = next(self._work) if self._work and self.code.ready else None
-        if outcome is not None:
-            self._end(outcome)
-        elif self._work:
-            self._timer.start()
-
-    def _end(self, outcome: PayloadOutcome) -> None:
-        self._done(outcome, time.monotonic() - self._begun)
+    def _end(self, outcome: PayloadOutcome, came: float) -> None:
+        self._done(outcome, time.monotonic() - came)
         self._answer(outcome)
 
     def _answer(self, outcome: PayloadOutcome) -> None:
-        waiting, self._waiting, self._work = self._waiting, [], None
+        waiting, self._waiting = self._waiting, []
         for answer in waiting:
             answer(Trigger.Response(
                 success=outcome.payload is not None, message=outcome.message))
