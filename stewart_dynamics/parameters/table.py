@@ -33,7 +33,7 @@ from stewart_dynamics.parameters.parameter_set import Parameter, ParameterSet
 
 
 # The length of a given quaternion may differ from one by this; the quaternion is normalized.
-_QUATERNION_TOLERANCE = 1e-3
+QUATERNION_TOLERANCE = 1e-3
 # A singularity warning or stop ends below this part of the condition number at which it began, or
 # when the predicted time to the crossing exceeds warn_time divided by it.
 HYSTERESIS = 0.8
@@ -261,7 +261,7 @@ class Parameters(ParameterSet):
                 f'{source}: singularity.stop_condition: {stop}: must be at least '
                 f'singularity.warn_condition, {warn}')
         length = float(np.linalg.norm(self['base.imu.orientation']))
-        if not is_unit(length):
+        if abs(length - 1.0) > QUATERNION_TOLERANCE:
             raise ParameterError(f'{source}: base.imu.orientation: '
                                  f'{self["base.imu.orientation"].tolist()}: {unit_rule(length)}')
         platform_joints = self['geometry.platform_joints']
@@ -285,11 +285,6 @@ def inertia_matrix(six: ArrayLike) -> Any:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
-def is_unit(length: Any) -> Any:
-    """Return whether a quaternion's length, or each of an array, is one within the tolerance."""
-    return abs(length - 1.0) <= _QUATERNION_TOLERANCE
-
-
 def unit_rule(length: float) -> str:
     """Return the rule that a quaternion of this length breaks, as text of an error."""
-    return f'length {length:.6g}, must be within {_QUATERNION_TOLERANCE:g} of 1'
+    return f'length {length:.6g}, must be within {QUATERNION_TOLERANCE:g} of 1'

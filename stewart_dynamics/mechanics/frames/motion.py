@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +29,7 @@ from stewart_dynamics.mechanics.frames import rotation as rotations
 from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, MOTION, POSE,
     POSITION, ROTATION)
-from stewart_dynamics.parameters.table import is_unit, unit_rule
+from stewart_dynamics.parameters.table import unit_rule
 
 Self = TypeVar('Self', bound='RowSamples')
 
@@ -60,6 +60,10 @@ class Field:
         view = samples.rows[..., self.where]
         view.setflags(write=False)
         return view.reshape(*samples.shape, 3, 3) if self._is_rotation else view
+
+    def __set__(self, samples: RowSamples, value: object) -> NoReturn:
+        """Raise AttributeError: samples are immutable."""
+        raise AttributeError(f'a {type(samples).__name__} cannot be changed')
 
     def checked(self, name: str, value: Any) -> Array:
         """Return a given value as parts of rows (..., n); MotionError if it is wrong."""
@@ -302,7 +306,7 @@ def matrix_of_quaternion(quaternion: ArrayLike) -> Array:
     q = as_array('quaternion', quaternion, (4,))
     with np.errstate(over='ignore'):
         length = np.asarray(rotations.quaternion_length(*np.moveaxis(q, -1, 0)))
-    off = ~np.asarray(is_unit(length))
+    off = ~np.asarray(rotations.is_unit(length))
     if off.any():
         at = tuple(map(int, np.argwhere(off)[0]))
         raise MotionError(
