@@ -27,6 +27,8 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import travel
 from stewart_dynamics.capability.force_intervals import (
     largest_multiple, quadratic_exit)
+from stewart_dynamics.capability.motions import (
+    constant, Deviations, faster, first_exit, timed)
 from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachable
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
@@ -37,7 +39,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, 
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.platform_arguments import copies, motion_rows
+from stewart_dynamics.mechanics.platform_arguments import check_kind, copies, motion_rows
 from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -63,7 +65,9 @@ class Extent(NamedTuple):
     leg : int or (...)
         Index of the leg that reaches it; -1 for a singularity or nothing.
     sample : int or None
-        Index of the sample of a motion at which it is reached.
+        Index of the sample of a motion at which it is reached, or of the last one before.
+    time : float or None
+        Time in a motion with times at which it is reached [s].
 
     """
 
@@ -71,6 +75,7 @@ class Extent(NamedTuple):
     limit: Any
     leg: Any
     sample: int | None = None
+    time: float | None = None
 
 
 class Tilt(NamedTuple):
@@ -345,7 +350,8 @@ class Capability:
         inertial = np.einsum('...ij,...j->...i', self.platform.mass_matrix(pose), directions)
         return self._multiple(self._at_rest(pose, None, motion), self._per_wrench(pose, inertial))
 
-    def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike) -> Extent:
+    def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike,
+                times: ArrayLike | None = None) -> Extent:
         """
         Return the largest point mass that can be added to the platform [kg].
 
@@ -355,8 +361,13 @@ class Capability:
             Poses at rest, with an answer for each; or a motion, with one answer for all samples.
         center_of_mass : (3,)
             Position of the added mass, platform frame [m].
+        times : (N,), optional
+            Times of a motion (N,), as in ``speed_factor``.
 
         """
+        if times is not None:
+            return timed(self.platform, times, motion, lambda each, _: self.payload(
+                each, center_of_mass), lambda rows, _: rows)
         center = as_array('center_of_mass', center_of_mass, (3,))
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
         forces = self.platform.inverse_dynamics(moving).forces
@@ -366,7 +377,7 @@ class Capability:
         return self._multiple(forces, per_mass, whole=isinstance(motion, Motion))
 
     def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
-                     base: BaseMotion | None = None) -> Extent:
+                     base: BaseMotion | None = None, times: ArrayLike | None = None) -> Extent:
         """
         Return how much faster a motion can be played until the first limit.
 
@@ -378,19 +389,94 @@ class Capability:
         Parameters
         ----------
         motion : Motion
-            Samples of the motion, (...); the motion between them is not checked.
+            Samples of the motion, (...).
         wrench : (..., 6), optional
             External wrench, which does not depend on the speed.
         base : BaseMotion, optional
             Motion of the base, likewise.
+        times : (N,), optional
+            Times of a motion (N,) [s]: the motion between the samples counts as well, by the rules
+            of planned trajectories (``planned.trajectory``): its extremes are found to 1 %, the
+            one that limits to rounding errors. Wrench and base must then be constant. By default
+            the samples alone count.
 
         """
+        if times is not None:
+            constant(wrench, base)
+            return timed(self.platform, times, motion, lambda each, _: self.speed_factor(
+                each, wrench, base), faster)
         found = [self._speed_of_rates(motion), self._speed_of_forces(motion, wrench, base),
                  self._of_path(motion)]
         known = [each for each in found if each is not None]
         if not known:
             raise self._unlimited((limits.VELOCITY_MAX, limits.FORCE_MAX))
         return min(known, key=lambda each: float(each.value))
+
+    def amplitude_factor(self, motion: Motion, center: Pose | Motion | None = None,
+                         wrench: ArrayLike | None = None, base: BaseMotion | None = None,
+                         times: ArrayLike | None = None) -> Extent:
+        """
+        Return how much larger a motion can be until the first limit.
+
+        Positions and rotation vectors from a center grow by the factor, and their rates and
+        accelerations with them. Lengths, joint angles and singularities end the factor as they end
+        a ``travel`` from the center: exactly. Rates and forces are followed in steps of 1/64 of
+        that range, smaller ones where three steps say that a limit may be exceeded between two;
+        their root is exact to rounding errors.
+
+        Parameters
+        ----------
+        motion : Motion of shape (N,)
+            Samples of the motion.
+        center : Pose or Motion of one sample, optional
+            By default the first pose of the motion; less than half a turn from all poses.
+        wrench, base, times
+            As in ``speed_factor``.
+
+        """
+        check_kind(motion, Motion)
+        if len(motion.shape) != 1 or not len(motion):
+            raise MotionError(f'motion: shape {motion.shape}: must be (N,), of N samples')
+        start = self._single(Pose(motion.position[0], motion.rotation[0]) if center is None
+                             else center)
+        if times is not None:
+            constant(wrench, base)
+            return timed(self.platform, times, motion, lambda each, most: self._amplitude(
+                each, start, wrench, base, most), lambda rows, k: Deviations(start, rows).at(k))
+        return self._amplitude(motion, start, wrench, base, math.inf)
+
+    def _amplitude(self, motion: Motion, start: Motion, wrench: ArrayLike | None,
+                   base: BaseMotion | None, most: float) -> Extent:
+        deviations = Deviations(start, motion.rows)
+        moving = np.flatnonzero(deviations.value.any(axis=1))
+        path = Extent(math.inf, '', -1)
+        if len(moving):
+            travels = self.travel(start, deviations.value[moving])
+            at = int(np.argmin(travels.value))
+            path = Extent(float(travels.value[at]), str(travels.limit[at]),
+                          int(travels.leg[at]), int(moving[at]))
+        bounds = {name: self._limits.bounds[name] for name in (
+            limits.VELOCITY_MAX, limits.FORCE_MAX) if name in self._limits.bounds}
+
+        def ratios(factor: float, which: Any) -> Array:
+            """Return rates and forces relative to their limits (N, 6 or 12)."""
+            load = None if wrench is None else _some(np.asarray(wrench), motion.shape, which)
+            moved = None if base is None else BaseMotion.of_rows(
+                _some(base.rows, motion.shape, which))
+            solved = self.platform.inverse_dynamics(
+                Motion.of_rows(deviations.at(factor, which)), load, moved, singular='nan')
+            return np.concatenate([
+                (solved.rates if name == limits.VELOCITY_MAX else solved.forces) / bound
+                for name, bound in bounds.items()], axis=1)
+
+        if not bounds or path.value == 0.0:
+            return path
+        found = first_exit(ratios, min(path.value, most))
+        if found is None:
+            return path
+        factor, sample, column = found
+        name = list(bounds)[column // 6]
+        return Extent(factor, _short(name), column % 6, sample)
 
     def _of_path(self, motion: Motion) -> Extent | None:
         """Return an extent of 0 where lengths or joint angles are exceeded at any speed."""
@@ -485,6 +571,11 @@ def _directions(value: ArrayLike) -> Array:
     if not np.abs(directions).max(axis=-1).all():
         raise MotionError('direction: all six numbers are zero')
     return directions
+
+
+def _some(rows: Array, shape: tuple[int, ...], which: Any) -> Array:
+    """Return the rows of some samples, or the row of all."""
+    return rows if rows.ndim == 1 else np.broadcast_to(rows, (*shape, rows.shape[-1]))[which]
 
 
 def _short(limit: str) -> str:

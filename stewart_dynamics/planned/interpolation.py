@@ -93,11 +93,11 @@ class Interpolation:
         self._quaternions = to_quaternion(motions[:, ROTATION].reshape(-1, 3, 3))
         h = durations[:, None]
         begin, end = motions[:-1], motions[1:]
-        turn = _rotation_vector(self._quaternions[:-1], self._quaternions[1:])
+        turn = rotation_vector(self._quaternions[:-1], self._quaternions[1:])
         # At the beginning the rotation vector is zero: J = 1, and J' r' = r' x r' / 2 = 0.
         value = np.concatenate([begin[:, POSITION], np.zeros_like(turn)], axis=1)
         rate, acceleration = begin[:, TWIST], begin[:, ACCELERATION]
-        turn_rate, turn_acceleration = _rates_of_vector(
+        turn_rate, turn_acceleration = rates_of_vector(
             turn, end[:, ANGULAR_VELOCITY], end[:, ANGULAR_ACCELERATION])
         end_value = np.concatenate([end[:, POSITION], turn], axis=1)
         end_rate = np.concatenate([end[:, LINEAR_VELOCITY], turn_rate], axis=1)
@@ -151,25 +151,35 @@ class Interpolation:
                 control, n=5 - degree, axis=1)) for degree in (5, 4, 3))
         rate *= 5.0 / h
         acceleration *= 20.0 / (h * h)
-        turn, turn_rate = value[:, 3:], rate[:, 3:]
-        a, b, per_a, per_b = _coefficients(turn)
-        along = (turn * turn_rate).sum(axis=1, keepdims=True)
-        once = _cross(turn, turn_rate)
-        twice = _cross(turn, once)
-        rows = np.empty((len(fraction), MOTION))
-        rows[:, POSITION] = value[:, :3]
-        rows[:, ROTATION] = np.stack(
-            from_quaternion(*_turned(self._quaternions[which], turn).T), axis=1)
-        rows[:, LINEAR_VELOCITY] = rate[:, :3]
-        rows[:, ANGULAR_VELOCITY] = turn_rate + a * once + b * twice
-        rows[:, LINEAR_ACCELERATION] = acceleration[:, :3]
-        rows[:, ANGULAR_ACCELERATION] = (
-            _jacobian(turn, a, b, acceleration[:, 3:])
-            + per_a * along * once + per_b * along * twice + b * _cross(turn_rate, once))
+        rows = motion_of(self._quaternions[which], value, rate, acceleration)
         for end in (0, 1):
             there = fraction == end
             rows[there] = self._motions[which[there] + end]
         return rows
+
+
+def motion_of(quaternions: Array, value: Array, rate: Array, acceleration: Array) -> Array:
+    """
+    Return rows of motion (N, MOTION) of positions and rotation vectors (N, 6).
+
+    Rates and accelerations are their derivatives in time; the rotation vectors, base axes, turn
+    rotations given as quaternions (N, 4) or (1, 4).
+    """
+    turn, turn_rate = value[:, 3:], rate[:, 3:]
+    a, b, per_a, per_b = _coefficients(turn)
+    along = (turn * turn_rate).sum(axis=1, keepdims=True)
+    once = _cross(turn, turn_rate)
+    twice = _cross(turn, once)
+    rows = np.empty((len(value), MOTION))
+    rows[:, POSITION] = value[:, :3]
+    rows[:, ROTATION] = np.stack(from_quaternion(*_turned(quaternions, turn).T), axis=1)
+    rows[:, LINEAR_VELOCITY] = rate[:, :3]
+    rows[:, ANGULAR_VELOCITY] = turn_rate + a * once + b * twice
+    rows[:, LINEAR_ACCELERATION] = acceleration[:, :3]
+    rows[:, ANGULAR_ACCELERATION] = (
+        _jacobian(turn, a, b, acceleration[:, 3:])
+        + per_a * along * once + per_b * along * twice + b * _cross(turn_rate, once))
+    return rows
 
 
 _BINOMIAL = {degree: np.array([comb(degree, n) for n in range(degree + 1)], dtype=float)
@@ -224,7 +234,7 @@ def _jacobian(turn: Array, a: Array, b: Array, vector: Array) -> Array:
     return vector + a * once + b * _cross(turn, once)
 
 
-def _rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Array]:
+def rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Array]:
     """Return r' and r'' of rotation vectors (N, 3) of angles up to pi, given omega and alpha."""
     a, b, per_a, per_b = _coefficients(turn)
     half = np.full_like(a, -0.5)
@@ -237,7 +247,7 @@ def _rates_of_vector(turn: Array, omega: Array, alpha: Array) -> tuple[Array, Ar
     return rate, _jacobian(turn, half, c, left)
 
 
-def _rotation_vector(start: Array, end: Array) -> Array:
+def rotation_vector(start: Array, end: Array) -> Array:
     """Return axis times angle (N, 3) [rad] of the shorter rotation between two."""
     vector = (end[:, :3] * start[:, 3:] - start[:, :3] * end[:, 3:]
               - _cross(end[:, :3], start[:, :3]))

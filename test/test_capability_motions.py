@@ -1,0 +1,157 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Motions that grow or are played faster, at their samples and between them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import rng
+from scipy.spatial.transform import Rotation
+from stewart_dynamics import (
+    BaseMotion, Capability, check_planned_trajectory, Motion, MotionError, Pose, StewartPlatform)
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.motions import Deviations, faster
+from test_capability_boxes import PLATFORM
+
+HOME = Motion.from_pose(PLATFORM.home_pose())
+TIMES: Array = np.linspace(0.0, 4.0, 201, dtype=np.float64)
+
+
+def turned(seed: int, size: float = 0.1) -> tuple[Array, Array, Array, Array]:
+    """Return a motion's amplitudes and phases of position and rotation vector at two rates."""
+    random = rng(seed)
+    first, third = size * random.uniform(-1.0, 1.0, (2, 6)) / [[1.0], [3.0]]
+    return first, third, random.uniform(0.0, 6.0, 6), random.uniform(0.0, 6.0, 6)
+
+
+def motion(seed: int, times: Array = TIMES, size: float = 0.1, factor: float = 1.0) -> Motion:
+    """Return harmonic deviations from home that are larger by a factor."""
+    first, third, phase, its = turned(seed, size)
+
+    def coordinates(at: Array) -> Array:
+        found: Array = factor * (first * np.sin(2.0 * at[:, None] + phase)
+                                 + third * np.sin(6.0 * at[:, None] + its))
+        return found
+
+    h = 1e-3
+    offsets = np.array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0]) * h
+    once = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / (60.0 * h)
+    around = np.array([coordinates(times + offset) for offset in offsets])
+    rotations = np.array([Rotation.from_rotvec(each[:, 3:]).as_matrix() for each in around])
+    now = rotations[3] @ HOME.rotation
+    position = HOME.position + around[3, :, :3]
+
+    def omega(at: Array) -> Array:
+        near = np.array([Rotation.from_rotvec(coordinates(at + offset)[:, 3:]).as_matrix()
+                         for offset in offsets])
+        spin = np.einsum('k,knij,nlj->nil', once, near, near[3])
+        found: Array = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        return found
+
+    def velocity(at: Array) -> Array:
+        found: Array = factor * (2.0 * first * np.cos(2.0 * at[:, None] + phase)
+                                 + 6.0 * third * np.cos(6.0 * at[:, None] + its))[:, :3]
+        return found
+
+    def acceleration(at: Array) -> Array:
+        found: Array = -factor * (4.0 * first * np.sin(2.0 * at[:, None] + phase)
+                                  + 36.0 * third * np.sin(6.0 * at[:, None] + its))[:, :3]
+        return found
+
+    alpha = np.einsum('k,kni->ni', once, np.array([omega(times + offset) for offset in offsets]))
+    return Motion(position, now, velocity(times), omega(times), acceleration(times), alpha)
+
+
+def ratio(platform: StewartPlatform, moving: Motion, wrench: Any = None) -> float:
+    """Return the largest part of a limit that samples take."""
+    p, solved = platform.parameters, platform.inverse_dynamics(moving, wrench)
+    return float(max((np.abs(solved.rates) / p['limits.velocity_max']).max(),
+                     (np.abs(solved.forces) / p['limits.force_max']).max(),
+                     (solved.lengths / p['limits.length_max']).max(),
+                     (p['limits.length_min'] / solved.lengths).max()))
+
+
+@pytest.mark.parametrize('factor', [0.3, 2.0])
+def test_deviations_grow_with_their_rates_and_accelerations(factor: float) -> None:
+    given, wanted = motion(0), motion(0, factor=factor)
+    np.testing.assert_allclose(Deviations(HOME, given.rows).at(factor), wanted.rows, atol=1e-7)
+    np.testing.assert_allclose(Deviations(HOME, given.rows).at(1.0), given.rows, atol=1e-13)
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_a_motion_as_large_as_it_can_be_reaches_its_limit(seed: int) -> None:
+    platform = PLATFORM if seed % 2 else StewartPlatform(PLATFORM.parameters.replaced({
+        'limits.force_max': 2000.0 if seed % 4 else 900.0, 'limits.velocity_max': 0.4}))
+    given, wrench = motion(seed, size=0.05), [0.0, 100.0, -300.0, 0.0, 20.0, 0.0]
+    found = Capability(platform).amplitude_factor(given, HOME, wrench)
+    grown = Deviations(HOME, given.rows)
+
+    def at(factor: float) -> float:
+        return ratio(platform, Motion.of_rows(grown.at(factor)), wrench)
+
+    assert at(found.value) == pytest.approx(1.0, abs=1e-9)
+    assert at(found.value * (1.0 + 1e-6)) > 1.0
+    assert max(at(k) for k in np.linspace(0.0, found.value, 300)) <= 1.0 + 1e-9
+    assert found.limit in ('length_min', 'length_max', 'velocity_max', 'force_max')
+
+
+@pytest.mark.parametrize('ask', ['speed', 'amplitude', 'payload'])
+def test_with_times_the_motion_between_the_samples_counts(ask: str) -> None:
+    """Ten samples find the limit that many find, and a planned trajectory keeps it."""
+    platform = StewartPlatform(PLATFORM.parameters.replaced({'limits.velocity_max': 0.3}))
+    capability, few = Capability(platform), TIMES[::20]
+    given = motion(3, few)
+
+    def found(times: Array | None) -> Any:
+        if ask == 'speed':
+            return capability.speed_factor(given, times=times)
+        if ask == 'amplitude':
+            return capability.amplitude_factor(given, times=times)
+        return capability.payload(given, [0.1, 0.2, 0.3], times=times)
+
+    between, samples = found(few), found(None)
+    assert between.value < samples.value
+    assert few[between.sample] <= between.time <= few[between.sample + 1]
+    if ask == 'payload':
+        return
+    for factor in (1.0 - 2e-3, 1.0 + 2e-3):
+        k = factor * between.value
+        rows, times = given.rows, few
+        if ask == 'speed':
+            rows, times = faster(rows, k), few / k
+        else:
+            rows = Deviations(Motion.from_pose(given.pose[0]), rows).at(k)
+        accepted = check_planned_trajectory(platform, times, Motion.of_rows(rows)).accepted
+        assert accepted == (factor < 1.0)
+
+
+def test_a_motion_that_starts_outside_cannot_grow() -> None:
+    outside = Pose(HOME.position + [0.0, 0.0, 5.0], HOME.rotation)
+    found = Capability(PLATFORM).amplitude_factor(motion(0), outside)
+    assert (found.value, found.limit) == (0.0, 'length_max')
+
+
+@pytest.mark.parametrize('more, text', [
+    ({'times': TIMES[:5]}, r'times: shape \(5,\)'),
+    ({'times': -TIMES}, r'times\[1\]: must be strictly increasing'),
+    ({'times': TIMES, 'wrench': np.zeros((201, 6))}, 'wrench: .* must be a single one'),
+    ({'times': TIMES, 'base': BaseMotion(np.zeros((201, 3)))}, 'base: .* must be a single one')])
+def test_times_that_do_not_fit_are_rejected(more: Any, text: str) -> None:
+    for ask in (Capability(PLATFORM).speed_factor, Capability(PLATFORM).amplitude_factor):
+        with pytest.raises(MotionError, match=text):
+            ask(motion(0), **more)
