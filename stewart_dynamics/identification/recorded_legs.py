@@ -27,10 +27,11 @@ from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
 from stewart_dynamics.identification.windows import period_of, segments, Signal, uniform, Window
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import FIELDS, JointStateReader, MISSING_JOINTS
 from stewart_dynamics.messages.recorded import Messages
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
+JOINT_STATE = type_names.JOINT_STATE
 # Maximum number of samples in a window, so that it and its extract fit into memory.
 _WINDOW = 1 << 16
 # Upper bound of positions [m] and forces [N]; larger values would overflow when squared.

@@ -36,6 +36,7 @@ from stewart_dynamics.description.model import JOINT_STATES, TF
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.external_wrench.estimate import EXTERNAL_WRENCH
 from stewart_dynamics.external_wrench.measured_legs import MEASURED_LEGS
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.node.tasks import LENGTH
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.planned import messages as planned
@@ -90,7 +91,7 @@ SUBSCRIBED = (
            '; held until the next one'),
     _input(MEASURED_LEGS, 'measured position, velocity and effort of the legs',
            ', for the [external wrench](external_wrench.md) and the [payload](payload.md); names '
-           'in any order, other joints are ignored', kind='sensor_msgs/msg/JointState'),
+           'in any order, other joints are ignored', kind=type_names.JOINT_STATE),
     _input(BASE_POSE, 'base frame in `world_frame`', ': see [Moving base](moving_base.md)',
            'base.source: pose or motion'),
     _input(BASE_TWIST, "velocity of the base frame's origin and angular velocity",
@@ -118,25 +119,25 @@ PUBLISHED = (
     Topic(planned.OUTPUT, planned.OUTPUT_TYPE,
           'answer to `~/platform_trajectory`', ', with its stamp and times: positions, velocities '
           'and effort of the legs; nothing when it is rejected', depth=LENGTH),
-    Topic(EXTERNAL_WRENCH, 'geometry_msgs/msg/WrenchStamped',
+    Topic(EXTERNAL_WRENCH, type_names.WRENCH_STAMPED,
           'estimated [external wrench](external_wrench.md)',
           ', for each message of `~/measured_legs`, with its stamp'),
     _output(BASE_WRENCH, '[what the hexapod puts on its base]'
             '(moving_base.md#what-the-base-must-carry)', ", at the base's origin, base axes; "
             'computed while somebody subscribes'),
-    Topic(PAYLOAD, 'geometry_msgs/msg/InertiaStamped',
+    Topic(PAYLOAD, type_names.INERTIA_STAMPED,
           'platform and [payload](payload.md) as one body', ', when the service '
           '`~/identify_payload` (std_srvs/Trigger) has identified it; latched (transient local)',
           depth=1, latched=True),
-    Topic(JOINT_STATES, 'sensor_msgs/msg/JointState', 'positions of all joints of the URDF',
+    Topic(JOINT_STATES, type_names.JOINT_STATE, 'positions of all joints of the URDF',
           ', for [robot_state_publisher](visualization.md#as-a-model); at most '
           '`visualization_rate`, while somebody subscribes'),
-    Topic(TF, 'tf2_msgs/msg/TFMessage', '`base_frame` to `platform_frame`',
+    Topic(TF, type_names.TF_MESSAGE, '`base_frame` to `platform_frame`',
           parameter='publish_tf: true', depth=100),
-    Topic(MARKERS, 'visualization_msgs/msg/MarkerArray',
+    Topic(MARKERS, type_names.MARKER_ARRAY,
           '[visualization](visualization.md) for RViz and Foxglove',
           '; at most `visualization_rate`, while somebody subscribes', depth=1),
-    Topic(DIAGNOSTICS, 'diagnostic_msgs/msg/DiagnosticArray',
+    Topic(DIAGNOSTICS, type_names.DIAGNOSTIC_ARRAY,
           'state of the node, one status for each part', ', see below'),
 )
 

@@ -36,6 +36,7 @@ from stewart_dynamics.mechanics.rows import (
     ANGULAR_ACCELERATION, ANGULAR_VELOCITY, BASE, consecutive, LENGTHS, LINEAR_ACCELERATION,
     MOTION, POSE, POSITION, ROTATION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.trajectory import LegTrajectory, PlatformTrajectory
 from stewart_dynamics.parameters.table import CHECK, IGNORE, Parameters, unit_rule
@@ -46,8 +47,8 @@ from stewart_dynamics.setpoints.inputs import unit_quaternions
 from stewart_dynamics.setpoints.rejections import (
     BASE_NOT_KNOWN, frame_details, MALFORMED, NOT_FINITE, NOT_UNIT, WRONG_FRAME)
 
-INPUT, INPUT_TYPE = 'platform_trajectory', 'trajectory_msgs/msg/MultiDOFJointTrajectory'
-OUTPUT, OUTPUT_TYPE = 'leg_trajectory', 'trajectory_msgs/msg/JointTrajectory'
+INPUT, INPUT_TYPE = 'platform_trajectory', type_names.MULTI_DOF_JOINT_TRAJECTORY
+OUTPUT, OUTPUT_TYPE = 'leg_trajectory', type_names.JOINT_TRAJECTORY
 
 MOST_POINTS = 100_000
 # Numbers of points read and written between two yields: some tenths of a millisecond of work.

@@ -22,13 +22,13 @@ from collections.abc import Container, Mapping
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.description.model import JOINT_STATES
 from stewart_dynamics.errors import BagError, StewartError
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints import inputs
 from stewart_dynamics.setpoints.base_wrench import BASE_WRENCH
 
 MEASURED = 'measured'
-_MEASURED_TYPE = 'sensor_msgs/msg/JointState'
 # Maximum number of listed texts of a kind.
 LISTED = 20
 _OF_BASE = tuple(dict.fromkeys(key for keys in inputs.BASE_SOURCES.values() for key in keys))
@@ -57,7 +57,7 @@ def find_topics(recording: Recording, parameters: Parameters, options: Options) 
     if load := _named(recording, inputs.WRENCH, options, ending=False):
         found[inputs.WRENCH] = load
     if options.measured:
-        found[MEASURED] = _of_type(recording, options.measured, _MEASURED_TYPE)
+        found[MEASURED] = _of_type(recording, options.measured, type_names.JOINT_STATE)
     names = list(found.values())
     for name in names:
         if names.count(name) > 1:
@@ -86,7 +86,7 @@ def notices_of(recording: Recording, topics: Mapping[str, str], parameters: Para
     if base:
         notices.append(f'{_joined(base)}: not used: base.source is {parameters["base.source"]}')
     legs = sorted(name for name, kind in recording.topics.items()
-                  if kind == _MEASURED_TYPE and name not in topics.values()
+                  if kind == type_names.JOINT_STATE and name not in topics.values()
                   and name not in (f'{options.node}/leg_states', f'{options.node}/{JOINT_STATES}'))
     if legs and MEASURED not in topics:
         notices.append(f'{_joined(legs)}: not used; --measured compares the efforts of measured '

@@ -33,6 +33,7 @@ from stewart_dynamics.description.model import JOINT_STATES, LinkTransforms, TF
 from stewart_dynamics.description.urdf import urdf
 from stewart_dynamics.mechanics.kinematics.leg_joints import TreeJoints
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.model import positions_layout, TransformsWriter
 from stewart_dynamics.messages.standard import string
 from stewart_dynamics.parameters.table import Parameters
@@ -41,10 +42,10 @@ TF_STATIC = '/tf_static'
 ROBOT_DESCRIPTION = '/robot_description'
 
 MODEL_TYPES = {
-    JOINT_STATES: 'sensor_msgs/msg/JointState',
-    TF: 'tf2_msgs/msg/TFMessage',
-    TF_STATIC: 'tf2_msgs/msg/TFMessage',
-    ROBOT_DESCRIPTION: 'std_msgs/msg/String',
+    JOINT_STATES: type_names.JOINT_STATE,
+    TF: type_names.TF_MESSAGE,
+    TF_STATIC: type_names.TF_MESSAGE,
+    ROBOT_DESCRIPTION: type_names.STRING,
 }
 Written = tuple[str, NDArray[np.void]]
 

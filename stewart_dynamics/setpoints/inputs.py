@@ -29,6 +29,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array, Bytes, Flags, Integers, NO_WRENCH, Six, Stamps
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion, is_unit, quaternion_length
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import MalformedError, Stamped
 from stewart_dynamics.messages.layout import Layout
 from stewart_dynamics.messages.setpoint import combined, imu, layout_of, pose, twist, wrench
@@ -49,15 +50,15 @@ BASE_IMU = 'base/imu'
 WRENCH = 'wrench'
 
 INPUT_TYPES = {
-    POSE: 'geometry_msgs/msg/PoseStamped',
-    TWIST: 'geometry_msgs/msg/TwistStamped',
-    ACCEL: 'geometry_msgs/msg/AccelStamped',
-    COMBINED: 'trajectory_msgs/msg/MultiDOFJointTrajectory',
-    BASE_POSE: 'geometry_msgs/msg/PoseStamped',
-    BASE_TWIST: 'geometry_msgs/msg/TwistStamped',
-    BASE_ACCEL: 'geometry_msgs/msg/AccelStamped',
-    BASE_IMU: 'sensor_msgs/msg/Imu',
-    WRENCH: 'geometry_msgs/msg/WrenchStamped',
+    POSE: type_names.POSE_STAMPED,
+    TWIST: type_names.TWIST_STAMPED,
+    ACCEL: type_names.ACCEL_STAMPED,
+    COMBINED: type_names.MULTI_DOF_JOINT_TRAJECTORY,
+    BASE_POSE: type_names.POSE_STAMPED,
+    BASE_TWIST: type_names.TWIST_STAMPED,
+    BASE_ACCEL: type_names.ACCEL_STAMPED,
+    BASE_IMU: type_names.IMU,
+    WRENCH: type_names.WRENCH_STAMPED,
 }
 
 # Topics that are joined, for each value of setpoint.source.

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stewart_dynamics.arrays import Array, NO_WRENCH, Six, Stamps
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import layout_of, StampedWriter, wrench
 from stewart_dynamics.messages.standard import (
@@ -33,12 +34,12 @@ from stewart_dynamics.setpoints.step import Output, Outputs
 
 # Topics relative to the node's name, in the order in which they are published for a setpoint.
 OUTPUT_TYPES = {
-    'leg_states': 'sensor_msgs/msg/JointState',
-    'leg_lengths': 'std_msgs/msg/Float64MultiArray',
-    'leg_forces': 'std_msgs/msg/Float64MultiArray',
-    'jacobian_determinant': 'std_msgs/msg/Float64',
-    'singularity_warning': 'std_msgs/msg/Bool',
-    BASE_WRENCH: 'geometry_msgs/msg/WrenchStamped',
+    'leg_states': type_names.JOINT_STATE,
+    'leg_lengths': type_names.FLOAT64_MULTI_ARRAY,
+    'leg_forces': type_names.FLOAT64_MULTI_ARRAY,
+    'jacobian_determinant': type_names.FLOAT64,
+    'singularity_warning': type_names.BOOL,
+    BASE_WRENCH: type_names.WRENCH_STAMPED,
 }
 # A topic, the indices of the outputs that have a message on it, and the messages.
 Written = tuple[str, Stamps, NDArray[np.void]]

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from operator import sub
 
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.joint_state import JointStateWriter
 from stewart_dynamics.messages.setpoint import StampedWriter
 from stewart_dynamics.parameters.table import Parameters
@@ -30,14 +31,14 @@ from stewart_dynamics.simulator.plant import PlantState
 
 # Under the node's name; those that it publishes in their order.
 INPUT_TYPES = {
-    'commands': 'std_msgs/msg/Float64MultiArray',
-    'wrench': 'geometry_msgs/msg/WrenchStamped',
+    'commands': type_names.FLOAT64_MULTI_ARRAY,
+    'wrench': type_names.WRENCH_STAMPED,
 }
 OUTPUT_TYPES = {
-    'leg_states': 'sensor_msgs/msg/JointState',
-    'pose': 'geometry_msgs/msg/PoseStamped',
-    'twist': 'geometry_msgs/msg/TwistStamped',
-    'accel': 'geometry_msgs/msg/AccelStamped',
+    'leg_states': type_names.JOINT_STATE,
+    'pose': type_names.POSE_STAMPED,
+    'twist': type_names.TWIST_STAMPED,
+    'accel': type_names.ACCEL_STAMPED,
 }
 # Topics of the base: published if its motion is generated, subscribed if it comes by topics.
 BASE_TYPES = {topic: inputs.INPUT_TYPES[topic] for topic in inputs.BASE_SOURCES['motion']}

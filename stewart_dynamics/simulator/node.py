@@ -35,6 +35,7 @@ from std_msgs.msg import Float64MultiArray
 from stewart_dynamics.arrays import SECOND, Six
 from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
+from stewart_dynamics.messages import type_names
 from stewart_dynamics.messages.cdr import finite, MalformedError
 from stewart_dynamics.messages.standard import clock, float64_values
 from stewart_dynamics.ros.declared_parameters import declare_parameters
@@ -50,13 +51,13 @@ from stewart_dynamics.simulator.parameters import SimulatorParameters
 from stewart_dynamics.simulator.plant import Plant
 
 _TYPES: dict[str, Any] = {
-    'geometry_msgs/msg/PoseStamped': PoseStamped,
-    'geometry_msgs/msg/TwistStamped': TwistStamped,
-    'geometry_msgs/msg/AccelStamped': AccelStamped,
-    'geometry_msgs/msg/WrenchStamped': WrenchStamped,
-    'sensor_msgs/msg/Imu': Imu,
-    'sensor_msgs/msg/JointState': JointState,
-    'std_msgs/msg/Float64MultiArray': Float64MultiArray,
+    type_names.POSE_STAMPED: PoseStamped,
+    type_names.TWIST_STAMPED: TwistStamped,
+    type_names.ACCEL_STAMPED: AccelStamped,
+    type_names.WRENCH_STAMPED: WrenchStamped,
+    type_names.IMU: Imu,
+    type_names.JOINT_STATE: JointState,
+    type_names.FLOAT64_MULTI_ARRAY: Float64MultiArray,
 }
 
 _QUEUE = 1000

@@ -1,0 +1,35 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The types of the messages, by the names that ROS gives them."""
+
+from __future__ import annotations
+
+ACCEL_STAMPED = 'geometry_msgs/msg/AccelStamped'
+BOOL = 'std_msgs/msg/Bool'
+DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
+FLOAT64 = 'std_msgs/msg/Float64'
+FLOAT64_MULTI_ARRAY = 'std_msgs/msg/Float64MultiArray'
+IMU = 'sensor_msgs/msg/Imu'
+INERTIA_STAMPED = 'geometry_msgs/msg/InertiaStamped'
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+MARKER_ARRAY = 'visualization_msgs/msg/MarkerArray'
+MULTI_DOF_JOINT_TRAJECTORY = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
+POSE_STAMPED = 'geometry_msgs/msg/PoseStamped'
+STRING = 'std_msgs/msg/String'
+TF_MESSAGE = 'tf2_msgs/msg/TFMessage'
+TWIST_STAMPED = 'geometry_msgs/msg/TwistStamped'
+WRENCH_STAMPED = 'geometry_msgs/msg/WrenchStamped'
