@@ -105,7 +105,8 @@ setup(
     maintainer_email='maintainers@stewart-dynamics.example',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed'], f'{package_name}.identification': ['templates/*'],
+    package_data={package_name: ['py.typed'], f'{package_name}.datasheet': ['templates/*'],
+                  f'{package_name}.identification': ['templates/*'],
                   f'{package_name}.replay': ['templates/*'],
                   f'{package_name}.reporting': ['templates/*']},
     data_files=[
@@ -127,6 +128,7 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
+            'stewart_capability = stewart_dynamics.datasheet:main',
             'stewart_describe = stewart_dynamics.description:main',
             'stewart_dynamics = stewart_dynamics.ros.console_scripts:dynamics',
             'stewart_identify = stewart_dynamics.identification:main',

@@ -34,8 +34,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'stewart_dynamics'
-EXECUTABLES = ('stewart_dynamics', 'stewart_describe', 'stewart_identify', 'stewart_replay',
-               'stewart_simulator', 'stewart_trajectory')
+EXECUTABLES = ('stewart_capability', 'stewart_dynamics', 'stewart_describe', 'stewart_identify',
+               'stewart_replay', 'stewart_simulator', 'stewart_trajectory')
 PACKAGED = ('bags', 'config', 'examples', 'launch', 'resource', 'security', NAME, 'LICENSE',
             'package.xml', 'pyproject.toml', 'setup.cfg', 'setup.py')
 SOURCES = ('bags', 'benchmarks', 'demo', 'docs', 'examples', 'launch', 'test', NAME)
@@ -275,7 +275,7 @@ def test_contributing_is_the_text_that_ament_copyright_knows() -> None:
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_entry_point_loads(distribution: importlib.metadata.Distribution, name: str) -> None:
     """The function behind each executable exists."""
-    if name not in ('stewart_describe', 'stewart_replay'):
+    if name not in ('stewart_capability', 'stewart_describe', 'stewart_replay'):
         pytest.importorskip('rclpy')
     point, = distribution.entry_points.select(name=name)
     assert callable(point.load())

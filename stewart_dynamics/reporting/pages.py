@@ -91,7 +91,7 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
     folder : Path
         The folder of the template.
     template : str
-        Name of the template (.html), its style (.css) and its script (.js).
+        Name of the template (.html), its style (.css) and its script (.js), if it has one.
     scripts : sequence of str
         Other scripts that the page is allowed to run.
     shared : bool
@@ -102,13 +102,14 @@ def page(folder: Path, template: str, scripts: Sequence[str] = (), shared: bool 
         Variables of the template.
 
     """
-    script, style = (folder.joinpath(template).with_suffix(suffix).read_text(encoding='utf-8')
-                     for suffix in ('.js', '.css'))
-    script = f'\n{script}'
+    style, script = folder.joinpath(f'{template}.css').read_text(encoding='utf-8'), ''
+    own = folder / f'{template}.js'
+    if own.is_file():
+        script = f"\n{own.read_text(encoding='utf-8')}"
     common = _SHARED.joinpath('document.css').read_text(encoding='utf-8') if document else ''
     style = custom_properties() + common + style
-    hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script)),
-                       *(["'self'"] if shared else [])])
+    hashes = ' '.join([*(f"'sha256-{_digest(each)}'" for each in (*scripts, script) if each),
+                       *(["'self'"] if shared else [])]) or "'none'"
     return _environment(folder).get_template(f'{template}.html').render(
         hashes=hashes, script=script, style=style, **values)
 

@@ -33,13 +33,17 @@ import tempfile
 from typing import Protocol
 
 from stewart_dynamics.errors import BagError
+from stewart_dynamics.whole_file import named
 
 RESULT = 'summary.json'
 """The file by which a folder is known as results of a replay."""
 IDENTIFICATION = 'identification.json'
 """The same of an identification."""
+DATASHEET = 'datasheet.json'
+"""The same of a datasheet."""
 
-_KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification'}
+_KINDS = {RESULT: 'replay results', IDENTIFICATION: 'results of an identification',
+          DATASHEET: 'a datasheet'}
 
 _REPLACED = '.replaced'
 _PARTIAL = re.compile(
@@ -62,7 +66,8 @@ class Writing(Protocol):
 def whole_folder(final: Path, options: Writing, result: str = RESULT) -> Iterator[Path]:
     """Yield a folder that gets its final name only when it is complete."""
     final.parent.mkdir(parents=True, exist_ok=True)
-    partial, lock = _new_folder(final, options.run)
+    with named(final):
+        partial, lock = _new_folder(final, options.run)
     replaced = partial.with_name(f'{partial.name}{_REPLACED}')
     try:
         yield partial

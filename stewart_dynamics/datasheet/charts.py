@@ -1,0 +1,169 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Charts of a datasheet: sections of the workspace, tilt, payload, and use of limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.datasheet.workspace import Boundary
+from stewart_dynamics.reporting.curves import Curves
+from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
+
+_WIDTH = 340.0
+# Dashes of a boundary by the limit that it is, before its color by the leg.
+DASHES = {'length_max': None, 'length_min': '6 3', 'base_joint_angle_max': '2 2.5',
+          'platform_joint_angle_max': '9 2 2 2', 'leg_clearance_min': '4 2 1 2 1 2',
+          'singularity': '1 3'}
+_MILLI = 1e3
+
+
+def section_chart(boundary: Boundary, first: int, second: int, set_: Array | None) -> Picture:
+    """Draw a section [mm], and the rectangle in it of a set of ranges (6, 2) [m]."""
+    names = 'XYZ'[first], 'XYZ'[second]
+    picture = Picture(_WIDTH, 330.0, f'Workspace, {names[0]}-{names[1]} section')
+    points = _MILLI * boundary.points[:, [first, second]]
+    x, y = _equal_ranges(points, (272.0, 252.0))
+    chart = Chart(picture, (52.0, 30.0, 272.0, 252.0), x, y)
+    picture.path(chart.at(points), closed=True, css='area')
+    chart.draw_axes(f'{names[0]} [mm]', f'{names[1]} [mm]')
+    _draw_boundary(chart, points, boundary)
+    if set_ is not None:
+        (a, b), (c, d) = _MILLI * set_[first], _MILLI * set_[second]
+        picture.path(chart.at([[a, c], [b, c], [b, d], [a, d]]), closed=True, css='set')
+    _cross(picture, chart.at([0.0, 0.0]))
+    return picture
+
+
+def tilt_chart(boundaries: Sequence[Boundary], names: Sequence[str]) -> Picture:
+    """Draw tilts over their azimuths [degrees]; the first boundary is that of the pose."""
+    picture = Picture(_WIDTH, 330.0, 'Largest tilt over its azimuth')
+    largest = max(float(np.max(each.values[np.isfinite(each.values)], initial=0.0))
+                  for each in boundaries)
+    rings = ticks(0.0, np.degrees(largest), 4)
+    outer = max(np.degrees(largest) * 1.02, rings[-1])
+    center, radius = np.array([170.0, 158.0]), 126.0
+    scale = radius / outer
+    for ring in rings[1:]:
+        picture.circle(center, ring * scale, css='grid', fill='none')
+    for angle in range(0, 360, 30):
+        way = _toward(np.radians(angle))
+        picture.line(center, center + radius * way, css='grid')
+        picture.text(center + (radius + 12.0) * way + [0.0, 3.5], f'{angle}°', 'middle',
+                     css='tick')
+    ways = _toward(np.linspace(0.0, 2.0 * np.pi, len(boundaries[0].values), endpoint=False))
+    for n, each in reversed(list(enumerate(boundaries))):
+        values = np.degrees(np.where(np.isfinite(each.values), each.values, np.nan)) * scale
+        points = center + values[:, None] * ways
+        if n == 0:
+            picture.path(points, closed=True, css='area')
+            _draw_pieces(picture, points, each)
+        else:
+            picture.path(points, closed=True, css=f'other other{n}')
+    for ring in rings[1:]:
+        picture.text(center + ring * scale * _toward(np.radians(75.0)) + [2.0, 3.0],
+                     f'{tick_text(ring)}°', css='tick halo')
+    for n, name in enumerate(names):
+        at = [10.0 + 112.0 * n, 318.0]
+        picture.line([at[0], at[1] - 3.5], [at[0] + 18.0, at[1] - 3.5],
+                     css='key' if n == 0 else f'other other{n}')
+        picture.text([at[0] + 23.0, at[1]], name, css='tick')
+    return picture
+
+
+def curves_chart(title: str, x: Array, curves: Mapping[str, Array], x_title: str, y_title: str,
+                 ) -> Picture:
+    """Draw curves over a common axis, from zero."""
+    picture = Picture(_WIDTH, 330.0, title)
+    top = max(float(np.max(each[np.isfinite(each)], initial=0.0)) for each in curves.values())
+    chart = Chart(picture, (52.0, 30.0, 272.0, 228.0), (float(x[0]), float(x[-1])),
+                  (0.0, 1.05 * top if top else 1.0))
+    chart.draw_axes(x_title, y_title)
+    for n, (name, values) in enumerate(curves.items()):
+        picture.path(chart.at(np.stack([x, values], axis=1)), css=f'curve curve{n}')
+        left = 14.0 + 326.0 / len(curves) * n
+        picture.line([left, 314.5], [left + 16.0, 314.5], css=f'curve curve{n}')
+        picture.text([left + 20.0, 318.0], name, css='tick')
+    return picture
+
+
+def use_chart(seconds: Array, used: Mapping[str, Array], timeout: float) -> Picture:
+    """Draw how much of each limit a motion uses over time [%]."""
+    picture = Picture(700.0, 300.0, 'Use of the limits over time')
+    finite = [each[np.isfinite(each)] for each in used.values()]
+    top = 100.0 * min(max(1.1, *(float(np.max(each, initial=0.0)) * 1.05 for each in finite)), 3.0)
+    end = float(seconds[-1]) if seconds[-1] > 0.0 else 1.0
+    chart = Chart(picture, (46.0, 26.0, 640.0, 208.0), (0.0, end), (0.0, top))
+    y = float(chart.at([0.0, 100.0])[1])
+    picture.add('rect', x=46.0, y=26.0, width=640.0, height=y - 26.0, css='beyond')
+    chart.draw_axes('time [s]', 'use of the limit [%]', 8)
+    picture.line([46.0, y], [686.0, y], css='limit')
+    curves = Curves(len(used), timeout, 512)
+    curves.add(seconds, np.array(list(used.values())) * 100.0)
+    for n, name in enumerate(used):
+        times, values = curves.drawn(n)
+        points = chart.at(np.stack([times, np.minimum(values, top)], axis=1))
+        picture.path(points, css=f'curve curve{n}')
+        picture.line([46.0 + 112.0 * n, 284.5], [64.0 + 112.0 * n, 284.5], css=f'curve curve{n}')
+        picture.text([69.0 + 112.0 * n, 288.0], name, css='tick')
+    return picture
+
+
+def _toward(azimuth: ArrayLike) -> Array:
+    """Return unit vectors in the picture toward azimuths from x (right) to y (up)."""
+    way: Array = np.stack([np.cos(azimuth), -np.sin(azimuth)], axis=-1)
+    return way
+
+
+def _equal_ranges(points: Array, size: tuple[float, float],
+                  ) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return ranges of equal scale around points."""
+    known = np.concatenate([points[np.isfinite(points).all(axis=1)], np.zeros((1, 2))])
+    low, high = known.min(axis=0), known.max(axis=0)
+    per_pixel = 1.08 * float(np.max((high - low) / np.array(size)))
+    half = per_pixel * np.array(size) / 2.0
+    middle = (low + high) / 2.0
+    (x0, y0), (x1, y1) = middle - half, middle + half
+    return (float(x0), float(x1)), (float(y0), float(y1))
+
+
+def _draw_boundary(chart: Chart, points: Array, boundary: Boundary) -> None:
+    _draw_pieces(chart.picture, chart.at(points), boundary)
+
+
+def _draw_pieces(picture: Picture, points: Array, boundary: Boundary) -> None:
+    """Draw pieces of a closed boundary, each in the color of its leg."""
+    for limit, leg, which in _pieces(boundary):
+        picture.path(points[which], css=f'edge leg{leg}' if leg >= 0 else 'edge',
+                     stroke_dasharray=DASHES.get(limit))
+
+
+def _pieces(boundary: Boundary) -> Iterator[tuple[str, int, Integers]]:
+    """Yield the pieces of a closed boundary with one limit and leg, and their points."""
+    count = len(boundary.values)
+    ends = list(zip(boundary.limits, boundary.legs, strict=True))
+    starts = [n for n in range(count) if ends[n] != ends[n - 1]] or [0]
+    for n, begin in enumerate(starts):
+        stop = starts[n + 1] if n + 1 < len(starts) else starts[0] + count
+        yield *ends[begin], np.arange(begin, stop + 1) % count
+
+
+def _cross(picture: Picture, at: Array) -> None:
+    for way in ([5.0, 0.0], [0.0, 5.0]):
+        picture.line(at - way, at + np.array(way), css='cross')

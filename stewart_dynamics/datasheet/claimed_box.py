@@ -1,0 +1,71 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A claimed set of ranges, all of them at once, from a YAML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.datasheet.ratings import AXES
+from stewart_dynamics.errors import ParameterError, shown, shown_name
+from stewart_dynamics.parameters.yaml_file import read_document
+
+
+def read_box(path: Path) -> Array:
+    """
+    Return the ranges (6, 2) of a file: translation [m] and rotation vector [rad] from the pose.
+
+    Each of ``x``, ``y``, ``z``, ``rx``, ``ry``, ``rz`` has a lower and an upper bound, or one
+    number for both signs; axes that are not named do not move.
+
+    Raises
+    ------
+    ParameterError
+        In one line: the file cannot be read, names another axis, or all ranges are zero.
+
+    """
+    document = read_document(path)
+    ranges = np.zeros((6, 2))
+    for name, value in document.items():
+        if name not in AXES:
+            raise ParameterError(f'{path}: {shown_name(name)}: must be one of {", ".join(AXES)}')
+        ranges[AXES.index(name)] = _range(f'{path}: {name}', value)
+    if not np.ptp(ranges, axis=1).any():
+        raise ParameterError(f'{path}: all ranges are of size zero: there is nothing to check')
+    return ranges
+
+
+def _range(where: str, value: Any) -> tuple[float, float]:
+    bounds = value if isinstance(value, list) else [value]
+    if not 1 <= len(bounds) <= 2 or not all(
+            isinstance(each, (int, float)) and not isinstance(each, bool)
+            and math.isfinite(each) for each in bounds):
+        raise ParameterError(f'{where}: {shown(value)}: must be one number, or two: [low, high]')
+    if len(bounds) == 1:
+        bounds = [-abs(bounds[0]), abs(bounds[0])]
+    if bounds[0] > bounds[1]:
+        raise ParameterError(f'{where}: {shown(value)}: the lower bound must come first')
+    return float(bounds[0]), float(bounds[1])
+
+
+def in_words(ranges: Array) -> Mapping[str, list[float]]:
+    """Return the ranges by axis, for JSON."""
+    return {axis: each.tolist() for axis, each in zip(AXES, ranges, strict=True)}

@@ -1,0 +1,208 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The datasheet of a hexapod: all its figures, pictures and files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import date
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.bags import blocks, mcap_scan
+from stewart_dynamics.capability import box, travel
+from stewart_dynamics.datasheet import claimed_box, ratings, workspace
+from stewart_dynamics.datasheet.datasheet_page import Pictures, write_page
+from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
+from stewart_dynamics.datasheet.ratings import answer, AXES
+from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, uses
+from stewart_dynamics.errors import StewartError
+from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.frames.rotation import to_euler
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.fingerprint import plain_parameters, software
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.reporting.results_folder import DATASHEET, whole_folder
+from stewart_dynamics.whole_file import write_files, write_json
+
+VERSION = 1
+"""Version of datasheet.json; increased when the meaning of a key changes."""
+PAGE, TABLE = 'datasheet.html', 'workspace.csv'
+
+# Heights of the tilt chart, as parts of the travel along z both ways.
+_HEIGHTS = {'at the pose': 0.0, 'half way up': 0.5, 'half way down': -0.5}
+# Levels of each axis of the grid on which the worst over the travel is computed.
+_LEVELS = 3
+
+
+class Order(NamedTuple):
+    """Options of a datasheet."""
+
+    name: str
+    pose: Pose | None = None
+    pivot: Array | None = None
+    payload: Payload | None = None
+    box: Array | None = None
+    bag: Path | None = None
+    recording: Options = Options()
+    leg_stiffness: float | None = None
+
+
+class Progress(NamedTuple):
+    """Receivers of the progress."""
+
+    stage: Callable[[str], object]
+    """Called with each stage as it begins."""
+    read: Callable[[int], object]
+    """Called with the numbers of bytes of the bag that were read."""
+
+
+STAGES = ('motion', 'travel', 'ranges at once', 'loads', 'workspace', 'page')
+
+# The machine code that every datasheet needs.
+FUNCTIONS = (travel.travels, box.legs_in_box, inverse_dynamics.solve, regressor.regressors,
+             *blocks.FUNCTIONS, mcap_scan.scan)
+
+
+def write_datasheet(parameters: Parameters, order: Order, folder: Path, options: Options,
+                    progress: Progress) -> dict[str, Any]:
+    """
+    Write a datasheet into a folder; return the content of datasheet.json.
+
+    Raises
+    ------
+    StewartError
+        No limit is given, the pose is outside the limits or singular, or the bag cannot be read.
+
+    """
+    hexapod = RatedHexapod(parameters, order.pose, order.pivot, order.payload)
+    progress.stage('motion')
+    recorded = None if order.bag is None else read_motion(
+        order.bag, hexapod.given, order.recording, progress.read)
+    progress.stage('travel')
+    sheet = _head(hexapod, order)
+    sheet['travel'] = ratings.travel(hexapod)
+    progress.stage('ranges at once')
+    sheet['at_once'] = _at_once(hexapod, sheet['travel'])
+    ranges = _stated(sheet['at_once'])
+    sheet['box'] = None if order.box is None else _checked(hexapod, order.box)
+    progress.stage('loads')
+    sheet |= dict.fromkeys(('velocity', 'acceleration', 'force', 'moment', 'payload'))
+    sheet |= ratings.at_pose(hexapod)
+    sheet['worst'] = None if ranges is None else ratings.worst(hexapod, ranges, _LEVELS)
+    sheet['stiffness'] = None if order.leg_stiffness is None else ratings.stiffness(
+        hexapod, order.leg_stiffness, ranges, _LEVELS)
+    progress.stage('workspace')
+    sections = [workspace.section(hexapod, *plane) for plane in workspace.PLANES]
+    tilts = {name: workspace.tilt(hexapod, part * (sheet['travel'][
+        'z+' if part > 0.0 else 'z-']['value'] or 0.0)) for name, part in _HEIGHTS.items()}
+    sheet['tilt'] = _smallest_tilt(tilts['at the pose'], hexapod)
+    used = sheet['motion'] = None
+    if recorded is not None:
+        platform = StewartPlatform(hexapod.given)
+        used = uses(platform, recorded)
+        sheet['motion'] = {'bag': str(order.bag)} | judged(platform, recorded, used) | {
+            'missing': recorded.missing}
+    progress.stage('page')
+    sheet['parameters'] = plain_parameters(hexapod.given)
+    pictures = Pictures(hexapod, sheet, sections, tilts, ranges,
+                        None if recorded is None else recorded.seconds, used)
+    with whole_folder(folder, options, DATASHEET) as partial:
+        write_json(partial / DATASHEET, sheet)
+        write_files({partial / TABLE: workspace.table(
+            [*sections, *tilts.values()], hexapod.joints)})
+        write_page(partial / PAGE, sheet, hexapod, pictures)
+    return sheet
+
+
+def _head(hexapod: RatedHexapod, order: Order) -> dict[str, Any]:
+    return {
+        'version': VERSION, 'software': software(), 'date': date.today().isoformat(),
+        'name': order.name,
+        'pose': {'position': hexapod.pose.position.tolist(),
+                 'angles': to_euler(hexapod.pose.rotation).tolist(),
+                 'home': order.pose is None},
+        'pivot': hexapod.pivot.tolist(),
+        'added_payload': None if order.payload is None else {
+            'mass': order.payload.mass,
+            'center_of_mass': np.asarray(order.payload.center_of_mass).tolist()}}
+
+
+def _at_once(hexapod: RatedHexapod, alone: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the largest ranges of translation, rotation and both that are reachable at once."""
+    travels = [[alone[f'{axis}{sign}']['value'] for sign in '-+'] for axis in AXES]
+    if any(each is None for both in travels for each in both):
+        return None
+    whole = np.array(travels) * [-1.0, 1.0]
+    found: dict[str, Any] = {}
+    for name, axes in (('translation', slice(0, 3)), ('rotation', slice(3, 6)),
+                       ('all', slice(0, 6))):
+        ranges = np.zeros((6, 2))
+        ranges[axes] = whole[axes]
+        if not np.ptp(ranges, axis=1).any():
+            return None
+        scaled = hexapod.reachable_factor(ranges)
+        found[name] = {
+            'ranges': claimed_box.in_words(scaled.value * ranges),
+            **answer(scaled.value, scaled.limit, scaled.leg, hexapod.joints)}
+        found[name]['factor'] = found[name].pop('value')
+    return found
+
+
+def _stated(at_once: dict[str, Any] | None) -> Array | None:
+    return None if at_once is None else np.array(
+        [at_once['all']['ranges'][axis] for axis in AXES])
+
+
+def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
+    """Return whether a claimed box is reachable, and its worst pose."""
+    found = hexapod.reachable(ranges)
+    worst = found.worst
+    factor = None
+    if (ranges[:, 0] <= 0.0).all() and (ranges[:, 1] >= 0.0).all():
+        factor = float(hexapod.reachable_factor(ranges).value)
+    return {'possible': bool(found.certain), 'ranges': claimed_box.in_words(ranges),
+            'factor': factor, 'limit': worst.limit,
+            'leg': hexapod.joints[worst.leg] if worst.leg >= 0 else None,
+            'excess': float(worst.excess),
+            'position': worst.pose.position.tolist(),
+            'angles': to_euler(worst.pose.rotation).tolist()}
+
+
+def _smallest_tilt(boundary: workspace.Boundary, hexapod: RatedHexapod) -> dict[str, Any]:
+    """Return the tilt toward every azimuth, and the azimuth of the smallest [rad]."""
+    n = int(np.argmin(boundary.values))
+    found = answer(float(boundary.values[n]), boundary.limits[n], boundary.legs[n],
+                   hexapod.joints)
+    return found | {'azimuth': 2.0 * math.pi * n / len(boundary.values)}
+
+
+def is_possible(sheet: dict[str, Any]) -> bool:
+    """Return whether the box and the motion are possible, as far as they are asked for."""
+    return all(sheet[name] is None or sheet[name]['possible'] for name in ('box', 'motion'))
+
+
+def check_order(order: Order) -> None:
+    """Raise StewartError for values that no datasheet can be made for."""
+    if order.payload is not None and not order.payload.mass > 0.0:
+        raise StewartError(f'--payload: mass {order.payload.mass:g} kg: must be above 0')
+    if order.leg_stiffness is not None and not order.leg_stiffness > 0.0:
+        raise StewartError(f'--leg-stiffness: {order.leg_stiffness:g} N/m: must be above 0')

@@ -1,0 +1,152 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line of stewart_capability."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import math
+from pathlib import Path
+import sys
+from typing import Any
+
+from stewart_dynamics.program import (
+    DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
+from stewart_dynamics.replay.replay_options import NODE, Options
+
+NOT_POSSIBLE = 1
+_PROGRAM = Program('stewart_capability')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; the exit code is explained in its help."""
+    given = _arguments().parse_args(arguments)
+    return _PROGRAM.exit_code(lambda: _run(given))
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=_PROGRAM.name, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Write the datasheet of a hexapod: what it can reach, carry and follow, and '
+                    'what limits it.',
+        epilog='DIR/ gets datasheet.html, datasheet.json and workspace.csv.\n\n'
+               'exit codes: 0 done; 1 with --strict, when the motion or the box is not '
+               'possible;\n2 bad arguments, parameters or bags; 3 part of the bag could not be '
+               'read, the rest is done; 130 interrupted')
+    parser.add_argument('--params', required=True, type=Path, metavar='FILE',
+                        help='parameters of the hexapod, the file that the node takes; with the '
+                             'limits that rate it')
+    parser.add_argument('--pose', nargs=6, type=_number, metavar=(
+        'X', 'Y', 'Z', 'ALPHA', 'BETA', 'GAMMA'),
+        help='pose that is rated [m, rad] (default: home)')
+    parser.add_argument('--pivot', nargs=3, type=_number, metavar=('X', 'Y', 'Z'),
+                        help='point that the platform turns about and forces act on, platform '
+                             'frame [m] (default: its origin)')
+    parser.add_argument('--payload', nargs=4, type=_number, metavar=('KG', 'X', 'Y', 'Z'),
+                        help='mass on the platform, and its center of mass in the platform frame '
+                             '[m]')
+    parser.add_argument('--leg-stiffness', type=_number, metavar='K',
+                        help='stiffness of a leg along its axis [N/m]: adds stiffness and natural '
+                             'frequencies')
+    parser.add_argument('--box', type=Path, metavar='FILE',
+                        help='YAML file of a claimed set of ranges, x y z [m] rx ry rz [rad] from '
+                             'the pose: is all of it reachable?')
+    parser.add_argument('--output', type=Path, default=Path('datasheet'), metavar='DIR',
+                        help='folder of the results (default: datasheet)')
+    parser.add_argument('--force', action='store_true', help='replace results that exist')
+    parser.add_argument('--strict', action='store_true',
+                        help='exit code 1 when the motion or the box is not possible')
+    parser.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
+                        help='node whose parameters are read, and name before the usual topics '
+                             f'(default: {NODE})')
+    motion = parser.add_argument_group('a recorded motion')
+    motion.add_argument('--motion', type=Path, metavar='BAG',
+                        help='bag with setpoints: is it possible, and how much faster?')
+    motion.add_argument('--combined', metavar='TOPIC',
+                        help='topic of setpoints in one message')
+    motion.add_argument('--differentiate', type=_number, metavar='HZ',
+                        help='compute twist and acceleration from the poses by smoothing splines '
+                             'of this cut-off frequency')
+    return parser
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text}: must be a number')
+    return value
+
+
+def _run(given: argparse.Namespace) -> int:
+    # Imported here, so that --help is fast.
+    import numpy as np
+    from tqdm import tqdm
+
+    from stewart_dynamics.bags.find import bytes_of
+    from stewart_dynamics.compilation.functions import prepare
+    from stewart_dynamics.compilation.machine_code import HINT
+    from stewart_dynamics.datasheet.claimed_box import read_box
+    from stewart_dynamics.datasheet.datasheet import (
+        check_order, FUNCTIONS, is_possible, Order, Progress, STAGES, write_datasheet)
+    from stewart_dynamics.datasheet.datasheet_text import sheet_text
+    from stewart_dynamics.datasheet.rated_hexapod import Payload
+    from stewart_dynamics.mechanics.frames.motion import Pose
+    from stewart_dynamics.mechanics.plausibility import likely_mistakes
+    from stewart_dynamics.parameters.table import Parameters
+    from stewart_dynamics.reporting.results_folder import (
+        check_free, DATASHEET, remove_abandoned)
+
+    interrupt_on_signals()
+    options = Options(
+        node=given.node, cutoff=given.differentiate, force=given.force,
+        topics={'combined': given.combined} if given.combined else {})
+    parameters = Parameters.from_yaml(given.params, given.node)
+    order = Order(
+        given.params.stem if given.node == NODE else given.node.rpartition('/')[2],
+        None if given.pose is None else Pose.from_euler(given.pose[:3], given.pose[3:]),
+        None if given.pivot is None else np.array(given.pivot),
+        None if given.payload is None else Payload(
+            given.payload[0], np.array(given.payload[1:])),
+        None if given.box is None else read_box(given.box), given.motion, options,
+        given.leg_stiffness)
+    check_order(order)
+    check_free(given.output, options, DATASHEET)
+    remove_abandoned([given.output])
+    if HINT:
+        _PROGRAM.complain(HINT)
+    prepare(FUNCTIONS)  # side by side
+    for mistake in likely_mistakes(parameters):
+        _PROGRAM.complain(f'warning: {mistake}')
+    size = 0 if given.motion is None else bytes_of(given.motion)
+    # Each stage counts as a part of the bag, whose reading is the longest where it is large.
+    part = max(size // len(STAGES), 1)
+    with tqdm(total=len(STAGES) * part + size, disable=None, leave=False, dynamic_ncols=True,
+              bar_format='{percentage:3.0f}%|{bar}| {desc}') as bar:
+        def stage(name: str) -> None:
+            bar.set_description_str(name, refresh=False)
+            bar.update(part if name != STAGES[0] else 0)
+            if bar.disable and name in ('ranges at once', 'workspace'):
+                print(f'{_PROGRAM.name}: {name}', file=sys.stderr, flush=True)
+
+        sheet: dict[str, Any] = write_datasheet(
+            parameters, order, given.output, options, Progress(stage, bar.update))
+    _PROGRAM.say(sheet_text(sheet))
+    _PROGRAM.say(f'results: {given.output}')
+    missing = sheet['motion']['missing'] if sheet['motion'] else []
+    if missing:
+        _PROGRAM.complain(f'{given.motion}: part of it could not be read: {"; ".join(missing)}')
+        return PARTLY_READ
+    return NOT_POSSIBLE if given.strict and not is_possible(sheet) else DONE

@@ -1,0 +1,293 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page of a datasheet: figures, tables, and pictures as vectors; needs no script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.datasheet import charts
+from stewart_dynamics.datasheet.datasheet_text import box_verdict, motion_verdict
+from stewart_dynamics.datasheet.figures import (
+    both_ways, DEGREE, down, LINEAR, MM, span, unit_of)
+from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
+from stewart_dynamics.datasheet.payloads import Payloads
+from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
+from stewart_dynamics.datasheet.ratings import AXES, grid, poses_of
+from stewart_dynamics.datasheet.workspace import (
+    Boundary, PLANES, rotations_over_height)
+from stewart_dynamics.parameters.table import inertia_matrix
+from stewart_dynamics.reporting.pages import page
+from stewart_dynamics.reporting.vector_picture import Picture
+from stewart_dynamics.whole_file import write_files
+
+_FOLDER = Path(__file__).with_name('templates')
+_NAMES = dict(zip(AXES, ('X', 'Y', 'Z', 'θX', 'θY', 'θZ'), strict=True))
+
+
+class Pictures(NamedTuple):
+    """Content of the pictures."""
+
+    hexapod: RatedHexapod
+    sheet: Mapping[str, Any]
+    sections: list[Boundary]
+    tilts: Mapping[str, Boundary]
+    ranges: Array | None
+    """Ranges (6, 2) that are reachable at once."""
+    seconds: Array | None
+    """Times of the motion's samples [s]."""
+    used: Mapping[str, Array] | None
+    """Use of the limits at these times."""
+
+    def drawing(self) -> Drawing:
+        """Return the drawing of the hexapod, with the ends of its travel along z."""
+        ends = [self.hexapod.moved_by(np.array([0.0, 0.0, sign, 0.0, 0.0, 0.0]), by)
+                for key, sign in (('z+', 1.0), ('z-', -1.0))
+                if (by := self.sheet['travel'][key]['value'])]
+        p = self.hexapod.platform.parameters
+        return Drawing(p, self.hexapod.pose, tuple(ends))
+
+    def workspace(self) -> list[Picture]:
+        """Return sections, tilt, rotation over height, and payload where it is limited."""
+        found = [charts.section_chart(each, *plane[1:], self.ranges)
+                 for each, plane in zip(self.sections, PLANES, strict=True)]
+        found.append(charts.tilt_chart(list(self.tilts.values()), list(self.tilts)))
+        low, high = (self.sheet['travel'][key]['value'] for key in ('z-', 'z+'))
+        if low and high:
+            heights, turns = rotations_over_height(self.hexapod, -low, high)
+            found.append(charts.curves_chart(
+                'Rotation over height', MM.factor * heights,
+                {f'±{name}': DEGREE.factor * each for name, each in turns.items()}, 'Z [mm]',
+                'rotation [°]'))
+        if self.sheet['payload'] is not None and self.hexapod.given['gravity'].any():
+            found.append(self._payload())
+        return found
+
+    def _payload(self) -> Picture:
+        """Return the largest payload over the distance of its center of mass from the pivot."""
+        platform = self.hexapod.platform
+        radius = float(np.linalg.norm(
+            platform.parameters['geometry.platform_joints'], axis=1).mean())
+        offsets = np.linspace(0.0, 1.5 * radius, 31, dtype=float)
+        here = Payloads(platform, self.hexapod.pose[None])
+        curves = {'at the pose': np.array([here.level(each) for each in offsets])}
+        if self.ranges is not None:
+            corners = Payloads(platform, poses_of(self.hexapod, grid(self.ranges, 2)))
+            curves['worst'] = np.array([corners.level(each) for each in offsets])
+        curves['any orientation'] = np.array([here.any_orientation(each) for each in offsets])
+        return charts.curves_chart(
+            'Payload over the distance of its center of mass', MM.factor * offsets, curves,
+            'center of mass from the pivot, sideways [mm]', 'payload [kg]')
+
+    def motion(self) -> Picture | None:
+        """Return the use of the limits over time."""
+        if self.seconds is None or self.used is None:
+            return None
+        return charts.use_chart(self.seconds, self.used,
+                                self.hexapod.given['setpoint.timeout'])
+
+
+def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pictures: Pictures,
+               ) -> None:
+    """Write datasheet.html, with the content of datasheet.json."""
+    drawing = pictures.drawing()
+    text = page(
+        _FOLDER, 'datasheet', document=True, s=sheet, key_figures=_key_figures(sheet, hexapod),
+        summary=_summary(hexapod), legs=hexapod.joints, travel=_travel(sheet, hexapod),
+        rates=_rates(sheet, hexapod), loads=_loads(sheet, hexapod), stiffness=_stiffness(sheet),
+        joints=_joints(hexapod), properties=_properties(sheet, hexapod),
+        verdicts=[(name.capitalize(), found, words(found)) for name, words in (
+            ('motion', motion_verdict), ('box', box_verdict)) if (found := sheet[name])],
+        oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
+        workspace=[each.svg() for each in pictures.workspace()],
+        motion=(chart.svg() if (chart := pictures.motion()) else None),
+        down=down, span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
+    write_files({path: text})
+
+
+def _summary(hexapod: RatedHexapod) -> str:
+    p = hexapod.given
+    parts = [f'{p["platform.mass"]:.4g} kg on six legs']
+    if p['limits.length_min'] is not None and p['limits.length_max'] is not None:
+        low, high = p['limits.length_min'].min(), p['limits.length_max'].max()
+        parts.append(f'{1e3 * low:.5g} to {1e3 * high:.5g} mm long')
+    for name, key in (('base', 'geometry.base_joints'), ('platform', 'geometry.platform_joints')):
+        diameter = circle_of(p[key])
+        if diameter is not None:
+            parts.append(f'{name} joints on ⌀ {1e3 * diameter:.4g} mm')
+    return ' · '.join(parts)
+
+
+def _key_figures(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[str, str, str]]:
+    """Return name, value and unit of the first figures to be looked for."""
+    travel = sheet['travel']
+    found = [(f'Travel {_NAMES[axis]}', both_ways(travel, axis, unit_of(axis, 'travel')),
+              unit_of(axis, 'travel').name) for axis in ('x', 'y', 'z')]
+    found.append(('Tilt, every direction', f'±{down(DEGREE.factor * sheet["tilt"]["value"])}'
+                  if sheet['tilt']['value'] is not None else '–', '°'))
+    found.append(('Rotation θZ', both_ways(travel, 'rz', DEGREE), '°'))
+    if sheet['payload'] is not None:
+        found.append(('Payload', down(sheet['payload']['value']), 'kg'))
+        found.append(('Force, every direction', down(sheet['force']['every_direction']), 'N'))
+    if sheet['velocity'] is not None:
+        found.append(('Velocity Z', both_ways(sheet['velocity'], 'z', LINEAR['velocity']), 'mm/s'))
+    return found
+
+
+class _Limit(NamedTuple):
+    """Sign of a direction (empty: both), and the limit and leg that end its extent."""
+
+    sign: str
+    limit: str
+    leg: int
+
+
+def _limits(values: Mapping[str, Any], axis: str, joints: tuple[str, ...]) -> list[_Limit]:
+    """Return what ends the extents of an axis, once if it is the same both ways."""
+    found = [_Limit(sign, each['limit'], joints.index(each['leg']) if each['leg'] else -1)
+             for key, sign in (('-', '−'), ('+', '+'))
+             if (each := values[f'{axis}{key}'])['limit']]
+    if len(found) == 2 and found[0][1:] == found[1][1:]:
+        return [found[0]._replace(sign='')]
+    return found
+
+
+def _travel(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, Any]]:
+    rows, at_once = [], sheet['at_once']
+    for axis in AXES:
+        unit = unit_of(axis, 'travel')
+        kind = 'rotation' if axis.startswith('r') else 'translation'
+        rows.append({
+            'axis': _NAMES[axis], 'unit': unit.name,
+            'alone': both_ways(sheet['travel'], axis, unit),
+            'limits': _limits(sheet['travel'], axis, hexapod.joints),
+            'three': at_once and span(at_once[kind]['ranges'][axis], unit),
+            'all': at_once and span(at_once['all']['ranges'][axis], unit)})
+    return rows
+
+
+def _rates(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, Any]]:
+    rows = []
+    for axis in AXES:
+        row: dict[str, Any] = {'axis': _NAMES[axis]}
+        for name in ('velocity', 'acceleration'):
+            if sheet[name] is None:
+                continue
+            unit = unit_of(axis, name)
+            row[name] = {
+                'unit': unit.name, 'value': both_ways(sheet[name], axis, unit),
+                'limits': _limits(sheet[name], axis, hexapod.joints),
+                'worst': both_ways(sheet['worst'][name], axis, unit) if sheet['worst'] else '–'}
+        rows.append(row)
+    return rows
+
+
+def _loads(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[dict[str, Any]]:
+    if sheet['force'] is None:
+        return []
+    rows, worst = [], sheet['worst']
+    for axis in AXES:
+        name = 'moment' if axis.startswith('r') else 'force'
+        unit = unit_of(axis, name)
+        rows.append({
+            'name': f'{name.capitalize()} {_NAMES[axis].replace("θ", "")}', 'unit': unit.name,
+            'value': both_ways(sheet[name], axis, unit),
+            'limits': _limits(sheet[name], axis, hexapod.joints), 'sum': False,
+            'worst': both_ways(worst[name], axis, unit) if worst else '–'})
+        if axis in ('z', 'rz'):
+            rows.append({
+                'name': f'{name.capitalize()}, every direction', 'unit': unit.name, 'sum': True,
+                'value': down(sheet[name]['every_direction']), 'limits': [],
+                'worst': down(worst[name]['every_direction']) if worst else '–'})
+    payload = {'x-': sheet['payload'], 'x+': sheet['payload']}
+    rows.append({'name': 'Payload at the pivot', 'unit': 'kg', 'sum': True,
+                 'value': down(sheet['payload']['value']),
+                 'limits': _limits(payload, 'x', hexapod.joints),
+                 'worst': down(worst['payload']['value']) if worst else '–'})
+    rows.append({'name': 'Payload, base in any orientation', 'unit': 'kg', 'sum': True,
+                 'limits': [], 'value': down(sheet['payload']['any_orientation']),
+                 'worst': down(worst['payload']['any_orientation']) if worst else '–'})
+    return rows
+
+
+def _stiffness(sheet: Mapping[str, Any]) -> list[dict[str, Any]]:
+    found = sheet['stiffness']
+    if found is None:
+        return []
+    rows = []
+    for axis in AXES:
+        unit = unit_of(axis, 'stiffness')
+        rows.append({'name': f'Stiffness {_NAMES[axis]}', 'unit': unit.name,
+                     'value': down(found[axis] * unit.factor),
+                     'worst': down(found['worst'][axis] * unit.factor) if found['worst'] else '–'})
+    worst = found['worst']
+    for n, frequency in enumerate(found['frequencies'][:2]):
+        rows.append({'name': f'{("Lowest", "Second")[n]} natural frequency', 'unit': 'Hz',
+                     'value': down(frequency),
+                     'worst': down(worst['frequencies'][n]) if worst else '–'})
+    return rows
+
+
+def _joints(hexapod: RatedHexapod) -> list[dict[str, Any]]:
+    """Return a row for each leg: joints in mm, and its limits."""
+    p = hexapod.given
+    lengths = hexapod.platform.inverse_kinematics(hexapod.pose)
+    return [{
+        'leg': name, 'base': 1e3 * p['geometry.base_joints'][n],
+        'platform': 1e3 * p['geometry.platform_joints'][n], 'length': 1e3 * float(lengths[n]),
+        'range': ' to '.join('–' if p[limit] is None else f'{1e3 * p[limit][n]:.6g}' for limit in (
+            'limits.length_min', 'limits.length_max'))} for n, name in enumerate(hexapod.joints)]
+
+
+def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[str, str]]:
+    """Return names and values of the other parameters that the figures rest on."""
+    p = hexapod.given
+    inertia = inertia_matrix(p['platform.inertia'])
+
+    def numbers(values: Any, factor: float = 1.0, unit: str = '') -> str:
+        given = factor * np.atleast_1d(np.asarray(values, dtype=float))
+        # not the rounding errors of a home pose
+        given[np.abs(given) < max(1e-9 * np.abs(given).max(), 1e-12)] = 0.0
+        texts = [f'{each:.5g}' for each in given.tolist()]
+        if len(set(texts)) == 1 and len(texts) == 6:
+            texts = texts[:1]
+        return f'{", ".join(texts)}{unit}'.replace('-', '−')
+
+    rows = [
+        ('Rated pose' + (', home' if sheet['pose']['home'] else ''),
+         numbers(sheet['pose']['position'], 1e3, ' mm') + '; '
+         + numbers(sheet['pose']['angles'], DEGREE.factor, '°')),
+        ('Pivot, platform frame', numbers(sheet['pivot'], 1e3, ' mm')),
+        ('Platform' + (' with payload' if sheet['added_payload'] else ''),
+         f'{p["platform.mass"]:.5g} kg at {numbers(p["platform.center_of_mass"], 1e3, " mm")}'),
+        ('Its inertia, xx yy zz', numbers(np.diagonal(inertia), 1.0, ' kg m²')),
+        ('Leg: cylinder, piston', f'{numbers(p["legs.cylinder.mass"])}, '
+         f'{numbers(p["legs.piston.mass"], 1.0, " kg")}'),
+        ('Reflected mass of an actuator', numbers(p['actuator.reflected_mass'], 1.0, ' kg')),
+        ('Gravity', numbers(p['gravity'], 1.0, ' m/s²'))]
+    for name, value in p.items():
+        if name.startswith('limits.') and name != 'limits.action' and value is not None and (
+                not name.startswith('limits.length_m')):
+            angle = 'angle' in name
+            unit = ('°' if angle else ' m/s' if 'velocity' in name else ' N' if 'force' in name
+                    else ' m')
+            rows.append((name, numbers(value, DEGREE.factor if angle else 1.0, unit)))
+    rows.append(('singularity.stop_condition', f'{p["singularity.stop_condition"]:g}'))
+    return rows

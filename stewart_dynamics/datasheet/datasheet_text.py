@@ -1,0 +1,71 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The datasheet in a few lines, for the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from stewart_dynamics.datasheet.figures import both_ways, down, span, unit_of
+from stewart_dynamics.datasheet.ratings import AXES
+
+
+def sheet_text(sheet: dict[str, Any]) -> str:
+    """Return travel, payload, and whether box and motion are possible."""
+    at_once = sheet['at_once']
+    lines = [f'{sheet["name"]}: travel of each axis alone' + (
+        ', all at once' if at_once else '')]
+    for axis in AXES:
+        unit = unit_of(axis, 'travel')
+        line = f'  {axis:<3} {both_ways(sheet["travel"], axis, unit):>20} {unit.name:<3}'
+        if at_once:
+            ranges = span(at_once['all']['ranges'][axis], unit)
+            line += f' {ranges:>20} {unit.name}'
+        lines.append(line.rstrip())
+    if sheet['payload'] is not None:
+        lines.append(f'payload {down(sheet["payload"]["value"])} kg')
+    for name, words in (('box', box_verdict), ('motion', motion_verdict)):
+        if sheet[name]:
+            possible = 'possible' if sheet[name]['possible'] else 'not possible'
+            lines.append(f'{name} {possible}: {words(sheet[name])}')
+    return '\n'.join(lines)
+
+
+def motion_verdict(found: dict[str, Any]) -> str:
+    """Return how much faster a motion can be, and its limit."""
+    factor = found['factor']
+    if factor is None:
+        return 'no limit at any speed'
+    where = f'{_limit(found)} at {found["at_s"]:.3f} s' if found['at_s'] is not None else (
+        _limit(found))
+    if factor == 0.0:
+        return f'at no speed, by {where}'
+    return f'up to {down(factor)} times as fast, limited by {where}'
+
+
+def box_verdict(found: dict[str, Any]) -> str:
+    """Return how much larger a box can be, or the limit that is exceeded in it."""
+    factor = '' if found['factor'] is None else (
+        f'up to {down(found["factor"])} times as large')
+    if found['possible']:
+        return f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
+    position = ', '.join(f'{each:.4g}' for each in found['position'])
+    angles = ', '.join(f'{each:.4g}' for each in found['angles'])
+    return (f'{_limit(found)} is exceeded at {position} m, {angles} rad'.replace('-', '−')
+            + (f'; reachable {factor}' if factor else ''))
+
+
+def _limit(found: dict[str, Any]) -> str:
+    return f'{found["limit"]} of {found["leg"]}' if found['leg'] else f'{found["limit"]}'

@@ -1,0 +1,245 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Drawings of the hexapod to scale: front, top and oblique view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.reporting.vector_picture import hull, Picture, ticks
+
+# Radii of parts without a given one, relative to the hexapod's size, and the part of a retracted
+# leg that its cylinder takes.
+_CYLINDER, _PISTON, _OF_LEG = 0.028, 0.017, 0.62
+_PLATE = 0.022  # half of a plate's thickness, relative to the size
+
+
+class View(NamedTuple):
+    """Directions in the base frame that are to the right and upward in a drawing."""
+
+    right: tuple[float, float, float]
+    up: tuple[float, float, float]
+
+    def of(self, points: Array) -> Array:
+        """Return points (..., 3) in the drawing (..., 2) [m]."""
+        drawn: Array = points @ np.array([self.right, self.up]).T
+        return drawn
+
+    def depth(self, points: Array) -> Array:
+        """Return how near to the viewer points (..., 3) are [m]."""
+        return points @ np.cross(self.right, self.up)
+
+
+class Margins(NamedTuple):
+    """Free room around a view [px]."""
+
+    top: float = 32.0
+    bottom: float = 46.0
+    sides: float = 96.0
+    """Left and right together."""
+    left: float = 16.0
+
+
+FRONT, TOP = View((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), View((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+_TURN, _TILT = np.radians(28.0), np.radians(20.0)
+OBLIQUE = View(
+    (np.cos(_TURN), np.sin(_TURN), 0.0),
+    (-np.sin(_TURN) * np.sin(_TILT), np.cos(_TURN) * np.sin(_TILT), np.cos(_TILT)))
+
+
+class Drawing:
+    """
+    Drawings of a hexapod at a pose.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Parameters of the hexapod.
+    pose : Pose
+        Pose that is drawn.
+    ends : sequence of Pose
+        Poses whose platforms are drawn as outlines.
+
+    """
+
+    def __init__(self, parameters: Parameters, pose: Pose, ends: tuple[Pose, ...] = ()) -> None:
+        self._p, self._pose, self._ends = parameters, pose, ends
+        self._base = np.asarray(parameters['geometry.base_joints'])
+        self._arms = np.asarray(parameters['geometry.platform_joints'])
+        self._platform = self._placed(pose)
+        everything = np.concatenate([self._base, self._platform])
+        self._size = float(np.linalg.norm(np.ptp(everything, axis=0))) / 2.0
+
+    def front(self) -> Picture:
+        """Return the front view, along y, with heights."""
+        picture = Picture(340.0, 360.0, 'Front view of the hexapod, to scale')
+        place = self._fitted(FRONT, picture, (FRONT, TOP), Margins())
+        for end in self._ends:
+            outline = place(FRONT.of(self._plate(self._placed(end), end.rotation)))
+            picture.path(hull(outline), closed=True, css='ghost')
+        self._draw(picture, FRONT, place)
+        self._heights(picture, place)
+        picture.text([8, 18], 'Front view', css='view')
+        _axes(picture, [30.0, picture.height - 22.0], 'X', 'Z')
+        return picture
+
+    def top(self) -> Picture:
+        """Return the view from above, with the numbers of the legs."""
+        picture = Picture(340.0, 360.0, 'Top view of the hexapod, to scale')
+        place = self._fitted(TOP, picture, (FRONT, TOP), Margins(left=48.0))
+        for joints in (self._base, self._platform):
+            diameter = circle_of(joints)
+            if diameter is not None:
+                picture.circle(place(TOP.of(joints.mean(axis=0))), diameter / 2.0 * place.scale,
+                               css='pitch')
+        self._draw(picture, TOP, place)
+        center = place(TOP.of(self._base.mean(axis=0)))
+        for n, joint in enumerate(place(TOP.of(self._base))):
+            out = joint - center
+            at = joint + 16.0 * out / max(float(np.linalg.norm(out)), 1e-9)
+            picture.text(at + [0, 4], str(n + 1), 'middle', css=f'number leg{n}')
+        picture.text([8, 18], 'Top view', css='view')
+        _axes(picture, [30.0, picture.height - 22.0], 'X', 'Y')
+        self._scale_bar(picture, place)
+        return picture
+
+    def oblique(self) -> Picture:
+        """Return an oblique view without dimensions."""
+        picture = Picture(300.0, 240.0, 'The hexapod')
+        self._draw(picture, OBLIQUE, self._fitted(
+            OBLIQUE, picture, (OBLIQUE,), Margins(6.0, 6.0, 12.0, 6.0)))
+        return picture
+
+    def _placed(self, pose: Pose) -> Array:
+        placed: Array = pose.position + self._arms @ pose.rotation.T
+        return placed
+
+    def _fitted(self, view: View, picture: Picture, views: Sequence[View], margins: Margins,
+                ) -> _Place:
+        """Return the place of a view, at the largest scale at which some views fit."""
+        points = np.concatenate([self._base, self._platform, *map(self._placed, self._ends)])
+        room = np.array([picture.width - margins.sides, picture.height - margins.top
+                         - margins.bottom])
+        spans = [np.ptp(each.of(points), axis=0) + 3.0 * _PLATE * self._size for each in views]
+        scale = float(np.min(room / np.array(spans)))
+        drawn = view.of(points)
+        middle = np.array([(picture.width - margins.sides) / 2.0 + margins.left,
+                           margins.top + room[1] / 2.0])
+        return _Place((drawn.min(axis=0) + drawn.max(axis=0)) / 2.0, scale, middle)
+
+    def _draw(self, picture: Picture, view: View, place: _Place) -> None:
+        p = self._p
+        legs = [(float(view.depth((self._base[n] + self._platform[n]) / 2.0)), n)
+                for n in range(6)]
+        plates = [(float(view.depth(joints.mean(axis=0))), self._plate(joints, rotation), css)
+                  for joints, rotation, css in (
+                      (self._base, np.eye(3), 'plate base'),
+                      (self._platform, self._pose.rotation, 'plate moving'))]
+        plates.sort(key=lambda each: each[0])
+        for _, points, css in plates[:1]:
+            picture.path(hull(place(view.of(points))), closed=True, css=css)
+        radii = (_given(p.get('legs.cylinder.radius'), _CYLINDER * self._size),
+                 _given(p.get('legs.piston.radius'), _PISTON * self._size))
+        shortest = p['limits.length_min']
+        for _, n in sorted(legs):
+            begin, end = self._base[n], self._platform[n]
+            length = float(np.linalg.norm(end - begin))
+            retracted = length if shortest is None else float(shortest[n])
+            cylinder = begin + (end - begin) * min(_OF_LEG * retracted / length, 1.0)
+            a, b, c = place(view.of(np.array([begin, cylinder, end])))
+            picture.line(a, c, css=f'piston leg{n}', stroke_width=max(
+                2.0 * radii[1][n] * place.scale, 1.5))
+            picture.line(a, b, css=f'cylinder leg{n}', stroke_width=max(
+                2.0 * radii[0][n] * place.scale, 3.0))
+            for joint in (a, c):
+                picture.circle(joint, 2.6, css='joint')
+        for _, points, css in plates[1:]:
+            picture.path(hull(place(view.of(points))), closed=True, css=css)
+
+    def _plate(self, joints: Array, rotation: Array) -> Array:
+        """Return corners of a plate through joints, a little larger than they are."""
+        center = joints.mean(axis=0)
+        wide = center + 1.06 * (joints - center)
+        normal = rotation[:, 2] * _PLATE * self._size
+        return np.concatenate([wide - normal, wide + normal])
+
+    def _heights(self, picture: Picture, place: _Place) -> None:
+        """Draw the height of the platform's origin above the base's, at the pose and its ends."""
+        right = picture.width - 44.0
+        zero = float(place(FRONT.of(np.zeros(3)))[1])
+        picture.line([right - 60.0, zero], [right + 8.0, zero], css='extension')
+        for n, pose in enumerate((self._pose, *self._ends)):
+            height = float(place(FRONT.of(pose.position))[1])
+            picture.line([right - 60.0, height], [right + 8.0, height], css='extension')
+            text = f'{1e3 * float(pose.position[2]):.0f}'.replace('-', '−')
+            if n == 0:
+                _dimension(picture, [right, zero], [right, height])
+                picture.text([right - 4.0, (zero + height) / 2.0], text, 'middle', 90.0,
+                             css='dimension')
+            else:
+                picture.text([right + 11.0, height + 4.0], text, css='dimension soft')
+
+    def _scale_bar(self, picture: Picture, place: _Place) -> None:
+        length = ticks(0.0, 110.0 / place.scale, 2)[1]
+        right, y = picture.width - 14.0, picture.height - 18.0
+        picture.path([[right - length * place.scale, y - 4.0], [right - length * place.scale, y],
+                      [right, y], [right, y - 4.0]], css='bar')
+        picture.text([right, y + 13.0], f'{1e3 * length:.10g} mm', 'end', css='tick')
+
+
+class _Place:
+    """From meters in a view to pixels in a picture."""
+
+    def __init__(self, center: Array, scale: float, middle: Array) -> None:
+        self._center, self.scale, self._middle = center, scale, middle
+
+    def __call__(self, points: Array) -> Array:
+        placed: Array = self._middle + (points - self._center) * self.scale * [1.0, -1.0]
+        return placed
+
+
+def circle_of(joints: Array) -> float | None:
+    """Return the diameter [m] of the circle around the joints' center that they are on, if any."""
+    radii = np.linalg.norm(joints - joints.mean(axis=0), axis=1)
+    mean = float(radii.mean())
+    return 2.0 * mean if float(np.ptp(radii)) < 0.01 * mean else None
+
+
+def _given(values: Array | None, otherwise: float) -> Array:
+    return np.full(6, otherwise) if values is None else values
+
+
+def _dimension(picture: Picture, begin: list[float], end: list[float]) -> None:
+    """Draw a line with arrows at both ends."""
+    a, b = np.array(begin), np.array(end)
+    picture.line(a, b, css='measure')
+    along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
+    across = np.array([-along[1], along[0]])
+    for tip, way in ((a, along), (b, -along)):
+        picture.path([tip, tip + 7.0 * way + 2.0 * across, tip + 7.0 * way - 2.0 * across],
+                     closed=True, css='arrow')
+
+
+def _axes(picture: Picture, origin: list[float], right: str, up: str) -> None:
+    o = np.array(origin)
+    for tip, name, css in ((o + [22.0, 0.0], right, 'x'), (o + [0.0, -22.0], up, up.lower())):
+        picture.line(o, tip, css=f'triad axis-{css}')
+        picture.text(tip + ([4.0, 3.5] if name == right else [-3.5, -3.0]), name, css='tick')

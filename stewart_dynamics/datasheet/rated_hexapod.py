@@ -1,0 +1,168 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The hexapod of a datasheet: with its payload, its platform frame at the pivot, at a pose."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.capability import Capability, Extent
+from stewart_dynamics.capability.reachable import Reachable
+from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
+from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.limits import LIMITS, Limits
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+
+
+class Payload(NamedTuple):
+    """A point mass on the platform."""
+
+    mass: float
+    """[kg]"""
+    center_of_mass: Array
+    """(3,) platform frame [m]"""
+
+
+class RatedHexapod:
+    """
+    A hexapod at the pose for which it is rated.
+
+    Poses are those of the pivot: travels are of it, rotations about it, and forces act on it. The
+    singularity of a pose is judged at the origin of the platform frame, as in the node.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Parameters of the hexapod.
+    pose : Pose, optional
+        Pose of the platform frame; by default home.
+    pivot : (3,), optional
+        Pivot, platform frame [m]; by default its origin.
+    payload : Payload, optional
+        Mass that is added to the platform.
+
+    Attributes
+    ----------
+    given : Parameters
+        Parameters with the payload.
+    platform : StewartPlatform
+        With the payload, and the origin of the platform frame at the pivot.
+    loads : Capability
+        Capability of that platform, for rates and loads.
+    pose : Pose
+        Pose of the pivot.
+    pivot : (3,)
+        As given.
+
+    Raises
+    ------
+    StewartError
+        No limit is given, or the pose is outside the limits or singular.
+
+    """
+
+    def __init__(self, parameters: Parameters, pose: Pose | None = None,
+                 pivot: Array | None = None, payload: Payload | None = None) -> None:
+        if all(parameters[name] is None for name in LIMITS):
+            raise ParameterError(f'parameters: {", ".join(LIMITS)}: none of them is set: without '
+                                 'a limit there is no datasheet')
+        self.pivot = np.zeros(3) if pivot is None else np.asarray(pivot, dtype=float)
+        self.given = parameters if payload is None else _loaded(parameters, payload)
+        whole = StewartPlatform(self.given)
+        self._origin = whole.home_pose() if pose is None else pose
+        self._limits = Capability(whole)
+        self.platform = StewartPlatform(_moved(self.given, self.pivot))
+        self.loads = Capability(self.platform)
+        self.pose = Pose(self._origin.position + self._origin.rotation @ self.pivot,
+                         self._origin.rotation)
+        self._check(whole, self._origin)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the legs."""
+        names: tuple[str, ...] = self.given['joints']
+        return names
+
+    def limited(self, name: str) -> bool:
+        """Return whether a limit is given."""
+        return self.given[f'limits.{name}'] is not None
+
+    def travel(self, poses: Pose, directions: Array) -> Extent:
+        """Return ``Capability.travel`` from poses of the pivot."""
+        origins = Pose(poses.position - poses.rotation @ self.pivot, poses.rotation)
+        return self._limits.travel(origins, directions, self.pivot)
+
+    def reachable(self, ranges: Array) -> Reachable:
+        """Return ``Capability.reachable`` of ranges (6, 2) from the pose."""
+        return self._limits.reachable(ranges, self._origin, self.pivot)
+
+    def reachable_factor(self, ranges: Array) -> Extent:
+        """Return ``Capability.reachable_factor`` of ranges (6, 2) from the pose."""
+        return self._limits.reachable_factor(ranges, self._origin, self.pivot)
+
+    def moved_by(self, direction: Array, by: float = 1.0) -> Pose:
+        """Return the pose after a translation and a rotation vector (6,), base axes."""
+        turn = by * direction[3:]
+        angle = float(np.linalg.norm(turn))
+        rotation = self.pose.rotation
+        if angle > 0.0:
+            x, y, z = turn / angle
+            k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            rotation = (np.eye(3) + np.sin(angle) * k
+                        + (1.0 - np.cos(angle)) * k @ k) @ rotation
+        return Pose(self.pose.position + by * direction[:3], rotation)
+
+    def _check(self, whole: StewartPlatform, pose: Pose) -> None:
+        """Raise where a limit is exceeded at the pose already."""
+        result = whole.inverse_dynamics(Motion.from_pose(pose), singular='nan')
+        stop = self.given['singularity.stop_condition']
+        if not result.condition_number < stop:
+            raise SingularityError(
+                f'pose: singular: the condition number of J_inv is {result.condition_number:.6g}, '
+                f'must be less than singularity.stop_condition, {stop:g}')
+        limits = Limits(self.given)
+        found: Any = limits.exceeded(*(tuple(each.tolist()) for each in (
+            result.lengths, result.rates, result.forces)))
+        if not found and limits.of_joints:
+            found = limits.exceeded_angles(np.concatenate(whole.joint_angles(pose)).tolist())
+        if found:
+            raise PoseError(f'pose: {found[0].words(self.joints)}')
+
+
+def _moved(p: Parameters, pivot: Array) -> Parameters:
+    """Return the parameters with the platform frame at the pivot."""
+    if not pivot.any():
+        return p
+    return p.replaced({
+        'geometry.platform_joints': p['geometry.platform_joints'] - pivot,
+        'platform.center_of_mass': p['platform.center_of_mass'] - pivot,
+        'singularity.characteristic_length': p['singularity.characteristic_length']})
+
+
+def _loaded(p: Parameters, payload: Payload) -> Parameters:
+    """Return the parameters with a point mass on the platform."""
+    masses = np.array([p['platform.mass'], payload.mass])
+    centers = np.array([p['platform.center_of_mass'], payload.center_of_mass])
+    center = masses @ centers / masses.sum()
+    inertia = inertia_matrix(p['platform.inertia'])
+    for mass, arm in zip(masses, centers - center, strict=True):
+        inertia = inertia + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return p.replaced({
+        'platform.mass': masses.sum(), 'platform.center_of_mass': center,
+        'platform.inertia': inertia[np.triu_indices(3)]})

@@ -1,0 +1,134 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ratings of a hexapod for its datasheet: at a pose, and the worst over a set of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.capability import Extent
+from stewart_dynamics.datasheet.payloads import Payloads
+from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
+from stewart_dynamics.mechanics.frames.motion import Pose
+
+AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+KEYS = tuple(f'{axis}{sign}' for axis in AXES for sign in '+-')
+DIRECTIONS = np.repeat(np.eye(6), 2, axis=0) * np.tile([1.0, -1.0], 6)[:, None]
+"""(12, 6): translation and rotation of KEYS, base axes."""
+
+
+def answer(value: float, limit: str, leg: int, joints: Sequence[str]) -> dict[str, Any]:
+    """Return an extent for JSON: null where nothing limits, legs by their names."""
+    limited = math.isfinite(value)
+    return {'value': float(value) if limited else None, 'limit': str(limit) if limited else None,
+            'leg': joints[leg] if limited and leg >= 0 else None}
+
+
+def answers(found: Extent, joints: Sequence[str], keys: Sequence[str] = KEYS) -> dict[str, Any]:
+    """Return the extents (N,) of some directions for JSON."""
+    return {key: answer(value, limit, int(leg), joints) for key, value, limit, leg in zip(
+        keys, found.value, found.limit, found.leg, strict=True)}
+
+
+def travel(hexapod: RatedHexapod) -> dict[str, Any]:
+    """Return the travel along and about each axis alone, both ways [m, rad]."""
+    return answers(hexapod.travel(hexapod.pose, DIRECTIONS), hexapod.joints)
+
+
+def at_pose(hexapod: RatedHexapod) -> dict[str, Any]:
+    """Return velocity, acceleration, force, moment and payload at the pose."""
+    return _loads(hexapod, hexapod.pose)
+
+
+def _loads(hexapod: RatedHexapod, poses: Pose) -> dict[str, Any]:
+    """Return the smallest of each rating over poses (N,), or at one."""
+    c, joints = hexapod.loads, hexapod.joints
+    one = not poses.shape
+    many = poses[None] if one else poses
+    at = many[:, None]
+    found: dict[str, Any] = {}
+    if hexapod.limited('velocity_max'):
+        found['velocity'] = _smallest(c.velocity(at, DIRECTIONS), joints, KEYS)
+    if hexapod.limited('force_max'):
+        found['acceleration'] = _smallest(c.acceleration(at, DIRECTIONS), joints, KEYS)
+        for name, part in (('force', slice(0, 6)), ('moment', slice(6, 12))):
+            found[name] = _smallest(c.wrench(at, DIRECTIONS[part]), joints, KEYS[part])
+        found['force']['every_direction'] = _least(c.force(many))
+        found['moment']['every_direction'] = _least(c.moment(many))
+        payload = c.payload(many, np.zeros(3))
+        column = Extent(*(each[:, None] for each in payload[:3]))
+        found['payload'] = _smallest(column, joints, ['mass'])['mass']
+        found['payload']['any_orientation'] = (
+            Payloads(hexapod.platform, many).any_orientation()
+            if hexapod.given['gravity'].any() else None)
+    return found
+
+
+def worst(hexapod: RatedHexapod, ranges: Array, levels: int) -> dict[str, Any]:
+    """Return the smallest of each rating over a grid of a box of ranges (6, 2)."""
+    poses = poses_of(hexapod, grid(ranges, levels))
+    return _loads(hexapod, poses) | {'poses': len(poses)}
+
+
+def grid(ranges: Array, levels: int) -> Array:
+    """Return the points (levels^6, 6) of a grid over a box."""
+    axes = [np.linspace(low, high, levels) for low, high in ranges.tolist()]
+    return np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1).reshape(-1, 6)
+
+
+def poses_of(hexapod: RatedHexapod, offsets: Array) -> Pose:
+    """Return the poses after translations and rotation vectors (N, 6)."""
+    poses = [hexapod.moved_by(each) for each in offsets]
+    return Pose(np.array([each.position for each in poses]),
+                np.array([each.rotation for each in poses]))
+
+
+def _least(values: Any) -> float:
+    return float(np.min(values))
+
+
+def _smallest(found: Extent, joints: Sequence[str], keys: Sequence[str]) -> dict[str, Any]:
+    """Return the smallest of extents (N, K) by key."""
+    at = np.argmin(found.value, axis=0), np.arange(len(keys))
+    return answers(Extent(found.value[at], found.limit[at], found.leg[at]), joints, keys)
+
+
+def stiffness(hexapod: RatedHexapod, leg_stiffness: float, ranges: Array | None, levels: int,
+              ) -> dict[str, Any]:
+    """
+    Return stiffness by axis [N/m, N m/rad] and natural frequencies [Hz], and their worst.
+
+    The stiffness of an axis is the load along it per deflection along it, all other axes being
+    free: the reciprocal of the diagonal of the compliance.
+    """
+    def of(poses: Pose) -> tuple[Array, Array]:
+        k = hexapod.platform.stiffness(poses, leg_stiffness)
+        compliance = np.diagonal(np.linalg.inv(k), axis1=-2, axis2=-1)
+        return 1.0 / compliance, hexapod.platform.natural_modes(poses, leg_stiffness).frequencies
+
+    axes, frequencies = of(hexapod.pose)
+    found: dict[str, Any] = {
+        'leg_stiffness': leg_stiffness, **dict(zip(AXES, axes.tolist(), strict=True)),
+        'frequencies': frequencies.tolist(), 'worst': None}
+    if ranges is not None:
+        axes, frequencies = of(poses_of(hexapod, grid(ranges, levels)))
+        found['worst'] = dict(zip(AXES, axes.min(axis=0).tolist(), strict=True)) | {
+            'frequencies': frequencies.min(axis=0).tolist()}
+    return found

@@ -1,0 +1,169 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A recorded motion for a datasheet: whether it is possible, how far, and its use of limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.bags.recording import Recording
+from stewart_dynamics.capability.capability import Capability
+from stewart_dynamics.datasheet.ratings import answer
+from stewart_dynamics.errors import BagError
+from stewart_dynamics.mechanics import limits
+from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
+from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.replay.bag_topics import find_topics
+from stewart_dynamics.replay.differentiate import Differentiator
+from stewart_dynamics.replay.replay_options import Options
+from stewart_dynamics.setpoints.joining import Setpoints
+from stewart_dynamics.setpoints.step import Batch
+
+LENGTH, RATE, FORCE, ANGLE, SINGULARITY = (
+    'length', 'rate', 'force', 'joint angle', 'singularity')
+
+
+class RecordedMotion(NamedTuple):
+    """Setpoints of a bag."""
+
+    seconds: Array
+    """Since the first setpoint (N,) [s]."""
+    motion: Motion
+    wrench: Array
+    """External wrench (N, 6) [N, N m]."""
+    base: BaseMotion | None
+    missing: list[str]
+    """Parts of the bag that could not be read."""
+
+
+def read_motion(bag: Path, parameters: Parameters, options: Options,
+                progress: Callable[[int], object]) -> RecordedMotion:
+    """
+    Return the setpoints of a bag, joined as in the replay.
+
+    Raises
+    ------
+    BagError
+        The bag cannot be read, or has no setpoints.
+
+    """
+    source = ('pose' if options.cutoff is not None
+              else 'combined' if 'combined' in options.topics else None)
+    if source:
+        parameters = parameters.replaced({'setpoint.source': source})
+    differentiator = None if options.cutoff is None else Differentiator(
+        options.cutoff, max(parameters['setpoint.timeout'], 1.0 / options.cutoff))
+    batches: list[Batch] = []
+    with closing(Recording(bag)) as recording:
+        topics = find_topics(recording, parameters, options)
+        setpoints = Setpoints(parameters, lambda rejection, details: None, lambda text: None)
+        for messages, size in recording.messages({name: key for key, name in topics.items()}):
+            batch = setpoints.take_many(messages)
+            batches.append(batch if differentiator is None else differentiator.add(batch))
+            progress(size)
+        setpoints.end('the bag ends')
+        if differentiator is not None:
+            batches.append(differentiator.finish())
+        missing = list(recording.missing)
+    batches = [each for each in batches if len(each.stamps)]
+    if not batches:
+        raise BagError(f'{bag}: has no valid setpoint')
+    stamps = np.concatenate([each.stamps for each in batches])
+    rows = np.concatenate([each.motions for each in batches])
+    wrenches = np.concatenate([np.broadcast_to(each.wrenches, (len(each.stamps), 6))
+                               for each in batches])
+    bases = None if batches[0].bases is None else np.concatenate(
+        [np.asarray(each.bases) for each in batches])
+    if bases is not None:
+        known = np.isfinite(bases).all(axis=1)
+        if not known.any():
+            raise BagError(f"{bag}: the base's motion is not known at any setpoint")
+        stamps, rows, wrenches, bases = (each[known] for each in (stamps, rows, wrenches, bases))
+    steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
+    return RecordedMotion(np.cumsum(steps) * 1e-9, Motion.of_rows(rows), wrenches,
+                          None if bases is None else BaseMotion.of_rows(bases), missing)
+
+
+def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array]:
+    """
+    Return the largest use of each kind of limit at each sample (N,): above 1 it is exceeded.
+
+    The use of a length is 0 in the middle of its range and 1 at both ends.
+    """
+    p = platform.parameters
+    result = platform.inverse_dynamics(
+        recorded.motion, recorded.wrench, recorded.base, singular='nan')
+    found: dict[str, Array] = {}
+    low, high = p[limits.LENGTH_MIN], p[limits.LENGTH_MAX]
+    if high is not None:
+        shortest = np.zeros(6) if low is None else low
+        found[LENGTH] = np.abs(2.0 * result.lengths - high - shortest) / (high - shortest)
+    elif low is not None:
+        found[LENGTH] = low / result.lengths
+    if p[limits.VELOCITY_MAX] is not None:
+        found[RATE] = np.abs(result.rates) / p[limits.VELOCITY_MAX]
+    if p[limits.FORCE_MAX] is not None:
+        forces = np.where(np.isfinite(result.forces), np.abs(result.forces), np.inf)
+        found[FORCE] = forces / p[limits.FORCE_MAX]
+    known = [name for name in limits.OF_JOINTS if p[name] is not None]
+    if known:
+        angles = dict(zip(limits.OF_JOINTS, platform.joint_angles(recorded.motion), strict=True))
+        found[ANGLE] = np.max([angles[name] / p[name] for name in known], axis=0)
+    found = {name: each.max(axis=-1) for name, each in found.items()}
+    condition = result.condition_number / p['singularity.stop_condition']
+    crossed = np.diff(np.sign(result.determinant), prepend=np.sign(result.determinant[0])) != 0.0
+    found[SINGULARITY] = np.where(crossed, np.inf, condition)
+    return found
+
+
+def judged(platform: StewartPlatform, recorded: RecordedMotion,
+           used: dict[str, Array]) -> dict[str, Any]:
+    """Return whether a motion is possible, how much faster it could be, and its payload."""
+    c, p = Capability(platform), platform.parameters
+    joints = p['joints']
+    worst = max(used, key=lambda name: float(used[name].max()))
+    sample = int(used[worst].argmax())
+    found: dict[str, Any] = {
+        'possible': bool(used[worst][sample] <= 1.0 + limits.TOLERANCE),
+        'samples': len(recorded.seconds), 'duration_s': float(recorded.seconds[-1]),
+        'largest_use': {name: float(each.max()) if np.isfinite(each.max()) else None
+                        for name, each in used.items()},
+        'largest_use_limit': worst, 'largest_use_at_s': float(recorded.seconds[sample])}
+    singular = used[SINGULARITY].max() > 1.0
+    if singular:
+        at = int(used[SINGULARITY].argmax())
+        return found | {'factor': 0.0, 'limit': 'singularity', 'leg': None,
+                        'at_s': float(recorded.seconds[at]), 'payload': None}
+    speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
+    found |= _named('factor', speed, recorded, joints)
+    payload = None
+    if p[limits.FORCE_MAX] is not None:
+        more = c.payload(recorded.motion, np.zeros(3))
+        payload = answer(float(more.value), str(more.limit), int(more.leg), joints)
+    return found | {'payload': payload}
+
+
+def _named(name: str, extent: Any, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:
+    plain = answer(float(extent.value), str(extent.limit), int(extent.leg), joints)
+    return {name: plain['value'], 'limit': plain['limit'], 'leg': plain['leg'],
+            'at_s': None if extent.sample is None else float(recorded.seconds[extent.sample])}

@@ -1,0 +1,106 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The workspace around the rated pose: sections at its rotation, and tilt in all directions."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
+from stewart_dynamics.mechanics.frames.motion import Pose
+
+_RAYS = 360
+PLANES = (('xz', 0, 2), ('yz', 1, 2), ('xy', 0, 1))
+"""Names of the sections, and the axes in them."""
+
+
+class Boundary(NamedTuple):
+    """Travels in all directions of a plane, and the limits that end them."""
+
+    name: str
+    directions: Array
+    """(N, 6), base axes."""
+    begin: Array
+    """(6,) translation and rotation vector from the pose, at which the rays begin."""
+    values: Array
+    """Travel along each direction (N,) [m or rad]; infinite if nothing limits."""
+    limits: list[str]
+    legs: list[int]
+
+    @property
+    def points(self) -> Array:
+        """Return the ends of the travels (N, 6), from the pose."""
+        ends: Array = self.begin + self.values[:, None] * self.directions
+        return ends
+
+
+def section(hexapod: RatedHexapod, name: str, first: int, second: int) -> Boundary:
+    """Return the travel from the pose in all directions of a plane, without rotation."""
+    around = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
+    directions = np.zeros((_RAYS, 6))
+    directions[:, first], directions[:, second] = np.cos(around), np.sin(around)
+    return _boundary(hexapod, name, directions, np.zeros(6))
+
+
+def tilt(hexapod: RatedHexapod, height: float) -> Boundary:
+    """
+    Return the tilt toward all azimuths at a height above the pose.
+
+    Row n is a lean toward the azimuth ``2 pi n / N`` from x to y, base axes.
+    """
+    around = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
+    directions = np.zeros((_RAYS, 6))
+    directions[:, 3], directions[:, 4] = -np.sin(around), np.cos(around)
+    begin = np.array([0.0, 0.0, height, 0.0, 0.0, 0.0])
+    return _boundary(hexapod, 'tilt', directions, begin)
+
+
+def rotations_over_height(hexapod: RatedHexapod, low: float, high: float, count: int = 41,
+                          ) -> tuple[Array, dict[str, Array]]:
+    """
+    Return heights (N,) from the pose [m], and how far the platform can turn there (N,) [rad].
+
+    ``tilt`` is the smallest of all azimuths.
+    """
+    around = np.linspace(0.0, 2.0 * np.pi, _RAYS // 5, endpoint=False)
+    directions = np.zeros((len(around) + 2, 6))
+    directions[:-2, 3], directions[:-2, 4] = -np.sin(around), np.cos(around)
+    directions[-2:, 5] = 1.0, -1.0
+    heights: Array = np.linspace(low, high, count, dtype=float)
+    up = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    poses = Pose(hexapod.pose.position + heights[:, None] * up[:3], hexapod.pose.rotation)
+    values = hexapod.travel(poses[:, None], directions).value
+    return heights, {'tilt, every direction': values[:, :-2].min(axis=1),
+                     'θZ': values[:, -2:].min(axis=1)}
+
+
+def _boundary(hexapod: RatedHexapod, name: str, directions: Array, begin: Array) -> Boundary:
+    found = hexapod.travel(hexapod.moved_by(begin), directions)
+    return Boundary(name, directions, begin, found.value, found.limit.tolist(),
+                    found.leg.tolist())
+
+
+def table(boundaries: list[Boundary], joints: tuple[str, ...]) -> str:
+    """Return the ends of all travels as CSV."""
+    lines = ['section,x,y,z,rx,ry,rz,limit,leg']
+    for each in boundaries:
+        for point, limit, leg in zip(each.points, each.limits, each.legs, strict=True):
+            if np.isfinite(point).all():
+                numbers = ','.join(f'{value:.9g}' for value in point)
+                lines.append(f'{each.name},{numbers},{limit},{joints[leg] if leg >= 0 else ""}')
+    return '\n'.join(lines) + '\n'

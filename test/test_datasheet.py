@@ -1,0 +1,387 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The program stewart_capability: its figures applied in the dynamics, its page, its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import csv
+from html.parser import HTMLParser
+import json
+import math
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from referees import random_direction, rng, rotation_about
+
+from stewart_dynamics import (
+    BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
+from stewart_dynamics.datasheet import main
+from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
+from stewart_dynamics.datasheet.payloads import Payloads
+from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
+from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS
+from stewart_dynamics.datasheet.recorded_motion import judged, RecordedMotion, uses
+from stewart_dynamics.reporting.vector_picture import hull, ticks
+
+ROOT = Path(__file__).resolve().parent.parent
+PLATFORM = ROOT / 'config' / 'platform.yaml'
+PARAMETERS = Parameters.from_yaml(PLATFORM)
+PIVOT = np.array([0.05, -0.1, 0.3])
+BROWSER = shutil.which('chromium') or shutil.which('chromium-browser')
+
+
+def run(*arguments: Any) -> int:
+    """Return the exit code for these arguments."""
+    return main([str(each) for each in arguments])
+
+
+@pytest.fixture(scope='module')
+def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a datasheet with everything in it."""
+    folder = tmp_path_factory.mktemp('capability')
+    box = folder / 'box.yaml'
+    box.write_text('x: 0.1\ny: [-0.1, 0.1]\nrx: 0.2\n')
+    assert run('--params', PLATFORM, '--pivot', *PIVOT, '--payload', 40, 0, 0, 0.2, '--box', box,
+               '--motion', ROOT / 'bags' / 'clear', '--leg-stiffness', 5e7,
+               '--output', folder / 'sheet', '--strict') == 0
+    return folder / 'sheet'
+
+
+@pytest.fixture(scope='module')
+def figures(sheet: Path) -> dict[str, Any]:
+    """Return the content of datasheet.json."""
+    document: dict[str, Any] = json.loads((sheet / 'datasheet.json').read_text())
+    return document
+
+
+def test_the_files_are_there_and_name_what_limits(sheet: Path, figures: dict[str, Any]) -> None:
+    assert sorted(each.name for each in sheet.iterdir()) == [
+        'datasheet.html', 'datasheet.json', 'workspace.csv']
+    assert [*figures['travel']] == [*figures['velocity']] == [*figures['acceleration']] == [*KEYS]
+    for name in ('travel', 'velocity', 'acceleration'):
+        for each in figures[name].values():
+            if each['limit'] == 'singularity':
+                assert each['leg'] is None
+            else:
+                assert each['leg'] in PARAMETERS['joints']
+                assert f'limits.{each["limit"]}' in PARAMETERS
+    assert figures['box']['possible']
+    assert figures['motion']['possible']
+    assert figures['motion']['factor'] > 1.0
+    assert figures['payload']['any_orientation'] < figures['payload']['value']
+    assert figures['stiffness']['worst']['frequencies'][0] < figures['stiffness']['frequencies'][0]
+
+
+def test_travel_is_about_the_pivot_and_the_table_ends_at_the_limits(
+        sheet: Path, figures: dict[str, Any]) -> None:
+    platform = StewartPlatform(PARAMETERS)
+    c, home = Capability(platform), platform.home_pose()
+    for key, direction in zip(KEYS, np.repeat(np.eye(6), 2, axis=0) * np.tile(
+            [1.0, -1.0], 6)[:, None], strict=True):
+        found = c.travel(home, direction, PIVOT)
+        assert figures['travel'][key]['value'] == pytest.approx(found.value, rel=1e-12)
+        assert figures['travel'][key]['limit'] == found.limit
+    rows = list(csv.DictReader((sheet / 'workspace.csv').open()))
+    ends = np.array([[float(each[axis]) for axis in AXES] for each in rows])
+    assert len(ends) == 6 * 360
+    center = home.position + PIVOT
+    for factor, within in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
+        offsets = ends.copy()
+        offsets[:, :2] *= factor
+        offsets[:, 3:] *= factor
+        sections = np.array([each['section'] != 'tilt' for each in rows])
+        offsets[sections, 2] *= factor
+        rates = np.linalg.norm(offsets[:, 3:], axis=1)
+        turns = np.array([rotation_about(each[3:] / rate, rate) if rate else np.eye(3)
+                          for each, rate in zip(offsets, rates, strict=True)])
+        result = platform.inverse_dynamics(Motion.from_pose(
+            Pose(center + offsets[:, :3] - turns @ PIVOT, turns)), singular='nan')
+        inside = ((result.lengths > 0.95) & (result.lengths < 1.65)).all(axis=1) & (
+            result.condition_number < 100.0)
+        assert (inside == within).all()
+
+
+def test_ranges_at_once_are_reachable_and_no_larger_ones_are(figures: dict[str, Any]) -> None:
+    c = Capability(StewartPlatform(PARAMETERS))
+    for name in ('translation', 'rotation', 'all'):
+        ranges = np.array([figures['at_once'][name]['ranges'][axis] for axis in AXES])
+        assert c.reachable(ranges, pivot=PIVOT).certain
+        assert not c.reachable(1.0001 * ranges, pivot=PIVOT).certain
+
+
+def test_force_and_moment_act_at_the_pivot() -> None:
+    rated = RatedHexapod(PARAMETERS, pivot=PIVOT)
+    found, home = at_pose(rated), StewartPlatform(PARAMETERS).home_pose()
+    for key in KEYS:
+        kind = 'moment' if key.startswith('r') else 'force'
+        load = np.zeros(6)
+        load[KEYS.index(key) // 2] = found[kind][key]['value'] * (-1.0 if key[-1] == '-' else 1.0)
+        load[3:] += np.cross(PIVOT, load[:3])
+        forces = StewartPlatform(PARAMETERS).inverse_dynamics(
+            Motion.from_pose(home), wrench=-load).forces
+        assert np.abs(forces).max() == pytest.approx(6000.0, rel=1e-9)
+
+
+def test_the_rated_payload_brings_a_leg_to_its_largest_force() -> None:
+    largest = at_pose(RatedHexapod(PARAMETERS, pivot=PIVOT))['payload']['value']
+    loaded = RatedHexapod(PARAMETERS, payload=Payload(largest * (1.0 - 1e-12), PIVOT))
+    forces = loaded.platform.inverse_dynamics(Motion.from_pose(loaded.pose)).forces
+    assert np.abs(forces).max() == pytest.approx(6000.0, rel=1e-9)
+    with pytest.raises(PoseError, match=r'force .* above limits.force_max'):
+        RatedHexapod(PARAMETERS, payload=Payload(1.001 * largest, PIVOT))
+
+
+def test_a_payload_in_any_orientation_exceeds_no_force_under_any_gravity() -> None:
+    platform, random = StewartPlatform(PARAMETERS), rng()
+    home = platform.home_pose()
+    for offset, height in ((0.0, 0.0), (0.3, 0.4)):
+        mass = Payloads(platform, home[None]).any_orientation(offset, height)
+        largest = 0.0
+        for azimuth in np.linspace(0.0, 2.0 * math.pi, 36, endpoint=False)[::1 if offset else 36]:
+            center = np.array([offset * math.cos(azimuth), offset * math.sin(azimuth), height])
+            loaded = RatedHexapod(
+                PARAMETERS.replaced({'limits.force_max': 1e9}), payload=Payload(mass, center))
+            gravities = 9.80665 * np.array([random_direction(random) for _ in range(500)])
+            forces = loaded.platform.inverse_dynamics(
+                Motion.from_pose(home), base=BaseMotion(gravities)).forces
+            largest = max(largest, float(np.abs(forces).max()))
+        assert largest <= 6000.0 * (1.0 + 1e-9)
+        assert largest > 0.98 * 6000.0
+
+
+@pytest.fixture(scope='module')
+def recorded() -> RecordedMotion:
+    """Return a motion of one second along z."""
+    t = np.linspace(0.0, 1.0, 101)
+    still = np.zeros((101, 3))
+    z = np.array([0.0, 0.0, 1.0])
+    motion = Motion(
+        [0.0, 0.0, 1.18] + 0.1 * np.sin(3.0 * t)[:, None] * z, np.eye(3),
+        0.3 * np.cos(3.0 * t)[:, None] * z, still, -0.9 * np.sin(3.0 * t)[:, None] * z, still)
+    return RecordedMotion(t, motion, np.zeros((101, 6)), None, [])
+
+
+def test_a_motion_at_its_factor_uses_a_limit_whole(recorded: RecordedMotion) -> None:
+    platform = StewartPlatform(PARAMETERS)
+    used = uses(platform, recorded)
+    found = judged(platform, recorded, used)
+    k, m = found['factor'], recorded.motion
+    faster = recorded._replace(motion=Motion(
+        m.position, m.rotation, k * m.linear_velocity, m.angular_velocity,
+        k * k * m.linear_acceleration, m.angular_acceleration))
+    used = uses(platform, faster)
+    assert found['limit'] == 'velocity_max'
+    assert max(each.max() for each in used.values()) == pytest.approx(1.0, rel=1e-9)
+    assert recorded.seconds[int(used['rate'].argmax())] == found['at_s']
+
+
+@pytest.mark.parametrize(('changes', 'limit'), [
+    ({'limits.length_max': 1.32}, 'length_max'), ({'limits.velocity_max': 0.1}, 'velocity_max'),
+    ({'limits.base_joint_angle_max': 0.001}, 'base_joint_angle_max')])
+def test_a_motion_that_exceeds_a_limit_is_not_possible(
+        changes: dict[str, float], limit: str, recorded: RecordedMotion) -> None:
+    platform = StewartPlatform(PARAMETERS.replaced(changes))
+    found = judged(platform, recorded, uses(platform, recorded))
+    assert not found['possible']
+    assert found['factor'] < 1.0
+    assert found['limit'] == limit
+
+
+def test_a_bag_through_a_singularity_is_not_possible(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = '--params', PLATFORM, '--motion', ROOT / 'bags' / 'singular', '--output'
+    assert run(*given, tmp_path / 'a', '--strict') == 1
+    printed = capsys.readouterr()
+    assert 'motion not possible: at no speed, by singularity at 8.4' in printed.out
+    assert f'results: {tmp_path / "a"}' in printed.out
+
+
+class _Loaded(HTMLParser):
+    """Resources and scripts of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.bold = 0
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.bold += 'onerror' in given
+        if tag == 'script' or given.get('src') or (tag == 'link' and given['href'] != 'data:,'):
+            self.found.append(tag)
+
+
+def test_the_page_loads_nothing_and_names_are_text(tmp_path: Path) -> None:
+    p = PARAMETERS.replaced({
+        'joints': ['<img src=x onerror=a>', 'b"', "c'", 'd&', 'e</svg>', 'f'],
+        'limits.velocity_max': 0.1, 'limits.base_joint_angle_max': 0.4})
+    p.to_yaml(tmp_path / 'a.yaml')
+    assert run('--params', tmp_path / 'a.yaml', '--output', tmp_path / 'sheet') == 0
+    text = (tmp_path / 'sheet' / 'datasheet.html').read_text()
+    page = _Loaded(text)
+    assert not page.found
+    assert not page.bold
+    assert text.count('<svg') == text.count('</svg>')
+    assert 'nan' not in text.lower().replace('nanum', '')
+
+
+@pytest.mark.skipif(not BROWSER, reason='there is no chromium')
+def test_the_page_fits_a_phone_and_two_sheets_of_paper(sheet: Path) -> None:
+    playwright = pytest.importorskip('playwright.sync_api')
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(
+            executable_path=BROWSER, args=['--no-sandbox', '--disable-gpu'])
+        page = browser.new_page()
+        page.goto((sheet / 'datasheet.html').as_uri())
+        for width in (390, 820, 1140, 1440):
+            page.set_viewport_size({'width': width, 'height': 900})
+            assert page.evaluate('document.documentElement.scrollWidth') <= width
+            overlaps = page.evaluate(
+                '[...document.querySelectorAll("table")].filter(each => !each.closest(".scroll")'
+                ' && each.offsetWidth > each.parentElement.clientWidth + 1).map(each => '
+                'each.innerText.slice(0, 40) + each.offsetWidth)')
+            assert not overlaps
+        pdf = page.pdf(prefer_css_page_size=True)
+        assert b'/Count 3' in pdf or b'/Count 2' in pdf  # the third for the motion
+        browser.close()
+
+
+BAD: list[tuple[list[str], str]] = [
+    (['--pose', '0', '0', '2', '0', '0', '0'], 'above limits.length_max'),
+    (['--pose', '0', '0', '1.18', '0', '0', '1.5707963'], 'pose: singular: the condition number'),
+    (['--payload', '0', '0', '0', '0'], '--payload: mass 0 kg: must be above 0'),
+    (['--payload', '9e4', '0', '0', '0'], 'above limits.force_max'),
+    (['--leg-stiffness', '-1'], '--leg-stiffness: -1 N/m: must be above 0'),
+    (['--motion', 'none'], 'none: not a bag that can be read'),
+    (['--box', 'none'], 'none: cannot be read'),
+    (['--output', '/proc/none'], '/proc/none: cannot be written'),
+    (['--params', 'none'], 'none: cannot be read')]
+
+
+@pytest.mark.parametrize(('arguments', 'error'), BAD, ids=[each for _, each in BAD])
+def test_bad_input_is_exit_code_2_and_one_line(
+        arguments: list[str], error: str, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--params', PLATFORM, '--output', tmp_path / 'sheet', *arguments) == 2
+    *_, last = capsys.readouterr().err.splitlines()
+    assert last.startswith('stewart_capability: ')
+    assert error in last
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(('text', 'error'), [
+    ('x: 0.0', 'all ranges are of size zero'), ('q: 1.0', 'q: must be one of x, y, z'),
+    ('x: [0.1, -0.1]', 'the lower bound must come first'), ('x: [1, 2, 3]', 'must be one number'),
+    ('x: .nan', 'must be one number'), ('x: far', 'must be one number')])
+def test_a_box_that_is_none_is_rejected(
+        text: str, error: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'box.yaml').write_text(text)
+    given = '--params', PLATFORM, '--box', tmp_path / 'box.yaml', '--output', tmp_path / 'a'
+    assert run(*given) == 2
+    assert error in capsys.readouterr().err
+
+
+def test_without_limits_there_is_no_datasheet_and_ratings_without_theirs_are_left_out(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def stripped(*kept: str) -> Path:
+        values = {name: value for name, value in PARAMETERS.given.items()
+                  if not name.startswith('limits.') or name in kept}
+        Parameters(values).to_yaml(tmp_path / 'a.yaml')
+        return tmp_path / 'a.yaml'
+
+    given = '--pose', 0, 0, 1.18, 0, 0, 0, '--output'
+    assert run('--params', stripped(), *given, tmp_path / 'a') == 2
+    assert 'limits.force_max' in capsys.readouterr().err
+    lengths = stripped('limits.length_min', 'limits.length_max')
+    assert run('--params', lengths, *given, tmp_path / 'a') == 0
+    found = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())
+    assert found['force'] is found['payload'] is found['velocity'] is None
+    assert 'Static load' not in (tmp_path / 'a' / 'datasheet.html').read_text()
+
+
+def test_results_are_replaced_only_by_option(
+        sheet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--params', PLATFORM, '--output', sheet) == 2
+    assert 'exists already; --force replaces' in capsys.readouterr().err
+
+
+def test_help_needs_neither_numpy_nor_the_compiler() -> None:
+    code = ('import sys; from stewart_dynamics.datasheet import main\n'
+            'try: main(["--help"])\n'
+            'except SystemExit: print(sorted({"numpy", "numba"} & set(sys.modules)))')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.endswith('[]\n')
+
+
+@pytest.mark.parametrize(('value', 'text'), [
+    (0.0, '0'), (1.23456, '1.234'), (-1.23456, '−1.234'), (99999.0, '99\u202f990'),
+    (0.1, '0.1000'), (2.3, '2.300'), (1234.0, '1\u202f234'), (math.inf, '–'), (None, '–'),
+    (1e-5, '0.00001000')])
+def test_figures_are_rounded_toward_zero(value: float | None, text: str) -> None:
+    assert down(value) == text
+
+
+def test_ranges_that_look_equal_are_written_once() -> None:
+    unit = LINEAR['travel']
+    write: Callable[[float, float], str] = lambda low, high: both_ways(  # noqa: E731
+        {'x-': {'value': low}, 'x+': {'value': high}}, 'x', unit)
+    assert write(0.1, 0.10001) == '±100.0'
+    assert write(0.1, 0.2) == '−100.0\u00a0… +200.0'
+
+
+def test_hull_and_ticks() -> None:
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.5, 0.0]])
+    assert sorted(map(tuple, hull(square))) == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    assert ticks(-1.05, 2.1, 3) == pytest.approx([0.0, 2.0])
+    assert ticks(0.0, 0.0, 3) == [0.0]
+
+
+# Camera hexapod of the Rubin Observatory, [mm]: coordinates of the ends of its struts, their
+# stroke, the pivot and the position limits of its controller, from constants.py of
+# https://github.com/lsst-ts/ts_mthexapod (1ba8f97).
+MOVING = [(227.6, 653.8), (-227.6, 653.8), (-680.0, -129.7), (-452.3, -524.0), (452.3, -524.0),
+          (680.0, -129.7)]
+FIXED = [(472.8, 512.2), (-472.8, 512.2), (-680.0, 153.3), (-207.2, -665.5), (207.2, -665.5),
+         (680.0, 153.3)]
+PUBLISHED = {'x': 0.0114, 'y': 0.0114, 'z': 0.0131, 'rx': math.radians(0.36),
+             'ry': math.radians(0.36), 'rz': math.radians(0.1)}
+
+
+def test_a_published_hexapod_reaches_each_of_its_limits_alone_but_not_all_at_once() -> None:
+    moving = 1e-3 * np.array([(*each, -525.0) for each in MOVING])
+    fixed = 1e-3 * np.array([(*each, -121.4) for each in FIXED])
+    lengths = np.linalg.norm(moving - fixed, axis=1)
+    rated = RatedHexapod(Parameters({
+        'geometry.base_joints': fixed, 'geometry.platform_joints': moving, 'platform.mass': 1.0,
+        'platform.inertia': [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+        'limits.length_min': lengths - 0.0141, 'limits.length_max': lengths + 0.0141}),
+        Pose(np.zeros(3), np.eye(3)), np.array([0.0, 0.0, -2.7584]))
+    box = np.array([[-PUBLISHED[axis], PUBLISHED[axis]] for axis in AXES])
+    for n, axis in enumerate(AXES):
+        alone = np.zeros((6, 2))
+        alone[n] = box[n]
+        assert rated.reachable(alone).certain, axis
+    found = rated.reachable(box)
+    assert not found.certain
+    assert found.worst.excess == pytest.approx(0.0200, abs=1e-4)
+    assert rated.reachable_factor(box).value == pytest.approx(
+        0.4173, abs=1e-4)
