@@ -26,7 +26,6 @@ import os
 from pathlib import Path
 import re
 import resource
-import shutil
 import signal
 import subprocess
 import sys
@@ -529,13 +528,6 @@ def test_a_bag_of_sqlite_gives_the_same(tmp_path: Path) -> None:
         RECORDED + n * 10 * MS + 2 for n in range(1, 31)]
 
 
-def test_a_bag_without_metadata_is_read_by_its_files(
-        tmp_path: Path, replayed: dict[str, Outputs]) -> None:
-    shutil.copy(bag_file('clear'), tmp_path / 'alone.mcap')
-    assert run(tmp_path / 'alone.mcap', tmp_path / 'out') == DONE
-    assert outputs_of(tmp_path / 'out' / 'alone').rows == replayed['clear'].rows
-
-
 def test_setpoints_without_stamps_are_stamped_as_they_were_recorded(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', [
         (topic, RECORDED + n * 10 * MS, write(0)) for n in range(5) for topic, write in (
@@ -653,8 +645,9 @@ def test_a_missing_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert not (tmp_path / 'out').exists()
 
 
-@pytest.mark.parametrize('content', [b'', b'no bag', b'\x89MCAP0\r\n', bytes(range(256)) * 20])
-@pytest.mark.parametrize('suffix', ['.mcap', '.db3', '.bag', '.txt'])
+@pytest.mark.parametrize(('content', 'suffix'), [
+    (b'', '.mcap'), (b'no bag', '.db3'), (b'\x89MCAP0\r\n', '.txt'),
+    (bytes(range(256)) * 20, '.bag')])
 def test_a_file_that_is_not_a_bag(
         content: bytes, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / f'file{suffix}'
@@ -865,11 +858,9 @@ def test_the_rest_of_a_damaged_bag_is_replayed(
     assert [row for row in expected if row in rows] == rows
 
 
-@pytest.mark.parametrize('order', [(0, 1, 2), (1, 0, 2), (2, 1, 0), (1, 2, 0)])
-def test_the_most_severe_exit_code_of_several_bags(order: tuple[int, ...], tmp_path: Path) -> None:
-    found = [ROOT / 'bags' / 'singular', damaged_bag(tmp_path / 'damaged.mcap'),
-             ROOT / 'bags' / 'clear']
-    bags = [str(found[n]) for n in order]
+def test_the_most_severe_exit_code_of_several_bags(tmp_path: Path) -> None:
+    bags = [str(bag) for bag in (ROOT / 'bags' / 'singular', damaged_bag(
+        tmp_path / 'damaged.mcap'), ROOT / 'bags' / 'clear')]
     assert main([*bags, '--params', str(PARAMS), '--output', str(tmp_path / 'out'), '--strict'
                  ]) == PARTLY_READ
     assert main([*bags, str(tmp_path / 'none'), '--params', str(PARAMS), '--output',
@@ -877,26 +868,19 @@ def test_the_most_severe_exit_code_of_several_bags(order: tuple[int, ...], tmp_p
 
 
 @pytest.mark.parametrize('plugin', list(StoragePlugin))
-def test_a_bag_cut_short_never_crashes_the_replay(
+def test_a_damaged_bag_never_crashes_the_replay(
         plugin: StoragePlugin, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
     file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
     whole = file.read_bytes()
-    for n, length in enumerate(range(0, len(whole), len(whole) // 12)):
-        file.write_bytes(whole[:length])
-        assert run(bag, tmp_path / 'out' / str(n)) in (BAD_INPUT, PARTLY_READ)
+    for n, at in enumerate(range(0, len(whole), len(whole) // 6)):
+        file.write_bytes(whole[:at])
+        assert run(bag, tmp_path / 'cut' / str(n)) in (BAD_INPUT, PARTLY_READ)
         assert capsys.readouterr().err.count('\n') == 1
-
-
-@pytest.mark.parametrize('plugin', list(StoragePlugin))
-def test_a_damaged_bag_never_crashes_the_replay(plugin: StoragePlugin, tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'bag', motion(60), plugin=plugin)
-    file = next(path for path in bag.iterdir() if path.suffix in ('.mcap', '.db3'))
-    whole = file.read_bytes()
-    for n, at in enumerate(range(0, len(whole), len(whole) // 25)):
         file.write_bytes(whole[:at] + bytes(b ^ 0xa5 for b in whole[at:at + 64])
                          + whole[at + 64:])
-        assert run(bag, tmp_path / 'out' / str(n)) in (DONE, BAD_INPUT, PARTLY_READ)
+        assert run(bag, tmp_path / 'spoiled' / str(n)) in (DONE, BAD_INPUT, PARTLY_READ)
+        capsys.readouterr()
 
 
 # In a process of its own
