@@ -27,10 +27,11 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.highlevel import AnyReader
 from running import (
-    assert_only_log_lines, DynamicsNode, executable, nanoseconds, own_domain, Peer, PLATFORM,
-    Program, ROOT)
+    assert_only_log_lines, DynamicsNode, executable, HOME as RESTING, nanoseconds,
+    own_domain, Peer, PLATFORM, Program, ROOT)
 from sensor_msgs.msg import JointState
-from stewart_dynamics import approach, Motion, Pose, StewartPlatform
+from std_msgs.msg import Float64MultiArray
+from stewart_dynamics import approach, Capability, Motion, Pose, StewartPlatform
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.messages.setpoint import pose, StampedWriter, twist
 from stewart_dynamics.reference_motion.motion import motion_at, sample_times
@@ -358,3 +359,27 @@ def test_motion_compensation_keeps_the_platform_still_until_the_base_motion_stop
         assert_only_log_lines(program.stderr)
     finally:
         peer.close()
+
+
+@pytest.mark.slow
+def test_travel_is_published_and_shown(start: Callable[..., DynamicsNode], run: Run) -> None:
+    node = start()
+    node.until_active()
+    messages = node.peer.listen('/stewart_dynamics/travel', Float64MultiArray)
+    panel = run('show_travel.py', node.domain)
+
+    def shown() -> bool:
+        node.answer()
+        return bool(messages) and ' deg' in panel.stdout
+
+    node.until(shown, 'the travel is shown')
+    message = deserialize_message(messages[-1], Float64MultiArray)
+    assert [(each.label, each.size, each.stride) for each in message.layout.dim] == [
+        ('x y z rx ry rz', 6, 12), ('minus plus', 2, 2)]
+    pose = Pose.from_quaternion(RESTING.position, RESTING.quaternion)
+    assert np.array(message.data).reshape(6, 2).T == pytest.approx(np.array([
+        Capability(node.platform).travel(pose, sign * np.eye(6)).value for sign in (-1.0, 1.0)]))
+    rows = panel.stdout.splitlines()[:6]
+    assert [row.split()[0] for row in rows] == ['x', 'y', 'z', 'rx', 'ry', 'rz']
+    assert f'{1e3 * message.data[5]:.1f} mm' in rows[2]
+    assert panel.stop() == 0

@@ -28,6 +28,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 
+from stewart_dynamics.capability import travel
 from stewart_dynamics.compilation import machine_code
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.description.model import JOINT_STATES, ModelMessages, TF
@@ -43,7 +44,8 @@ from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, TI
 from stewart_dynamics.node.diagnostics.publisher import DiagnosticsPublisher
 from stewart_dynamics.node.tasks import (
     inertia_message, LENGTH, PAUSE, PayloadService, TaskQueue)
-from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD
+from stewart_dynamics.node.topics import MARKERS, NodeTopics, PAYLOAD, TRAVEL
+from stewart_dynamics.node.travel import TravelPublisher
 from stewart_dynamics.node.visualization import MarkersPublisher, ModelPublisher
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.parameters.yaml_file import is_of_ros
@@ -107,6 +109,7 @@ class DynamicsNode(LifecycleNode):
         self._planned_code = Preparation(*planned_trajectory.FUNCTIONS)
         self._external_wrench_code = Preparation(*external_wrench.FUNCTIONS)
         self._base_wrench_code = Preparation(*base_wrench.FUNCTIONS)
+        self._travel_code = Preparation(travel.travels)
         self._base_wrench_read = False  # it has a subscriber
         self._planned: TaskQueue[planned.PlannedOutcome] = TaskQueue(
             OneShotTimer(self, PAUSE, lambda: self._planned.tick()).start,
@@ -161,6 +164,7 @@ class DynamicsNode(LifecycleNode):
         self._model = ModelPublisher(
             self._model_messages, parameters['visualization_rate'], publishers.get(JOINT_STATES),
             publishers.get(TF))
+        self._travel = TravelPublisher(parameters, publishers[TRAVEL], self._travel_code)
         self._model_measured = parameters['joint_states.source'] == 'measured'
         self._handled, self._rested = -math.inf, False
         self._active = True
@@ -251,6 +255,7 @@ class DynamicsNode(LifecycleNode):
         now = time.monotonic()
         self._markers.publish_due(now)
         self._model.publish_due(now)
+        self._travel.publish_due(now)
         rested, self._rested = self._rested, False
         if not rested:
             self._gathering = True
@@ -289,6 +294,7 @@ class DynamicsNode(LifecycleNode):
                 self._topics.publishers[BASE_WRENCH].publish(
                     self._messages.of_wrench(setpoint.stamp, wrench))
         self._markers.answered(setpoint, output)
+        self._travel.answered(setpoint.motion)
         if not self._model_measured:
             self._model.moved(setpoint.stamp, setpoint.motion)
         now = time.monotonic()
@@ -426,6 +432,9 @@ class DynamicsNode(LifecycleNode):
         self._markers.publish_due(now)  # the last answer before a silence
         self._model.publish_due(now)
         self._model.look()
+        self._travel.publish_due(now)
+        if notice := self._travel.look():
+            self._log.write([LogLine(WARN, notice)])
         if self._diagnostics.due_at_tick(now):
             self._report()
 
@@ -450,6 +459,7 @@ class DynamicsNode(LifecycleNode):
             self._diagnostics.singularity.parameters = parameters
             self._diagnostics.limits.parameters = parameters
             self._markers.use(parameters)
+            self._travel.use(parameters)
         return SetParametersResult(successful=True)
 
 

@@ -47,7 +47,7 @@ from stewart_dynamics.setpoints.inputs import (
 from stewart_dynamics.setpoints.output_messages import OUTPUT_TYPES
 from stewart_dynamics.setpoints.sample_joining import WAITING
 
-DIAGNOSTICS, MARKERS, PAYLOAD = '/diagnostics', 'markers', 'payload'
+DIAGNOSTICS, MARKERS, PAYLOAD, TRAVEL = '/diagnostics', 'markers', 'payload', 'travel'
 
 
 class Topic(NamedTuple):
@@ -129,6 +129,12 @@ PUBLISHED = (
           'platform and [payload](payload.md) as one body', ', when the service '
           '`~/identify_payload` (std_srvs/Trigger) has identified it; latched (transient local)',
           depth=1, latched=True),
+    Topic(TRAVEL, type_names.FLOAT64_MULTI_ARRAY, 'how far x, y, z and the rotations about them '
+          'can go from the pose of the last setpoint, to minus and to plus, the others held: 6 x '
+          '2, m and rad', '; up to the first limit of lengths or joint angles or '
+          '`singularity.stop_condition`, about the origin of the platform; 0 where one is '
+          'exceeded, one turn or the largest number where nothing limits; at most 10 Hz, computed '
+          'while somebody subscribes', depth=1),
     Topic(JOINT_STATES, type_names.JOINT_STATE, 'positions of all joints of the URDF',
           ', for [robot_state_publisher](visualization.md#as-a-model); at most '
           '`visualization_rate`, while somebody subscribes'),

@@ -30,14 +30,14 @@ from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.setpoints.step import Output, Setpoint
 
 
-class _PublisherAtRate:
+class PublisherAtRate:
     """
     Publishes the last data noted, at most at a given rate, while there are subscribers.
 
     Parameters
     ----------
     publisher : Publisher, optional
-        Publishes the bytes from ``_write``; None if nothing is to be published.
+        Publishes the message from ``_write``; None if nothing is to be published.
     rate : float
         Maximum rate [Hz].
 
@@ -60,11 +60,11 @@ class _PublisherAtRate:
         if self._publisher.get_subscription_count():
             self._publisher.publish(self._write(*last))
 
-    def _write(self, *last: Any) -> bytes:
+    def _write(self, *last: Any) -> Any:
         raise NotImplementedError
 
 
-class MarkersPublisher(_PublisherAtRate):
+class MarkersPublisher(PublisherAtRate):
     """Publishes the markers of the last answer."""
 
     def __init__(self, parameters: Parameters, publisher: Any) -> None:
@@ -84,7 +84,7 @@ class MarkersPublisher(_PublisherAtRate):
         return self._markers.write(setpoint.motion, output)
 
 
-class ModelPublisher(_PublisherAtRate):
+class ModelPublisher(PublisherAtRate):
     """
     Publishes the last pose as joint states, and each pose as a transform.
 
