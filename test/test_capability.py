@@ -320,3 +320,68 @@ def test_a_question_without_a_limit_is_rejected(ask: Any, text: str) -> None:
 def test_a_direction_of_zeros_is_rejected() -> None:
     with pytest.raises(MotionError, match='all six numbers are zero'):
         Capability(PLATFORM).travel(PLATFORM.home_pose(), np.zeros(6))
+
+
+# Stiffness
+
+def test_stiffness_is_the_derivative_of_the_wrench_of_loaded_springs() -> None:
+    random = rng()
+    for seed in range(4):
+        platform, pose = limited(rng(seed))
+        legs = random.uniform(1e5, 1e6, 6)
+        lengths = platform.inverse_kinematics(pose)
+        forces = platform.inverse_dynamics(Motion.from_pose(pose)).forces
+
+        def wrench(by: float, direction: Array, *given: Any) -> Array:
+            platform, pose, legs, lengths, forces = given
+            at = moved(pose, direction, np.zeros(3), np.array([by]))[0]
+            pushed = forces + legs * (lengths - platform.inverse_kinematics(at))
+            return np.asarray(platform.inverse_jacobian(at).T @ pushed)
+
+        capability, given = Capability(platform), (platform, pose, legs, lengths, forces)
+        found = capability.stiffness(pose, legs)
+        for direction in np.eye(6):
+            change = (wrench(-1e-5, direction, *given) - wrench(1e-5, direction, *given)) / 2e-5
+            np.testing.assert_allclose(found @ direction, change, rtol=0.0,
+                                       atol=1e-8 * np.abs(found).max())
+        # With the weight the whole is the second derivative of an energy.
+        total = found + capability._weight_stiffness(pose)
+        part = np.abs(total - platform.stiffness(pose, legs)).max()
+        np.testing.assert_allclose(total, total.T, rtol=0.0, atol=1e-7 * part)
+
+
+def test_stiffness_of_a_cubic_hexapod_is_the_closed_form() -> None:
+    a, k = 0.5, 1e6
+    cube = a * np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    near = [c for c in cube if np.isclose(c.sum(), a)]
+    far = [c for c in cube if np.isclose(c.sum(), 2.0 * a)]
+    pairs = [(b, p) for b in near for p in far if np.isclose(np.linalg.norm(p - b), a)]
+    axes = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0], [1.0, 1.0, 1.0]])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]  # the diagonal is z
+    base, top = ((np.array(each) - 0.5 * a) @ axes.T for each in zip(*pairs, strict=True))
+    platform = StewartPlatform(Parameters({
+        'geometry.base_joints': base.ravel(), 'geometry.platform_joints': top.ravel(),
+        'platform.mass': 1e-9, 'platform.inertia': [1e-9, 0.0, 0.0, 1e-9, 0.0, 1e-9]}))
+    center = Pose(np.zeros(3), np.eye(3))
+    expected = k * np.array([2.0, 2.0, 2.0, a * a / 2.0, a * a / 2.0, 2.0 * a * a])
+    np.testing.assert_allclose(
+        Capability(platform).stiffness(center, k), np.diag(expected), rtol=0.0, atol=1e-6)
+
+
+def test_forces_of_the_legs_and_the_weight_change_the_modes_little() -> None:
+    capability, home = Capability(PLATFORM), PLATFORM.home_pose()
+    stiff, soft = capability.modes(home, 1e8), capability.modes(home, 1e5)
+    np.testing.assert_allclose(
+        stiff.frequencies, PLATFORM.natural_modes(home, 1e8).frequencies, rtol=1e-3)
+    assert not np.allclose(soft.frequencies, PLATFORM.natural_modes(home, 1e5).frequencies,
+                           rtol=1e-4)
+    with pytest.raises(MotionError, match='not stable'):
+        capability.modes(home, 10.0)
+
+
+def test_clearance_needs_the_shape_of_the_legs() -> None:
+    with pytest.raises(ParameterError, match=r'legs\.cylinder\.radius, .*: not set'):
+        Capability(PLATFORM).clearance(PLATFORM.home_pose())
+    shaped = StewartPlatform(PLATFORM.parameters.replaced({
+        'legs.cylinder.radius': 0.05, 'legs.cylinder.length': 0.8, 'legs.piston.radius': 0.03}))
+    assert 0.0 < Capability(shaped).clearance(PLATFORM.home_pose()) < 0.3

@@ -35,19 +35,25 @@ from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
 from stewart_dynamics.mechanics.batch import in_parts
+from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.platform_arguments import check_kind, copies, motion_rows
 from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
+from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, NaturalModes
 
 # Names of the codes of ``travel``.
 _ENDS = np.array(['length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max',
                   'singularity', ''])
 # Rounds in which the least tilt between two azimuths is found.
 _ZOOMS = 6
+# Step of a numerical derivative by the pose [m, rad].
+_STEP = 1e-5
 _AROUND: Array = np.linspace(-1.0, 1.0, 33, dtype=np.float64)
 
 
@@ -315,6 +321,49 @@ class Capability:
         directions = _directions(direction)
         return self._multiple(self._at_rest(pose, base), self._per_wrench(pose, directions))
 
+    def clearance(self, pose: Pose | Motion) -> Array | float:
+        """Return the smallest distance between the surfaces of two legs [m]; negative: overlap."""
+        values = LegClearance(self.platform.parameters)(motion_rows(pose)).min(axis=1)
+        return float(values[0]) if pose.shape == () else values.reshape(pose.shape)
+
+    def stiffness(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> Array:
+        """
+        Return the stiffness K (..., 6, 6) at rest, as ``StewartPlatform.stiffness``.
+
+        It includes the forces of the legs, which turn with them: minus the derivative of the
+        wrench of six springs that carry these forces at the lengths of the pose.
+        """
+        legs = lagrange.legs(self.platform.parameters, pose.position, pose.rotation)
+        return self.platform.stiffness(pose, leg_stiffness) + geometric_stiffness(
+            legs, self._at_rest(pose, None))
+
+    def modes(self, pose: Pose | Motion, leg_stiffness: ArrayLike) -> NaturalModes:
+        """
+        Return natural frequencies and shapes at rest, as ``StewartPlatform.natural_modes``.
+
+        Besides ``stiffness``, the change of the weight's wrench holds the platform or tips it
+        over; both together are symmetric.
+
+        Raises
+        ------
+        MotionError
+            The pose is not stable.
+
+        """
+        total = self.stiffness(pose, leg_stiffness) + self._weight_stiffness(pose)
+        return modes_of(
+            self.platform.mass_matrix(pose), 0.5 * (total + np.swapaxes(total, -1, -2)))
+
+    def _weight_stiffness(self, pose: Pose | Motion) -> Array:
+        """Return the derivative (..., 6, 6) of the gravity vector, by central differences."""
+        columns = []
+        for direction in _STEP * np.eye(6):
+            ends = [self.platform.gravity_vector(Pose(
+                pose.position + sign * direction[:3],
+                from_euler(sign * direction[3:]) @ pose.rotation)) for sign in (1, -1)]
+            columns.append((ends[0] - ends[1]) / (2.0 * _STEP))
+        return np.stack(columns, axis=-1)
+
     def force(self, pose: Pose | Motion) -> Array | float:
         """Return the force [N] that the platform at rest can exert in every direction."""
         return self._in_every_direction(pose, slice(0, 3))
@@ -482,6 +531,9 @@ class Capability:
         """Return an extent of 0 where lengths or joint angles are exceeded at any speed."""
         values = {limits.LENGTH_MIN: (lengths := self.platform.inverse_kinematics(motion)),
                   limits.LENGTH_MAX: lengths}
+        if limits.CLEARANCE_MIN in self._limits.bounds:
+            values[limits.CLEARANCE_MIN] = LegClearance(self.platform.parameters)(
+                motion_rows(motion))
         if self._limits.of_joints:
             values.update(zip(limits.OF_JOINTS, self.platform.joint_angles(motion), strict=True))
         for name, each in values.items():

@@ -16,8 +16,9 @@
 Stiffness of the platform on its legs, and its natural modes.
 
 Legs of stiffness k_i hold a small displacement ``dX = [dx; dtheta]`` (base axes) with the wrench
-``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2); the
-contribution of the present leg forces, which rotate with the legs, is neglected. Undamped small
+``K dX``, ``K = J_inv^T diag(k) J_inv`` (Merlet, Parallel Robots, 2nd ed., 2006, 9.2). Forces f of
+the legs turn with them, by ``ds = (1 - s s^T) / L (dx + dtheta x a)``, and so do the arms a,
+by ``dtheta x a``: ``geometric_stiffness`` is minus the derivative of their wrench. Undamped small
 vibrations obey ``M dX'' + K dX = 0``: modes are the solutions of ``K phi = omega^2 M phi``.
 """
 
@@ -29,6 +30,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import MotionError
+from stewart_dynamics.mechanics.dynamics.lagrange import Legs, skew
 
 
 class NaturalModes(NamedTuple):
@@ -63,6 +65,28 @@ def platform_stiffness(inverse_jacobian: Array, leg_stiffness: Array) -> Array:
     return stiffness
 
 
+def geometric_stiffness(legs: Legs, forces: Array) -> Array:
+    """
+    Return the part (..., 6, 6) of K that is due to the forces of the legs.
+
+    It is symmetric if the moment of all forces about the platform's origin is zero.
+
+    Parameters
+    ----------
+    legs : Legs
+        Legs at poses (...).
+    forces : (..., 6)
+        Their forces [N], + pushes.
+
+    """
+    s, arm = skew(legs.directions), skew(legs.arms)
+    across = s @ s / legs.lengths[..., None, None]  # -(1 - s s^T) / L
+    turning = -across @ arm
+    stiffness: Array = np.einsum('...n,...nij->...ij', forces, np.block([
+        [across, turning], [arm @ across, arm @ turning - s @ arm]]))
+    return stiffness
+
+
 def natural_modes(mass: Array, inverse_jacobian: Array, leg_stiffness: Array) -> NaturalModes:
     """
     Return the modes of M (..., 6, 6), J_inv (..., 6, 6) and stiffnesses of the legs (..., 6).
@@ -86,3 +110,21 @@ def natural_modes(mass: Array, inverse_jacobian: Array, leg_stiffness: Array) ->
     except np.linalg.LinAlgError as exc:
         raise MotionError('natural modes: the mass matrix is not positive definite') from exc
     return NaturalModes(omega[..., ::-1] / (2.0 * np.pi), shapes[..., ::-1])
+
+
+def modes_of(mass: Array, stiffness: Array) -> NaturalModes:
+    """
+    Return the modes of M and a symmetric K (..., 6, 6).
+
+    Raises
+    ------
+    MotionError
+        K is not positive definite: the pose is not stable.
+
+    """
+    inverse = np.linalg.inv(np.linalg.cholesky(mass))
+    squares, vectors = np.linalg.eigh(inverse @ stiffness @ np.swapaxes(inverse, -1, -2))
+    if not np.all(squares > 0.0):
+        raise MotionError('natural modes: the stiffness is not positive definite: the pose is not '
+                          'stable')
+    return NaturalModes(np.sqrt(squares) / (2.0 * np.pi), np.swapaxes(inverse, -1, -2) @ vectors)
