@@ -30,7 +30,7 @@ from typing import NamedTuple
 from inverse_dynamics import HERE, markdown, measured_on, write
 import numpy as np
 
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.results import document, IDENTIFIED
 from stewart_dynamics.identification.unknowns import Unknowns
 
@@ -60,7 +60,7 @@ def answer(given: tuple[float, int]) -> Answer:
     case = Case(true_hexapod(seed))
     motion = fourier(seed, size=1e-3 * displacement / AMPLITUDES[0])
     found = identify(simulated(case, seed, motion))
-    result = document(found, Options())
+    result = document(found, IdentificationOptions())
     held = {each['name']: each['interval'][0] < true < each['interval'][1]
             for each, true in zip(result['parameters'], Unknowns(case.true).start, strict=True)
             if each['state'] == IDENTIFIED and each['interval']}

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from stewart_dynamics import Motion
 from stewart_dynamics.identification.design_limits import DesignLimits
-from stewart_dynamics.identification.design_options import DesignOptions
+from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 from running import PLATFORM, ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identification
 from stewart_dynamics.identification.results import document
 from stewart_dynamics.messages.joint_state import JointStateWriter
@@ -57,10 +57,10 @@ def test_the_demo_identifies_the_true_parameters(demo: ModuleType, tmp_path: Pat
     states = states_of(true, motion_at(settings, times), stamps)
     # While it waits for the first command, the simulator repeats its state.
     assert demo.write_bag(tmp_path / 'bag', [states[0]] * 5 + states) == len(states) - 1
-    work = Identification(given, Options())
+    work = Identification(given, IdentificationOptions())
     work.read(tmp_path / 'bag', lambda many: None)
     found = work.result()
-    numbers = demo.values(document(found, Options()), true)
+    numbers = demo.values(document(found, IdentificationOptions()), true)
     work.close()
     by_name = {each.name: each for each in numbers}
     assert len(by_name) == 12

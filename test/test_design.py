@@ -25,7 +25,7 @@ from referees import ROOT
 from stewart_dynamics import ParameterError, Parameters, StewartPlatform
 from stewart_dynamics.identification.design import (
     columns_of, Design, design, predicted_half_widths)
-from stewart_dynamics.identification.design_options import DesignOptions
+from stewart_dynamics.identification.identification_options import DesignOptions
 from stewart_dynamics.identification.identify_command_line import main
 from stewart_dynamics.reference_motion.motion import motion_at
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
@@ -195,7 +195,7 @@ def test_a_motion_may_be_designed_for_the_tilt_as_well(
 
 @pytest.mark.parametrize(('arguments', 'said'), [
     ((*QUICK, '--highest-frequency', 20), '--highest-frequency 20 Hz: must be at most --cutoff'),
-    ((*QUICK[:-1], 'cylinder,piston'), 'no motion within the limits tells all of cylinder, '
+    ((*QUICK[:-1], 'cylinder,piston'), 'no motion within the limits identifies cylinder, '
      'piston: legs.cylinder.second_moment.leg_1 is not identifiable; ask for less'),
     (('--params', 'missing.yaml'), 'missing.yaml: '),
 ])

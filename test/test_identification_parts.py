@@ -28,14 +28,12 @@ from referees import rng, ROOT
 from stewart_dynamics import Parameters, StewartPlatform
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError
-from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
-from stewart_dynamics.identification.guess import pose_near
 from stewart_dynamics.identification.identify_command_line import main
-from stewart_dynamics.identification.kinematics import motions, poses
+from stewart_dynamics.identification.kinematics import motions, pose_near, poses
 from stewart_dynamics.identification.physical import consistent
 from stewart_dynamics.identification.recorded_legs import find_topics, RecordedLegs
-from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.unknowns import regression, Unknowns
 from stewart_dynamics.identification.windows import interpolated, Signal, uniform
 from stewart_dynamics.mechanics.dynamics.pseudo_inertia import is_consistent
 from stewart_dynamics.mechanics.least_squares import identifiability, Information

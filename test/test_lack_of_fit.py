@@ -23,8 +23,8 @@ from recorded import fourier, HOME, MotionAt, recorded
 from referees import rng
 
 from stewart_dynamics import Motion, StewartPlatform
-from stewart_dynamics.identification.guess import pose_near
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import deviations
 from stewart_dynamics.identification.results import document
 from stewart_dynamics.identification.text import result_text
@@ -45,7 +45,7 @@ def test_a_wrong_model_is_noticed_and_its_cause_named(cause: str) -> None:
     found = identify(simulated(case, seed))
     assert found.lack_of_fit is not None
     assert found.lack_of_fit.causes[0].what in right
-    result = document(found, Options())
+    result = document(found, IdentificationOptions())
     assert result['lack_of_fit']['cause'] in right
     assert result_text(result).startswith('LACK OF FIT: the residuals are more than noise: likely')
     if cause in ('saturation', 'two payloads in two bags', 'payload of 2 to 6 kg drops'):
@@ -82,7 +82,7 @@ def test_delays_of_the_efforts_up_to_a_tenth_of_a_second_are_found(
     case = Case(true_hexapod(2))
     found = identify(simulated(case, 2))
     assert (found.likely, found.lack_of_fit) == ((), None)
-    (bag,) = document(found, Options())['bags']
+    (bag,) = document(found, IdentificationOptions())['bags']
     assert bag['delay_s'] == pytest.approx(delay, abs=2e-4)
     off = np.abs(found.fit.values - Unknowns(case.true).start)
     assert np.mean(off < TWO_SIDED * np.sqrt(np.diag(found.errors.covariance))) > 0.8
@@ -115,6 +115,10 @@ def test_hexapods_of_all_sizes_have_similar_results(size: float) -> None:
     assert [(each.likely, each.lack_of_fit) for each in found] == 2 * [((), None)]
     ratio = found[1].parameters['platform.inertia'] / found[0].parameters['platform.inertia']
     np.testing.assert_allclose(ratio, size ** 5, rtol=1e-6)
+    # two digits of the standard error: 14.4 +- 0.1 kg m^2 in a hexapod of 1:1
+    shown = result_text(document(found[1], IdentificationOptions())).partition('inertia.xx')[2]
+    assert shown.split()[1].startswith('1.44')
+    assert shown.split()[1].endswith({1e-3: 'e-14', 1e3: 'e+16'}[size])
     wrong = [each._replace(positions=each.positions - 0.02) for each in bags]
     (mistake,) = identify(wrong, size=size).likely
     assert mistake.what == 'zero_length'

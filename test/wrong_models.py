@@ -27,7 +27,7 @@ from recorded import fourier, MotionAt, Noise, Recorded, recorded
 from referees import rng, ROOT, rotation_about
 
 from stewart_dynamics import Parameters, StewartPlatform
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.unknowns import DEFAULT
 from stewart_dynamics.identification.windows import Window
@@ -197,7 +197,7 @@ def identify(bags: Sequence[Recorded], given: Parameters = GIVEN,
              kinds: Sequence[str] = DEFAULT, size: float = 1.0) -> Identified:
     """Return the identification from the recordings of one hexapod, or of one of another size."""
     slower = np.sqrt(size)
-    options = Options(kinds=tuple(kinds), hold_out=0.0, cutoff=10.0 / slower)
+    options = IdentificationOptions(kinds=tuple(kinds), hold_out=0.0, cutoff=10.0 / slower)
     with closing(Identification(sized(given, size), options)) as work:
         for n, each in enumerate(bags):
             work.add(Path(f'bag {n}'), [Window(

@@ -30,8 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Integers
-from stewart_dynamics.identification.extraction import SLIP
-from stewart_dynamics.identification.extracts import Block
+from stewart_dynamics.identification.extraction import Block, SLIP
 from stewart_dynamics.identification.fit import Fit
 from stewart_dynamics.identification.kinematics import motions
 from stewart_dynamics.identification.tilt import Tilt

@@ -35,10 +35,9 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.design_limits import DesignLimits
-from stewart_dynamics.identification.design_options import DesignOptions
-from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.identification_options import DesignOptions
+from stewart_dynamics.identification.unknowns import regression, Unknowns
 from stewart_dynamics.mechanics.frames.motion import Motion
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -49,7 +48,7 @@ from stewart_dynamics.reference_motion.parameters import ReferenceMotionParamete
 # Samples per period of the highest harmonic: in the search, and in the final check.
 _SAMPLES, _FINE_SAMPLES = 20, 100
 # Standard error of an unidentifiable parameter, relative to its scale.
-_NOT_TOLD = 100.0
+_NOT_IDENTIFIABLE = 100.0
 # Number of iterations that scale a motion to its limits: in the search, and at the end.
 _SCALINGS, _LAST_SCALINGS = 2, 30
 _CLOSE = 1e-3
@@ -112,9 +111,9 @@ def design(parameters: Parameters, options: DesignOptions,
         search.platform, search.unknowns, motion, options.duration, options)
     unknown = [name for name, half, scale in zip(
         search.unknowns.names, half_widths, search.unknowns.scales, strict=True)
-        if not half < _NOT_TOLD * scale]
+        if not half < _NOT_IDENTIFIABLE * scale]
     if unknown:
-        raise StewartError(f'no motion within the limits tells all of {", ".join(options.kinds)}: '
+        raise StewartError(f'no motion within the limits identifies {", ".join(options.kinds)}: '
                            f'{unknown[0]} is not identifiable; ask for less with --identify')
     return Design(trajectory, search.unknowns, half_widths, search.limits.use(motion))
 
@@ -138,7 +137,7 @@ def predicted_half_widths(platform: StewartPlatform, unknowns: Unknowns, motion:
         seconds * options.rate / len(columns) / options.noise ** 2)
     scaled = unknowns.scales[:, None] * information * unknowns.scales
     values, vectors = np.linalg.eigh(scaled)
-    least = max(_NOT_TOLD ** -2, 1e-13 * float(values[-1]))
+    least = max(_NOT_IDENTIFIABLE ** -2, 1e-13 * float(values[-1]))
     variances = (vectors ** 2) @ (1.0 / np.maximum(values, least))
     errors: Array = np.sqrt(variances)
     return TWO_SIDED * unknowns.scales * errors
@@ -189,7 +188,7 @@ class _Search:
         information = columns.swapaxes(1, 2) @ columns * (
             self._options.duration * self._options.rate / rows.shape[1]
             / self._options.noise ** 2)
-        information += np.eye(information.shape[-1]) / _NOT_TOLD ** 2
+        information += np.eye(information.shape[-1]) / _NOT_IDENTIFIABLE ** 2
         variances = np.trace(np.linalg.inv(information), axis1=1, axis2=2)
         # Information grows with the square of the amplitude; excess amplitude costs as much.
         cost: Array = np.log(variances) + 2.0 * np.abs(np.log(np.maximum(excess, 0.2)))

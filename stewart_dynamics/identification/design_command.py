@@ -24,8 +24,8 @@ import time
 from typing import TYPE_CHECKING
 
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.identification.design_options import DesignOptions
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_options import (
+    DesignOptions, IdentificationOptions)
 from stewart_dynamics.parameters.table import Parameters
 
 if TYPE_CHECKING:
@@ -39,9 +39,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     default = DesignOptions()
     group = parser.add_argument_group('design of a motion (--design)')
     group.add_argument('--design', action='store_true',
-                       help='identify nothing, but design a motion that will tell what '
-                            f'--identify asks for: DIR/{TRAJECTORY} (default DIR: designed), for '
-                            'stewart_trajectory, within the limits of the parameter file')
+                       help='identify nothing, but design a motion from which the parameters of '
+                            f'--identify are identifiable: DIR/{TRAJECTORY} (default DIR: '
+                            'designed), for stewart_trajectory, within the limits of the '
+                            'parameter file')
     group.add_argument('--duration', type=_between(2.0, 3600.0), default=default.duration,
                        metavar='S', help='of the motion (default: %(default)g)')
     group.add_argument('--highest-frequency', type=_between(0.01, 100.0),
@@ -80,7 +81,7 @@ def run(given: argparse.Namespace, parameters: Parameters) -> None:
         raise StewartError(f'--highest-frequency {given.highest_frequency:g} Hz: must be at most '
                            f'--cutoff, {given.cutoff:g} Hz: nothing above passes the filter')
     folder = given.output or Path('designed')
-    options = Options(force=given.force)
+    options = IdentificationOptions(force=given.force)
     check_free(folder, options, TRAJECTORY)
     remove_abandoned([folder])
     asked = DesignOptions(

@@ -22,20 +22,23 @@ decimates regressor and efforts: f = Y theta holds for the filtered signals as w
 inertia matrix", IROS 2013, doi:10.1109/IROS.2013.6697198, section V.)
 
 Efforts are stored with their first derivatives, so that a delay can be applied to them later.
+Extracts are kept in a temporary file, so that memory does not grow with the bags.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+import tempfile
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.identification.columns import regression
 from stewart_dynamics.identification.filters import convolved, decimated, LowPass, white_deviation
 from stewart_dynamics.identification.kinematics import motions, poses
-from stewart_dynamics.identification.unknowns import Unknowns
+from stewart_dynamics.identification.unknowns import regression, Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.dynamics.friction import friction
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -93,6 +96,54 @@ class Extract(NamedTuple):
     def columns(self) -> Array:
         """Return regressor, known force, effort and its derivatives, (N, 6, n + 1 + ORDERS)."""
         return np.concatenate([self.regressor, self.known[..., None], self.efforts], axis=-1)
+
+
+class Block(NamedTuple):
+    """Data of one window of N samples for the fit."""
+
+    number: int
+    bag: int
+    times: Array
+    """(N,) since the start of the bag [s]"""
+    columns: Array
+    """(N, 6, n + 1 + ORDERS): regressor, known force, effort and its derivatives"""
+    sound: Flags
+    """(N, 6)"""
+    legs: Array
+    slip: Array
+    poses: Array
+    """Legs, slip and poses as in ``Extract``."""
+
+
+class Extracts:
+    """Extracts in the order of addition; can be iterated over repeatedly."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()
+        self._bags: list[int] = []
+        self.samples = 0
+
+    def add(self, bag: int, begin: float, extract: Extract) -> None:
+        """Add the extract of a window of a bag that begins at a time [s]."""
+        for array in (begin + extract.times, extract.columns, extract.sound, extract.legs,
+                      extract.slip, extract.poses):
+            np.save(self._file, array)
+        self._bags.append(bag)
+        self.samples += len(extract.times)
+
+    def __iter__(self) -> Iterator[Block]:
+        """Read the extracts from the file."""
+        self._file.seek(0)
+        for number, bag in enumerate(self._bags):
+            yield Block(number, bag, *(np.load(self._file) for _ in range(6)))
+
+    def __len__(self) -> int:
+        """Return the number of windows."""
+        return len(self._bags)
+
+    def close(self) -> None:
+        """Remove the file."""
+        self._file.close()
 
 
 class Extraction:
@@ -198,7 +249,9 @@ class Extraction:
 
     def _slip(self, rates: Array) -> Array:
         assert self.speeds is not None
-        sign = np.clip(rates / self.platform.parameters['actuator.coulomb_velocity'], -1.0, 1.0)
+        sign = np.empty(rates.shape)
+        friction(np.ascontiguousarray(rates), np.zeros(6), np.ones(6),
+                 self.platform.parameters['actuator.coulomb_velocity'], sign)
         return np.stack([sign, *(sign * np.exp(-(rates / speed) ** 2) for speed in self.speeds)],
                         axis=-1)
 

@@ -42,7 +42,7 @@ _LONGEST_DELAY = 0.2
 # factor.
 _TIMES_NOISE = 10.0
 # Unknowns whose identifiable share is smaller are reported as not identifiable.
-LEAST_TOLD = 0.1
+LEAST_SHARE = 0.1
 _HELD = 1e-6
 # Lower bound of the residuals' deviation, reached with exact efforts, relative to the efforts.
 _SMALLEST_DEVIATION = 1e-8
@@ -106,13 +106,13 @@ def fit(sums: Sums, unknowns: Unknowns, noise: Array | None = None, prior: float
 
     """
     found = _fit(sums, unknowns, unknowns.scales, noise, prior, cutoffs, largest_error)
-    not_told = found.identifiability.told < LEAST_TOLD
-    if not not_told.any():
+    unknown = found.identifiability.told < LEAST_SHARE
+    if not unknown.any():
         return found
     # Weakly identifiable parameters keep the value from the file.
-    found = _fit(sums, unknowns, np.where(not_told, _HELD, 1.0) * unknowns.scales, noise, prior,
+    found = _fit(sums, unknowns, np.where(unknown, _HELD, 1.0) * unknowns.scales, noise, prior,
                  cutoffs, largest_error)
-    return found._replace(values=np.where(not_told, unknowns.start, found.values))
+    return found._replace(values=np.where(unknown, unknowns.start, found.values))
 
 
 def _fit(sums: Sums, unknowns: Unknowns, scales: Array, noise: Array | None, prior: float | None,
@@ -224,9 +224,9 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
         gram = np.tensordot(1.0 / variances[bag], sums.grams[bag], axes=1)
         by_delay = delayed_by(theta, delay)
         # Compare with the derivative of white noise below the cut-off.
-        told = cutoffs is not None and by_delay @ gram @ by_delay > (
+        observable = cutoffs is not None and by_delay @ gram @ by_delay > (
             _TIMES_NOISE * sums.counts[bag].sum() * (2.0 * np.pi * cutoffs[bag]) ** 2 / 3.0)
-        e = directions(unknowns, values, delay, told)
+        e = directions(unknowns, values, delay, observable)
         normal, vector = e.T @ gram @ e, e.T @ gram @ c
         along = without_delay(normal)
         alone = float(vector[-1] / normal[-1, -1]) if normal[-1, -1] > 0.0 else 0.0
@@ -235,7 +235,7 @@ def _information(sums: Sums, unknowns: Unknowns, values: Array, delays: Array, v
         total = total.plus(Information(
             matrix, of_values + matrix @ values, float(c @ gram @ c),
             int(sums.counts[bag].sum())))
-        steps.append((alone, along, float(normal[-1, -1] ** -0.5) if told else 0.0))
+        steps.append((alone, along, float(normal[-1, -1] ** -0.5) if observable else 0.0))
     if noise is None:
         return total, steps, None
     mean = np.average(1.0 / variances, axis=0, weights=np.maximum(sums.counts.sum(axis=1), 1))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Options of an identification."""
+"""Options of an identification and of the design of a motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CUTOFF = 10.0
 HOLD_OUT = 0.2
 
 
-class Options(NamedTuple):
+class IdentificationOptions(NamedTuple):
     """Options of an identification."""
 
     node: str = NODE
@@ -53,3 +53,25 @@ class Options(NamedTuple):
     force: bool = False
     """Replace existing results."""
     run: str = ''
+
+
+class DesignOptions(NamedTuple):
+    """Options of a design."""
+
+    kinds: tuple[str, ...] = DEFAULT
+    """Parameters to be identified, from ``unknowns.KINDS``."""
+    duration: float = 60.0
+    """Duration of the motion [s]."""
+    frequency: float = 2.0
+    """Frequency of the highest harmonic [Hz]."""
+    harmonics: int = 10
+    amplitude: float | None = None
+    """Largest displacement [m]; rotations: divided by the characteristic length."""
+    center: tuple[float, ...] | None = None
+    """Center of the motion, X Y Z alpha beta gamma [m, rad]; None: home."""
+    noise: float = 5.0
+    """Standard deviation of the efforts [N], for the predicted intervals."""
+    rate: float = 500.0
+    """Rate of setpoints and measured efforts [Hz]."""
+    generations: int = 400
+    seed: int = 0

@@ -29,7 +29,7 @@ import numpy as np
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.identification.identify import Identification, Identified
-from stewart_dynamics.identification.results import IDENTIFIED, IN_COMBINATION, NOT_TOLD
+from stewart_dynamics.identification.results import IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.text import decimals, grouped
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
@@ -43,7 +43,7 @@ _FOLDER = Path(__file__).with_name('templates')
 _MOST = 12_000
 
 
-class Report:
+class IdentificationReport:
     """
     The page of an identification.
 
@@ -91,12 +91,12 @@ class Report:
             'digits': decimals(each['standard_error']) if each['standard_error'] else 4,
         } for each in result['parameters']]
         of_state = {state: [each for each in parameters if each['state'] == state]
-                    for state in (IDENTIFIED, IN_COMBINATION, NOT_TOLD)}
+                    for state in (IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE)}
         text = page(
             _FOLDER, 'identification', [script], document=True, r=result, parameters=parameters,
             identified=of_state[IDENTIFIED],
             combined=grouped([each['name'] for each in of_state[IN_COMBINATION]]),
-            not_told=grouped([each['name'] for each in of_state[NOT_TOLD]]),
+            not_told=grouped([each['name'] for each in of_state[NOT_IDENTIFIABLE]]),
             name=Path(result['bags'][0]['bag']).name or result['bags'][0]['bag'],
             combinations=[each | {'half': TWO_SIDED * each['standard_error'],
                                   'digits': decimals(each['standard_error'])}

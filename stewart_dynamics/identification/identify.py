@@ -32,13 +32,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.bags.recording import Recording
 from stewart_dynamics.errors import BagError, ParameterError, PoseError, SingularityError
-from stewart_dynamics.identification.extraction import Extract, Extraction
-from stewart_dynamics.identification.extracts import Block, Extracts
+from stewart_dynamics.identification.extraction import Block, Extract, Extraction, Extracts
 from stewart_dynamics.identification.filters import LowPass
 from stewart_dynamics.identification.fit import Fit, fit, shift_of_noise
-from stewart_dynamics.identification.guess import pose_near
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.intervals import Errors, errors_of
+from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import lack_of_fit, LackOfFit
 from stewart_dynamics.identification.likely_mistakes import (
     LikelyMistake, LONGEST_LAG, most_motion, of_delay, of_efforts, of_fit, of_no_pose)
@@ -137,12 +136,12 @@ class Identification:
     ----------
     parameters : Parameters
         Known or estimated parameters of the hexapod.
-    options : Options
-        Options of the identification.
+    options : IdentificationOptions
+        IdentificationOptions of the identification.
 
     """
 
-    def __init__(self, parameters: Parameters, options: Options) -> None:
+    def __init__(self, parameters: Parameters, options: IdentificationOptions) -> None:
         if parameters['base.source'] != 'fixed':
             raise ParameterError(
                 f'base.source: {parameters["base.source"]}: hexapods are identified on a base at '

@@ -21,12 +21,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from stewart_dynamics.identification import design_command
-from stewart_dynamics.identification.identification_options import CUTOFF, HOLD_OUT, Options
+from stewart_dynamics.identification.identification_options import (
+    CUTOFF, HOLD_OUT, IdentificationOptions)
 from stewart_dynamics.identification.unknowns import DEFAULT, KINDS
 from stewart_dynamics.program import DONE, interrupt_on_signals, node_name, PARTLY_READ, Program
 from stewart_dynamics.replay.replay_options import NODE
 
-NOT_ALL_TOLD = 1
+NOT_ALL_IDENTIFIED = 1
 _PROGRAM = Program('stewart_identify')
 
 
@@ -47,7 +48,7 @@ def _arguments() -> argparse.ArgumentParser:
                     'measured legs of recorded motions.',
         epilog='DIR/ gets identified.yaml (the whole parameter file, for the node), '
                'identification.json and report.html.\n\nexit codes: 0 done; 1 with --strict, '
-               'when the motion does not tell everything that was asked for;\n2 bad arguments, '
+               'when a requested parameter is not identifiable;\n2 bad arguments, '
                'parameters or bags, or a likely mistake; 3 part of a bag could not be read, the '
                'rest is done; 130 interrupted')
     parser.add_argument('bags', nargs='*', type=Path, metavar='BAG',
@@ -60,8 +61,7 @@ def _arguments() -> argparse.ArgumentParser:
                         help='folder of the results (default: identified)')
     parser.add_argument('--force', action='store_true', help='replace results that exist')
     parser.add_argument('--strict', action='store_true',
-                        help='exit code 1 when the motion does not tell everything that was '
-                             'asked for')
+                        help='exit code 1 when a requested parameter is not identifiable')
     parser.add_argument('--no-report', action='store_true', help='write no report.html')
     topics = parser.add_argument_group('topics')
     topics.add_argument('--node', default=NODE, metavar='NAME', type=node_name,
@@ -103,7 +103,7 @@ def _run(given: argparse.Namespace) -> int:
     from stewart_dynamics.parameters.table import Parameters
 
     interrupt_on_signals()
-    options = Options(
+    options = IdentificationOptions(
         given.node, given.measured, given.efforts, given.identify, given.motor_torque,
         given.cutoff, given.prior, given.hold_out, not given.no_delay, given.accept_mistakes,
         not given.no_report, given.force)
@@ -129,7 +129,7 @@ def _run(given: argparse.Namespace) -> int:
         return PARTLY_READ
     everything = all(each['state'] == 'identified' and not each['at_bound']
                      for each in result['parameters'])
-    return NOT_ALL_TOLD if given.strict and not (
+    return NOT_ALL_IDENTIFIED if given.strict and not (
         everything and result['lack_of_fit'] is None) else DONE
 
 

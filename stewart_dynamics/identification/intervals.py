@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
-from stewart_dynamics.identification.extracts import Extracts
+from stewart_dynamics.identification.extraction import Extracts
 from stewart_dynamics.identification.fit import directions, Fit, strength_of, without_delay
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns

@@ -12,19 +12,50 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Motion of the platform over a whole window, from leg lengths and their derivatives."""
+"""Poses and motion of the platform over a whole window, from leg lengths and their derivatives."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
 from stewart_dynamics.mechanics.rows import ACCELERATION, MOTION, POSE, ROTATION, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
 # Stride of the poses that are computed in sequence; they are the guesses of the others.
 _STRIDE = 32
+# Rotations about z that are tried, platform axes parallel to base axes first [rad].
+_TURNS = (0.0, 0.3, -0.3, 0.6, -0.6)
+
+
+def pose_near(platform: StewartPlatform, lengths: Array) -> Pose:
+    """
+    Return the pose of lengths (6,), starting from home and level poses on both sides.
+
+    Raises
+    ------
+    PoseError, SingularityError
+        Forward kinematics converges from no initial guess.
+
+    """
+    p = platform.parameters
+    positions, rotations = homes(p)  # both sides of the base, the more likely one first
+    guesses = [Pose(*each) for each in zip(positions, rotations, strict=True)]
+    across = p['geometry.platform_joints'] - p['geometry.base_joints']
+    level = float(np.mean(lengths ** 2 - np.sum(across[:, :2] ** 2, axis=1)))
+    height = np.sqrt(max(level, (0.1 * float(lengths.mean())) ** 2))
+    side = 1.0 if positions[0, 2] >= 0.0 else -1.0
+    guesses += [Pose.from_euler([0.0, 0.0, up * height - across[:, 2].mean()], [0.0, 0.0, turn])
+                for up in (side, -side) for turn in _TURNS]
+    for guess in guesses[:-1]:
+        try:
+            return platform.forward_kinematics(lengths, guess)
+        except (PoseError, SingularityError):
+            continue
+    return platform.forward_kinematics(lengths, guesses[-1])
 
 
 def poses(platform: StewartPlatform, lengths: Array, guess: Pose) -> Pose:

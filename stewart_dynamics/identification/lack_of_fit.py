@@ -36,8 +36,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array, Flags, Integers
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.causes import Cause, Causes, UNKNOWN
-from stewart_dynamics.identification.extraction import SAMPLES
-from stewart_dynamics.identification.extracts import Block, Extracts
+from stewart_dynamics.identification.extraction import Block, Extracts, SAMPLES
 from stewart_dynamics.identification.fit import directions, Fit
 from stewart_dynamics.identification.sums import residual_of
 from stewart_dynamics.identification.unknowns import Unknowns

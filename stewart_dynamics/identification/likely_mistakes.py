@@ -32,7 +32,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.identification.extraction import Extract, Extraction
 from stewart_dynamics.identification.fit import Fit
-from stewart_dynamics.identification.guess import pose_near
+from stewart_dynamics.identification.kinematics import pose_near
 from stewart_dynamics.identification.lack_of_fit import LackOfFit
 from stewart_dynamics.identification.sums import residual_of, Sums
 from stewart_dynamics.identification.unknowns import Unknowns

@@ -26,11 +26,11 @@ import numpy as np
 from stewart_dynamics.bags import blocks, mcap_scan
 from stewart_dynamics.bags.find import bytes_of
 from stewart_dynamics.errors import StewartError
-from stewart_dynamics.identification.identification_options import Options
-from stewart_dynamics.identification.identification_report import Report
+from stewart_dynamics.identification.identification_options import IdentificationOptions
+from stewart_dynamics.identification.identification_report import IdentificationReport
 from stewart_dynamics.identification.identify import Identification, Identified
 from stewart_dynamics.identification.results import comments, document
-from stewart_dynamics.mechanics.dynamics import inverse_dynamics, regressor
+from stewart_dynamics.mechanics.dynamics import friction, inverse_dynamics, regressor
 from stewart_dynamics.mechanics.kinematics import forward_kinematics
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reporting.results_folder import (
@@ -42,10 +42,10 @@ PARAMETERS, RESULT, REPORT = 'identified.yaml', IDENTIFICATION, 'report.html'
 
 # Functions that every identification needs as machine code.
 FUNCTIONS = (inverse_dynamics.solve, forward_kinematics.poses, regressor.regressors,
-             *blocks.FUNCTIONS, mcap_scan.scan)
+             friction.friction, *blocks.FUNCTIONS, mcap_scan.scan)
 
 
-def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Options,
+def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: IdentificationOptions,
         warn: Callable[[str], None]) -> dict[str, Any]:
     """
     Identify from bags into a folder; return the content of identification.json.
@@ -58,8 +58,8 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Opt
         Known or estimated parameters of the hexapod.
     folder : Path
         Results folder, created when complete; must not exist, unless ``options.force`` is set.
-    options : Options
-        Options of the identification.
+    options : IdentificationOptions
+        IdentificationOptions of the identification.
     warn : callable
         Called with likely mistakes that were accepted.
 
@@ -88,7 +88,7 @@ def run(bags: Sequence[Path], parameters: Parameters, folder: Path, options: Opt
                 partial / PARAMETERS, comments(result, found.unknowns))
             write_json(partial / RESULT, result)
             if options.report:
-                Report(work, found).write(partial / REPORT, result)
+                IdentificationReport(work, found).write(partial / REPORT, result)
     return result
 
 

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.identification.fit import LEAST_TOLD
-from stewart_dynamics.identification.identification_options import Options
+from stewart_dynamics.identification.fit import LEAST_SHARE
+from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identified
 from stewart_dynamics.identification.lack_of_fit import Found
 from stewart_dynamics.identification.unknowns import Unknowns
@@ -35,10 +35,10 @@ from stewart_dynamics.replay.fingerprint import plain_parameters, software
 # Version of identification.json; increased when the meaning of a key changes.
 VERSION = 1
 
-IDENTIFIED, IN_COMBINATION, NOT_TOLD = 'identified', 'in_combination', 'not_told'
+IDENTIFIED, IN_COMBINATION, NOT_IDENTIFIABLE = 'identified', 'in_combination', 'not_told'
 
 
-def document(found: Identified, options: Options) -> dict[str, Any]:
+def document(found: Identified, options: IdentificationOptions) -> dict[str, Any]:
     """Return the content of identification.json."""
     what = found.fit.identifiability
     states = _states(found)
@@ -47,7 +47,7 @@ def document(found: Identified, options: Options) -> dict[str, Any]:
     sure = lack is None or not lack.unexplained
     parameters = [{
         'name': name, 'unit': unit, 'file': float(start), 'value': float(value),
-        'state': state, 'standard_error': _plain(error) if state != NOT_TOLD else None,
+        'state': state, 'standard_error': _plain(error) if state != NOT_IDENTIFIABLE else None,
         'interval': ([float(value - TWO_SIDED * error), float(value + TWO_SIDED * error)]
                      if state == IDENTIFIED and sure else None),
         'unknown_share': float(share), 'at_bound': name in found.fit.at_bound,
@@ -102,7 +102,7 @@ def _cause(each: Found) -> dict[str, Any]:
 
 def _states(found: Identified) -> list[str]:
     what = found.fit.identifiability
-    return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_TOLD else NOT_TOLD
+    return [IDENTIFIED if known else IN_COMBINATION if part >= LEAST_SHARE else NOT_IDENTIFIABLE
             for known, part in zip(what.identifiable, what.told, strict=True)]
 
 
@@ -170,9 +170,9 @@ def comments(result: dict[str, Any], unknowns: Unknowns) -> dict[str, str]:
             if name == 'gravity':  # the identified angle is not a value of the file
                 text = f'turned about {parts[1][-1]} by {each["value"]:.5f} {text} rad'
         else:
-            text = 'kept' if each['state'] == NOT_TOLD else 'partly told'
+            text = 'kept' if each['state'] == NOT_IDENTIFIABLE else 'only in a combination'
         texts.setdefault(name, []).append(text)
-    return {name: 'kept: the motion does not tell it' if set(each) == {'kept'} else
+    return {name: 'kept: not identifiable from the motion' if set(each) == {'kept'} else
             f'identified {result["date"][:10]}, 95 %: '
             + ', '.join(each if len(set(each)) > 1 else each[:1])
             for name, each in texts.items()}

@@ -29,8 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags, Integers
-from stewart_dynamics.identification.extraction import ORDERS
-from stewart_dynamics.identification.extracts import Block, Extracts
+from stewart_dynamics.identification.extraction import Block, Extracts, ORDERS
 
 
 class Sums(NamedTuple):

@@ -17,12 +17,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import math
 import textwrap
 from typing import Any
 
-from stewart_dynamics.identification.results import IDENTIFIED, NOT_TOLD
+from stewart_dynamics.identification.results import IDENTIFIED, NOT_IDENTIFIABLE
 from stewart_dynamics.mechanics.least_squares import TWO_SIDED
 from stewart_dynamics.replay.statements import plural
+
+# Numbers with more decimals have an exponent.
+_MOST_DECIMALS = 9
 
 
 def result_text(result: Mapping[str, Any]) -> str:
@@ -37,7 +41,8 @@ def result_text(result: Mapping[str, Any]) -> str:
     """
     lack = result['lack_of_fit']
     notice = textwrap.wrap(f'LACK OF FIT: {lack["text"]}', 100) if lack else []
-    lines = [*notice, *_headline(result), '', *_table(result['parameters']), *_not_told(result)]
+    lines = [*notice, *_headline(result), '', *_table(result['parameters']),
+             *_not_identifiable(result)]
     lines += _bags(result)
     return '\n'.join(lines)
 
@@ -69,14 +74,13 @@ def _table(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
              '  unit']
     for each in parameters:
         if each['state'] == IDENTIFIED:
-            digits = decimals(each['standard_error'])
-            shown = f'{each["value"]:>11.{digits}f}', 'none: lack of fit'
+            error = each['standard_error']
+            shown = f'{rounded(each["value"], error):>11}', 'none: lack of fit'
             if each['interval']:
-                low, high = each['interval']
-                shown = shown[0], f'{low:.{digits}f} .. {high:.{digits}f}'
+                shown = shown[0], ' .. '.join(rounded(end, error) for end in each['interval'])
             remark = '  at its bound' if each['at_bound'] else ''
         else:
-            shown = f'{"-":>11}', ('kept: not told' if each['state'] == NOT_TOLD
+            shown = f'{"-":>11}', ('kept: not identifiable' if each['state'] == NOT_IDENTIFIABLE
                                    else 'only in a combination')
             remark = ''
         lines.append(f'{each["name"]:<{name_width}} {each["file"]:>10.5g} {shown[0]} '
@@ -84,27 +88,36 @@ def _table(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
     return lines
 
 
+def rounded(value: float, error: float) -> str:
+    """Return a number as text with two digits of its standard error."""
+    digits = decimals(error)
+    if value == 0.0 or error == 0.0 or (digits < _MOST_DECIMALS and abs(value) < 1e9):
+        return f'{value:.{digits}f}'
+    places = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    return f'{value:.{max(0, places)}e}'
+
+
 def decimals(error: float) -> int:
     """Return the number of decimals that show two digits of a standard error."""
     digits = 0
-    while digits < 9 and error * 10 ** digits < 1.95:
+    while digits < _MOST_DECIMALS and error * 10 ** digits < 1.95:
         digits += 1
     return digits
 
 
-def _not_told(result: Mapping[str, Any]) -> list[str]:
-    not_told = [each['name'] for each in result['parameters'] if each['state'] == NOT_TOLD]
+def _not_identifiable(result: Mapping[str, Any]) -> list[str]:
+    unknown = [each['name'] for each in result['parameters'] if each['state'] == NOT_IDENTIFIABLE]
     lines = []
-    if not_told:
-        lines += ['', "the motion does not tell (the file's values are kept):",
-                  *(f'  {name}' for name in grouped(not_told))]
+    if unknown:
+        lines += ['', "not identifiable from the motion (the file's values are kept):",
+                  *(f'  {name}' for name in grouped(unknown))]
     if result['combinations']:
-        lines += ['', 'of these it tells only combinations:']
+        lines += ['', 'identifiable only in combinations:']
         for each in result['combinations']:
             size = TWO_SIDED * each['standard_error']
-            digits = decimals(each['standard_error'])
-            lines.append(f'  {each["words"]} = {each["value"]:.{digits}f} +- {size:.{digits}f} '
-                         f'{each["unit"]}')
+            value, half = (rounded(number, each['standard_error'])
+                           for number in (each['value'], size))
+            lines.append(f'  {each["words"]} = {value} +- {half} {each["unit"]}')
     return lines
 
 

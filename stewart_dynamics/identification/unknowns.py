@@ -35,6 +35,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     about_origin, COULOMB_FRICTION, CYLINDER_FIRST, CYLINDER_MASS, CYLINDER_SECOND, FIRST_MOMENT,
     LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
+from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 
 # Platform parameters as defined in the parameter file.
@@ -239,6 +240,32 @@ class Unknowns:
         whole = self._of_file.copy()
         whole[self._platform] = values[:self.many_of_platform]
         return whole
+
+
+def regression(platform: StewartPlatform, unknowns: Unknowns, rows: Array) -> tuple[Array, Array]:
+    """
+    Return the regressor (N, 6, n) of ``unknowns.theta`` and the known forces (N, 6) [N].
+
+    Parameters
+    ----------
+    platform : StewartPlatform
+        Hexapod with the parameters of the file.
+    unknowns : Unknowns
+        Parameters to be identified.
+    rows : (N, MOTION)
+        Rows of motion.
+
+    """
+    matrix, fixed = platform.regressors(rows), unknowns.fixed
+    regressor: Array = matrix[..., unknowns.linear]
+    known: Array = matrix @ fixed
+    if unknowns.tilt is not None:
+        parts = [regressor]
+        for axis in np.eye(3):
+            matrix = platform.regressors_at_rest(rows, axis[None])
+            parts += [matrix[..., unknowns.weighing], (matrix @ fixed)[..., None]]
+        regressor = np.concatenate(parts, axis=-1)
+    return regressor, known
 
 
 def _alike(value: Any, other: Any) -> bool:
