@@ -28,6 +28,7 @@ import argparse
 from collections.abc import Callable
 import math
 from pathlib import Path
+import signal
 import sys
 import time
 
@@ -148,7 +149,11 @@ def main() -> None:
     try:
         stream = Stream(StewartPlatform.from_yaml(options.params))
         stream.begin(options.timeout)
-        rclpy.spin(stream)
+        signals: list[int] = []
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, lambda number, frame: signals.append(number))
+        while not signals:
+            rclpy.spin_once(stream, timeout_sec=0.1)
     except KeyboardInterrupt:
         pass
     except StewartError as exc:  # parameters, measured legs or approach

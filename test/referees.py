@@ -268,54 +268,6 @@ def energies(p: Parameters, motion: Motion) -> tuple[Array, Array]:
     return kinetic, potential
 
 
-def in_world(base: Motion, motion: Motion) -> Motion:
-    """Return the motion of the platform in the world (...), without accelerations."""
-    r = base.rotation
-
-    def turned(vector: Array) -> Array:
-        result: Array = np.einsum('...ij,...j->...i', r, vector)
-        return result
-
-    arm = turned(motion.position)
-    return Motion(
-        base.position + arm, r @ motion.rotation,
-        base.linear_velocity + np.cross(base.angular_velocity, arm)
-        + turned(motion.linear_velocity),
-        base.angular_velocity + turned(motion.angular_velocity))
-
-
-def energy_in_world(p: Parameters, base: Motion, motion: Motion, gravity: Array) -> Array:
-    """
-    Return kinetic and potential energy of all moving parts in the world, a batch (N,) [J].
-
-    The base's motion and gravity are those in the world. The platform as ``energies`` has it,
-    without its legs; each leg from the velocities of its two joints in the world.
-    """
-    platform = in_world(base, motion)
-    total: Array = sum(_of_platform(p, platform, gravity))
-    r, r_platform = base.rotation, platform.rotation
-    for i in range(6):
-        lower_arm = r @ p['geometry.base_joints'][i]
-        upper_arm = r_platform @ p['geometry.platform_joints'][i]
-        lower, upper = base.position + lower_arm, platform.position + upper_arm
-        lower_velocity = base.linear_velocity + np.cross(base.angular_velocity, lower_arm)
-        upper_velocity = platform.linear_velocity + np.cross(platform.angular_velocity, upper_arm)
-        leg, leg_velocity = upper - lower, upper_velocity - lower_velocity
-        length = np.linalg.norm(leg, axis=-1, keepdims=True)
-        s = leg / length
-        rate = np.sum(s * leg_velocity, axis=-1, keepdims=True)
-        s_rate = (leg_velocity - s * rate) / length
-        s1, s2 = p['legs.cylinder.center_of_mass'][i], p['legs.piston.center_of_mass'][i]
-        for mass, center, velocity in (
-                (p['legs.cylinder.mass'][i], lower + s1 * s, lower_velocity + s1 * s_rate),
-                (p['legs.piston.mass'][i], upper - s2 * s, upper_velocity - s2 * s_rate)):
-            total = total + mass * (0.5 * np.sum(velocity ** 2, axis=-1) - center @ gravity)
-        inertia = p['legs.cylinder.inertia'][i] + p['legs.piston.inertia'][i]
-        total = total + 0.5 * (inertia * np.sum(s_rate ** 2, axis=-1)
-                               + p['actuator.reflected_mass'][i] * rate[..., 0] ** 2)
-    return total
-
-
 def assert_order(order: float, ends: Sequence[Array]) -> None:
     """Check the order of convergence of results of steps that are halved each time."""
     errors = [float(np.linalg.norm(one - finer))

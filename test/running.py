@@ -171,21 +171,7 @@ def assert_only_log_lines(text: str) -> None:
 
 
 class Program:
-    """
-    One of the executables in a process of its own.
-
-    Parameters
-    ----------
-    command : sequence of str
-        Command line, ROS arguments included.
-    domain : int
-        Its ROS domain.
-    folder : Path
-        Gets its output on stdout and stderr, and its log files.
-    environment : mapping, optional
-        Variables added to the environment of this process.
-
-    """
+    """One of the executables in a process of its own; a folder gets its output and logs."""
 
     def __init__(self, command: Sequence[str | Path], domain: int, folder: Path,
                  **environment: str) -> None:
@@ -280,19 +266,9 @@ class _Stderr:
 
 class Inside:
     """
-    A node of the package in this process, spun by a thread, where a test asks for no process.
+    A node of the package in this process, spun by a thread, where a test needs no process.
 
-    Parameters
-    ----------
-    kind : type
-        Which; it is made as its executable makes it, with ROS's own context.
-    arguments : sequence of str
-        The command line, without the executable.
-    domain : int
-        Its ROS domain.
-    done : Future, optional
-        When it is done, its result is the exit code.
-
+    It is created as its executable creates it; ``done`` gets the exit code.
     """
 
     def __init__(self, kind: Callable[[], Any], arguments: Sequence[str | Path], domain: int,
@@ -473,23 +449,7 @@ def _twist(six: Sequence[float]) -> Twist:
 
 
 class NodeProcess:
-    """
-    The node's process, in a domain that no other has, and its arguments.
-
-    Parameters
-    ----------
-    folder : Path
-        Gets its output.
-    overrides : str
-        Parameters on the command line, ``name:=value``.
-    file : Path
-        Its parameter file.
-    command : sequence of str, optional
-        How it is started; by default its executable.
-    environment
-        Variables added to its environment.
-
-    """
+    """The node's process in a domain of its own; ``overrides`` are ``name:=value``."""
 
     def __init__(self, folder: Path, *overrides: str, file: Path = PLATFORM,
                  command: Sequence[str | Path] | None = None, **environment: str) -> None:
@@ -546,16 +506,8 @@ class DynamicsNode:
     The node in a process of its own, and a peer that feeds it and keeps its answers.
 
     Where the process runs already, the node in it is brought to the state ``unconfigured``, with
-    the parameters of its file and these; ``until_active`` configures and activates it then. The
-    peer is new as well, so that nothing is left of an earlier test.
-
-    Parameters
-    ----------
-    process : NodeProcess
-        It is started if it does not run.
-    overrides : str
-        Parameters that are set once it runs, ``name:=value``.
-
+    the parameters of its file and ``overrides``; ``until_active`` configures and activates it
+    then. The peer is new as well, so that nothing is left of an earlier test.
     """
 
     def __init__(self, process: NodeProcess, *overrides: str) -> None:
@@ -933,21 +885,9 @@ class DynamicsNode:
 
 class Feeder(Program):
     """
-    A publisher of setpoints in a process of its own: the hexapod at rest, over and over.
+    A publisher of setpoints in a process of its own: the hexapod at rest, ``rate`` in a second.
 
-    Parameters
-    ----------
-    node : DynamicsNode
-        Whom it feeds, on the topics that it listens to.
-    folder : Path
-        Gets its output.
-    rate : int
-        Setpoints in a second.
-    many : int, optional
-        How many it sends; it ends when the node has them all, or when it is stopped.
-    environment
-        Variables added to its environment.
-
+    It ends when the node has ``many``, or when it is stopped.
     """
 
     def __init__(self, node: DynamicsNode, folder: Path, rate: int, many: int = _ENDLESS,
@@ -1035,7 +975,7 @@ class Planner:
         """Send long trajectories until the queue is full."""
         while not any('queue full' in line for line in log_lines(
                 self._node.program.stderr, 'ERROR')):
-            self.send_long(50_000, leap=leap)
+            self.send_long(20_000, leap=leap)
             self._node.peer.spin(0.1)
 
     def until_answered(self, number: int) -> JointTrajectory:

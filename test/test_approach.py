@@ -85,7 +85,7 @@ def test_an_approach_slows_down_until_forces_are_within_their_limit() -> None:
 @pytest.mark.parametrize(('end', 'text'), [
     (Pose([0.0, 0.0, 2.5], np.eye(3)), 'limits.length_max'),
     (Pose.from_euler([0.0, 0.0, 1.1], [0.0, 0.0, np.pi / 2.0]), '')])
-def test_where_no_speed_is_slow_enough_there_is_no_approach(end: Pose, text: str) -> None:
+def test_an_approach_that_no_speed_allows_is_rejected(end: Pose, text: str) -> None:
     with pytest.raises(MotionError, match=f'approach over .* s: rejected: .*{text}'):
         approach(PLATFORM, HOME, end)
 

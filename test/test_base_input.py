@@ -31,7 +31,7 @@ from referees import rng, rotation_about, symmetric_parameters
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Imu
 
-from stewart_dynamics import BaseMotion, Motion, Pose, StewartPlatform
+from stewart_dynamics import BaseMotion, Motion, Pose
 from stewart_dynamics.messages.cdr import MalformedError
 from stewart_dynamics.messages.recorded import Messages
 from stewart_dynamics.messages.setpoint import imu, layout_of
@@ -40,8 +40,8 @@ from stewart_dynamics.setpoints.inputs import (
     BASE_ACCEL, BASE_IMU, BASE_POSE, BASE_SOURCES, BASE_TWIST, POSE, WRENCH)
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.rejections import (
-    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, Rejection, Rejections,
-    TOO_OLD, TWICE, WRONG_FRAME)
+    MALFORMED, NOT_FINITE, NOT_JOINED, NOT_MEASURED, NOT_UNIT, OUT_OF_RANGE, Rejection, TOO_OLD,
+    TWICE, WRONG_FRAME)
 from stewart_dynamics.setpoints.step import Setpoint
 
 MS = 1_000_000
@@ -194,7 +194,7 @@ def oracle(samples: Sequence[tuple[int, Any]], stamp: int, timeout: int = SECOND
 @settings(max_examples=200)
 @given(st.lists(st.integers(1, 60), min_size=0, max_size=8),
        st.lists(st.integers(-50, 400), min_size=1, max_size=6))
-def test_of_the_samples_that_have_come_the_newest_usable_one_is_taken(
+def test_the_newest_usable_base_sample_is_used(
         steps: Sequence[int], stamps: Sequence[int]) -> None:
     feed, samples, at = Feed('motion', setpoint__timeout=1e-9), [], SECOND
     for n, step in enumerate(steps):
@@ -275,19 +275,7 @@ def test_an_imu_whose_first_message_is_rejected_does_not_set_the_frame() -> None
     assert feed.reasons == {(BASE_IMU, NOT_MEASURED): 1}
 
 
-def test_huge_numbers_are_rejected_and_leave_nothing() -> None:
-    for source, bad in (('imu', messages.imu(SECOND + MS, (1e10, 0.0, 0.0))),
-                        ('imu', messages.imu(SECOND + MS, force=(0.0, -1e308, 0.0)))):
-        feed = Feed(source)
-        feed.sample(SECOND)
-        before = feed.row(SECOND)
-        feed(BASE_IMU, bad)
-        assert feed.reasons == {(BASE_IMU, OUT_OF_RANGE): 1}
-        feed.sample(SECOND + 2 * MS)
-        assert feed.row(SECOND + 2 * MS) == pytest.approx(before, rel=1e-12, abs=1e-12)
-
-
-def test_no_line_is_drawn_from_an_old_sample_over_a_gap() -> None:
+def test_base_motion_is_not_interpolated_over_a_gap() -> None:
     """As where the base's clock jumps ahead: what the setpoint needs lies in between."""
     for source in SOURCES:
         feed = Feed(source)
@@ -299,7 +287,7 @@ def test_no_line_is_drawn_from_an_old_sample_over_a_gap() -> None:
         assert known(feed.row(4 * SECOND))
 
 
-def test_what_is_joined_within_a_tolerance_is_not_dropped_by_a_restart() -> None:
+def test_samples_joined_within_a_tolerance_survive_a_restart() -> None:
     feed = Feed('motion', setpoint__sync_tolerance=0.02, base__timeout=0.01)
     start = 1000 * SECOND
     feed.sample(start)
@@ -508,57 +496,3 @@ def test_the_noise_of_the_angular_acceleration_is_as_stated(rate: float, cutoff:
     found = filtered(1e-3 * rng().normal(size=20_000), rate, cutoff)[200:]
     assert np.std(found) == pytest.approx(
         1e-3 * gain / dt * math.sqrt(2.0 / (2.0 - gain)), rel=0.05)
-
-
-def test_forces_by_an_imu_are_within_what_its_filter_misses() -> None:
-    """A base that rolls and heaves: the truth is known, only the angular acceleration is late."""
-    platform = StewartPlatform(PARAMETERS)
-    mounting = Pose.from_quaternion(
-        PARAMETERS['base.imu.position'], PARAMETERS['base.imu.orientation'])
-    feed, worst, largest = Feed('imu'), 0.0, 0.0
-    gain = -math.expm1(-2.0 * math.pi * PARAMETERS['base.imu.cutoff'] * 0.005)
-    delay = 0.005 * (1.0 / gain - 0.5)
-    pose = Pose([0.0, 0.0, 1.1], np.eye(3))
-    omega, angle = 2.0 * math.pi * 0.5, 0.2
-    for n in range(1000):
-        t = 0.005 * n
-        at = Motion.from_euler(
-            [0.0, 0.0, 0.4 * math.sin(omega * t)], [angle * math.sin(omega * t), 0.0, 0.0],
-            [0.0, 0.0, 0.4 * omega * math.cos(omega * t)],
-            [angle * omega * math.cos(omega * t), 0.0, 0.0],
-            [0.0, 0.0, -0.4 * omega ** 2 * math.sin(omega * t)],
-            [-angle * omega ** 2 * math.sin(omega * t), 0.0, 0.0])
-        base = BaseMotion.from_motion(at, PARAMETERS['gravity'])
-        w, dw, arm = base.angular_velocity, base.angular_acceleration, mounting.position
-        force = (base.linear_acceleration - base.gravity + np.cross(dw, arm)
-                 + np.cross(w, np.cross(w, arm)))
-        feed(BASE_IMU, messages.imu(SECOND + 5 * MS * n, mounting.rotation.T @ w,
-                                    mounting.rotation.T @ force))
-        if n < 100:
-            continue
-        row = feed.setpoints.base.at(SECOND + 5 * MS * n)
-        assert row is not None
-        motion = Motion.from_pose(pose)
-        truth = platform.inverse_dynamics(motion, base=base).forces
-        found = platform.inverse_dynamics(motion, base=BaseMotion.of_rows(np.array(row))).forces
-        # Effect of the delay of the angular acceleration, to first order.
-        jerk = delay * angle * omega ** 3
-        late = platform.inverse_dynamics(motion, base=BaseMotion(
-            base.gravity, base.linear_acceleration, w, dw + [jerk, 0.0, 0.0])).forces
-        bound = np.abs(late - truth).max()
-        # the lever arm's share of the specific force as well
-        bound += np.abs(platform.inverse_dynamics(motion, base=BaseMotion(
-            base.gravity + np.cross([jerk, 0.0, 0.0], arm), base.linear_acceleration, w, dw,
-        )).forces - truth).max()
-        assert np.abs(found - truth).max() < 1.05 * bound
-        worst = max(worst, np.abs(found - truth).max())
-        largest = max(largest, np.abs(truth - platform.inverse_dynamics(motion).forces).max())
-    assert worst < 0.05 * largest
-
-
-def test_the_rejections_are_counted_where_they_are_asked_for() -> None:
-    counts = Rejections(lambda rejection, details: None)
-    base = BaseInput(PARAMETERS.replaced({'base.source': 'imu'}), counts, lambda text: None)
-    assert not base.take(BASE_IMU, b'', lambda: NOW)
-    assert base.take(BASE_IMU, messages.imu(SECOND), lambda: NOW)
-    assert counts.counts == {Rejection(BASE_IMU, MALFORMED): 1}

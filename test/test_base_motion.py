@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    derivative, each_relative, energies, energy_in_world, friction, PinocchioReferee,
+    each_relative, friction, PinocchioReferee,
     random_base_motion, random_direction, random_motion, random_parameters, random_wrench,
-    relative, rng, rotation_about, size_of, smooth_motion, STANDARD_GRAVITY, uncompiled)
+    relative, rng, rotation_about, size_of, STANDARD_GRAVITY, uncompiled)
 
 from stewart_dynamics import BaseMotion, Motion, MotionError, Pose, StewartPlatform
 from stewart_dynamics.mechanics.dynamics import base_wrench
@@ -123,17 +123,6 @@ def test_rows_of_nan_among_others_add_nothing() -> None:
     assert np.array_equal(found[~still], platform.solve(motion.rows, wrench, base.rows)[~still])
 
 
-def test_a_base_in_free_fall_makes_static_forces_zero() -> None:
-    platform, motion, _, _ = case(5)
-    gravity = platform.parameters['gravity']
-    still = Motion.from_pose(motion.pose)
-    forces = platform.inverse_dynamics(still, base=BaseMotion(gravity, gravity)).forces
-    weight = np.abs(platform.inverse_dynamics(still).forces).max()
-    assert np.abs(forces).max() < 1e-13 * weight
-    found = platform.base_wrench(still, base=BaseMotion(gravity, gravity))
-    assert np.abs(found).max() < 1e-12 * weight
-
-
 def test_turning_the_base_is_turning_gravity() -> None:
     platform, motion, wrench, _ = case(6)
     turn = rotation_about(random_direction(rng()), 0.7)
@@ -144,32 +133,6 @@ def test_turning_the_base_is_turning_gravity() -> None:
                     turned.inverse_dynamics(motion, wrench).forces) < 1e-13
     assert relative(platform.base_wrench(motion, wrench, base),
                     turned.base_wrench(motion, wrench)) < 1e-13
-
-
-def test_a_platform_that_stands_still_in_the_world_weighs_what_it_weighs() -> None:
-    """The base moves beneath it: with massless legs the leg forces hold its weight alone."""
-    random = rng(7)
-    p = random_parameters(random, actuators=False)
-    p = p.replaced({f'legs.{part}.{what}': 0.0 for part in ('cylinder', 'piston')
-                    for what in ('mass', 'inertia')} | {'gravity': [0.0, 0.0, -STANDARD_GRAVITY]})
-    platform = StewartPlatform(p)
-    place, turn = np.array([0.3, -0.2, 2.0]), rotation_about(random_direction(random), 0.2)
-    for _ in range(STATES):
-        world = Motion(0.1 * random.normal(size=3), rotation_about(random_direction(random), 0.2),
-                       *random.normal(size=(4, 3)))
-        r, w, dw = world.rotation, world.angular_velocity, world.angular_acceleration
-        out = place - world.position
-        v = -world.linear_velocity - np.cross(w, out)
-        a = (-world.linear_acceleration - np.cross(dw, out) + np.cross(w, np.cross(w, out))
-             + 2.0 * np.cross(w, world.linear_velocity))
-        motion = Motion(r.T @ out, r.T @ turn, r.T @ v, -r.T @ w, r.T @ a, -r.T @ dw)
-        found = platform.inverse_dynamics(motion, base=BaseMotion.from_motion(world)).forces
-        load = np.concatenate([
-            r.T @ [0.0, 0.0, STANDARD_GRAVITY * p['platform.mass']], np.zeros(3)])
-        arm = motion.rotation @ p['platform.center_of_mass']
-        load[3:] = np.cross(arm, load[:3])
-        truth = np.linalg.solve(platform.inverse_jacobian(motion).T, load)
-        assert relative(found, truth) < 1e-12
 
 
 def test_the_sources_sum_to_the_force() -> None:
@@ -198,48 +161,6 @@ def test_the_coriolis_matrix_on_a_turning_base_keeps_its_identities() -> None:
         assert np.abs(np.swapaxes(twist, -1, -2) @ added @ twist).max() < 1e-9 * np.abs(
             added @ twist).max()
     assert np.array_equal(platform.mass_matrix(motion), platform.mass_matrix(motion.pose))
-
-
-@pytest.mark.parametrize('seed', range(3))
-def test_power_of_legs_and_base_is_the_rate_of_energy(seed: int) -> None:
-    """Kinetic and potential energy in the world, from speeds of all parts in the world."""
-    random = rng(seed)
-    p = random_parameters(random).replaced({
-        'actuator.reflected_mass': 0.0, 'actuator.viscous_friction': 0.0,
-        'actuator.coulomb_friction': 0.0})
-    platform, gravity = StewartPlatform(p), p['gravity']
-    of_base, of_platform = smooth_motion(p, random), smooth_motion(p, random)
-
-    def energy(time: float) -> Any:
-        return energy_in_world(p, of_base(time), of_platform(time), gravity)
-
-    base, motion = of_base(0.0), of_platform(0.0)
-    moving = BaseMotion.from_motion(base, gravity)
-    result = platform.inverse_dynamics(motion, base=moving)
-    on_base = platform.base_wrench(motion, base=moving)
-    r = base.rotation
-    # Power of the base on the hexapod, from the velocity of the base in the world.
-    by_base = -(on_base[:3] @ (r.T @ base.linear_velocity)
-                + on_base[3:] @ (r.T @ base.angular_velocity))
-    power = result.forces @ result.rates + by_base
-    assert power == pytest.approx(float(derivative(energy, 1e-3)), rel=1e-8)
-
-
-def test_the_base_wrench_of_a_hexapod_at_rest_is_its_weight() -> None:
-    platform, motion, _, _ = case(10)
-    p = platform.parameters
-    still = Motion.from_pose(motion.pose)
-    mass = p['platform.mass'] + np.sum(p['legs.cylinder.mass'] + p['legs.piston.mass'])
-    found = platform.base_wrench(still)
-    assert np.allclose(found[:, :3], mass * p['gravity'], rtol=1e-13, atol=0.0)
-    # Its moment is the derivative of the potential energy where all turns about the base's origin.
-    axis, step = random_direction(rng()), 1e-3
-
-    def potential(angle: float) -> Any:
-        turn = rotation_about(axis, angle)
-        return energies(p.replaced({'gravity': turn.T @ p['gravity']}), still)[1]
-
-    assert np.allclose(found[:, 3:] @ axis, -derivative(potential, step), rtol=1e-9)
 
 
 def test_the_base_wrench_needs_no_leg_force() -> None:

@@ -38,7 +38,6 @@ CONTROLLERS = sorted((CONFIG / 'controllers').glob('*.yaml'))
 
 # Published only with ~/measured_legs connected.
 MONITOR = '/stewart_dynamics/external_wrench'
-BASE_WRENCH = '/stewart_dynamics/base_wrench'
 # Foxglove's layouts: with a running node, and for the replay's output bags.
 LIVE, OF_BAG = 'foxglove.json', 'foxglove_bag.json'
 
@@ -105,35 +104,6 @@ def topics_of_foxglove(layout: str = LIVE) -> dict[str, str]:
                 kind = FIELDS[re.sub(r'\.[xyz]$', '.x', re.sub(r'\[\d\]', '[n]', field))]
                 assert found.setdefault(topic, kind) == kind
     return found
-
-
-def leaves(layout: Any) -> Iterator[str]:
-    """Yield the panels in a layout, and check how it is divided."""
-    if isinstance(layout, str):
-        yield layout
-        return
-    assert set(layout) == {'direction', 'splitPercentage', 'first', 'second'}
-    assert layout['direction'] in ('row', 'column')
-    assert 0 < layout['splitPercentage'] < 100
-    yield from leaves(layout['first'])
-    yield from leaves(layout['second'])
-
-
-@pytest.mark.parametrize('name, wrench', [(LIVE, MONITOR), (OF_BAG, BASE_WRENCH)])
-def test_each_panel_of_foxglove_has_its_place(name: str, wrench: str) -> None:
-    layout = foxglove(name)
-    assert set(layout) == {'configById', 'globalVariables', 'userNodes', 'playbackConfig',
-                           'layout'}
-    assert sorted(leaves(layout['layout'])) == sorted(layout['configById'])
-    plotted = [path['value'] for panel in layout['configById'].values()
-               for path in panel.get('paths', ())]
-    for topic in ('leg_forces', 'leg_lengths'):
-        assert [value for value in plotted if f'/{topic}.' in value] == [
-            f'/stewart_dynamics/{topic}.data[{n}]' for n in range(6)]
-    assert [value for value in plotted if '.wrench.' in value] == [
-        f'{wrench}.wrench.{part}.{axis}' for part in ('force', 'torque') for axis in 'xyz']
-    frames = [panel['followTf'] for panel in layout['configById'].values() if 'followTf' in panel]
-    assert frames == ['base']
 
 
 def test_rviz_shows_every_namespace_of_the_markers_in_the_base_frame() -> None:
@@ -255,34 +225,6 @@ def test_controllers_have_parameters_that_they_know(path: Any) -> None:
         assert JOINTS == [key for key in given[name]['constraints'] if key in JOINTS]
         assert {value for key, value in parameters.items()
                 if key.endswith('antiwindup_strategy')} <= set(ANTIWINDUP)
-
-
-@pytest.mark.parametrize('path', CONTROLLERS, ids=lambda path: path.name)
-def test_commands_in_the_comments_fit_the_file(path: Any) -> None:
-    types, (name,) = sections(path)[0], sections(path)[1]
-    text = path.read_text(encoding='utf-8')
-    assert f'spawner joint_state_broadcaster {name} ' in text
-    assert f'--param-file {path.name}' in text
-    # The spawner is fatal where the manager does not know the types.
-    assert f'ros2_control_node --ros-args --params-file {path.name}\n' in text
-    topic = 'commands' if types[name].startswith('effort_') else 'joint_trajectory'
-    assert f":=/{name}/{topic}'" in text
-
-
-def test_pages_send_forces_to_the_controller_of_the_file() -> None:
-    file, = (path for path in CONTROLLERS if path.name == 'effort.yaml')
-    name, = sections(file)[1]
-    for page in ('README.md', 'docs/node.md', 'docs/from_cad_to_controller.md'):
-        text = (ROOT / page).read_text(encoding='utf-8')
-        assert set(re.findall("-r '~/leg_forces:=(.*)'", text)) == {f'/{name}/commands'}, page
-
-
-def test_there_is_a_controller_of_each_kind() -> None:
-    kinds = [(types[name], given[name].get('command_interfaces')) for path in CONTROLLERS
-             for types, given in [sections(path)] for name in given]
-    trajectory = 'joint_trajectory_controller/JointTrajectoryController'
-    assert kinds == [('effort_controllers/JointGroupEffortController', None),
-                     (trajectory, ['effort']), (trajectory, ['position', 'effort'])]
 
 
 def test_the_example_gains_damp_every_mode_of_the_hexapod() -> None:

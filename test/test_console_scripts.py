@@ -16,14 +16,16 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 import subprocess
 import sys
 
 import pytest
 from referees import ROOT
-
+from stewart_dynamics import StewartError
 from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.executables import executable
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.ros.console_scripts import check_arguments, usage
@@ -103,20 +105,10 @@ def test_a_bad_file_is_rejected_before_libraries_are_loaded(program: str, tmp_pa
     assert error.count('\n') == 1
 
 
-def test_a_file_is_checked_without_a_compiler() -> None:
-    done = subprocess.run([sys.executable, '-c', f"""\
-import sys
-from stewart_dynamics import Parameters
-print(len(Parameters.from_yaml({str(ROOT / 'config' / 'platform.yaml')!r})))
-print([name for name in {HEAVY} if name in sys.modules])
-"""], check=True, capture_output=True, text=True, timeout=60)
-    assert done.stdout == f'{len(Parameters.table)}\n[]\n'
-
-
 @pytest.mark.parametrize('arguments, text', [
     (['-p', 'platform.mass=200.0'], 'command line: -p platform.mass=200.0: must be NAME:=VALUE'),
     (['--params-file', str(PLATFORM), '-p'], 'command line: -p : must be NAME:=VALUE')])
-def test_what_ros_would_reject_in_its_own_words_is_named(arguments: list[str], text: str) -> None:
+def test_malformed_ros_arguments_are_named(arguments: list[str], text: str) -> None:
     with pytest.raises(ParameterError) as caught:
         check_arguments(['--ros-args', *arguments], Parameters)
     assert str(caught.value) == text
@@ -129,3 +121,58 @@ def test_a_file_without_the_lines_of_ros_is_named(tmp_path: Path) -> None:
         check_arguments(['--ros-args', '--params-file', str(file)], Parameters)
     assert str(caught.value) == (f"{file}: holds platform, but no parameters under '/**:' or "
                                  "'stewart_dynamics:', 'ros__parameters:'")
+
+
+# Where executables are looked for: beside Python, and in workspaces that are sourced
+
+NAME = 'stewart_replay'
+
+
+@pytest.fixture
+def workspaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Return the executables of two workspaces; both are sourced, and a third without any."""
+    paths = [tmp_path / prefix / 'lib' / 'stewart_dynamics' / NAME for prefix in ('one', 'two')]
+    for path in paths:
+        path.parent.mkdir(parents=True)
+        path.touch()
+    prefixes = ['', str(tmp_path / 'none'), *(str(path.parents[2]) for path in paths)]
+    monkeypatch.setenv('AMENT_PREFIX_PATH', os.pathsep.join(prefixes))
+    monkeypatch.setattr(sys, 'executable', str(tmp_path / 'bin' / 'python'))
+    return paths
+
+
+def beside(workspaces: list[Path]) -> Path:
+    """Return a new executable beside Python."""
+    path = Path(sys.executable).with_name(NAME)
+    path.parent.mkdir()
+    path.touch()
+    return path
+
+
+def test_in_a_workspace_it_is_that_of_the_first_prefix(workspaces: list[Path]) -> None:
+    assert executable(NAME) == workspaces[0]
+    workspaces[0].unlink()
+    assert executable(NAME) == workspaces[1]
+
+
+def test_a_workspace_comes_before_the_system(
+        workspaces: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    system = beside(workspaces)
+    monkeypatch.setattr(sys, 'prefix', sys.base_prefix)
+    assert executable(NAME) == workspaces[0]
+    monkeypatch.delenv('AMENT_PREFIX_PATH')
+    assert executable(NAME) == system
+
+
+def test_a_virtual_environment_comes_before_workspaces(
+        workspaces: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = beside(workspaces)
+    monkeypatch.setattr(sys, 'prefix', sys.base_prefix + '/other')
+    assert executable(NAME) == environment
+
+
+def test_a_missing_one_is_an_error_with_the_folders(workspaces: list[Path]) -> None:
+    with pytest.raises(StewartError, match='^stewart_nothing: not found in ') as error:
+        executable('stewart_nothing')
+    for path in workspaces:
+        assert str(path.parent) in str(error.value)

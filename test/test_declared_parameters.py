@@ -142,28 +142,6 @@ def test_the_node_describes_each_parameter(declared: Any) -> None:
             'set also while active' if parameter.while_active else 'set only while unconfigured')
 
 
-def test_types_sizes_and_ranges_are_described(declared: Any) -> None:
-    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
-    mass, inertia, cylinder, force, joints, action, autostart, friction = described(
-        ask, 'platform.mass', 'platform.inertia', 'legs.cylinder.mass', 'limits.force_max',
-        'joints', 'singularity.action', 'autostart', 'actuator.viscous_friction')
-    assert mass.type == ParameterType.PARAMETER_DOUBLE
-    assert bounds(mass) == [(0.0, math.inf, 0.0)]
-    assert mass.additional_constraints == 'more than 0; set also while active'
-    assert inertia.type == ParameterType.PARAMETER_DOUBLE_ARRAY
-    assert bounds(inertia) == []
-    assert inertia.additional_constraints == '6 entries; set also while active'
-    assert cylinder.type == ParameterType.PARAMETER_DOUBLE
-    assert cylinder.additional_constraints == (
-        '1 or 6 entries; at least 0; set only while unconfigured')
-    assert force.type == ParameterType.PARAMETER_DOUBLE
-    assert joints.type == ParameterType.PARAMETER_STRING_ARRAY
-    assert action.type == ParameterType.PARAMETER_STRING
-    assert action.additional_constraints == 'one of warn, suppress_forces; set also while active'
-    assert autostart.type == ParameterType.PARAMETER_BOOL
-    assert friction.type == ParameterType.PARAMETER_DOUBLE
-
-
 def test_a_value_out_of_range_is_left_to_the_node_s_own_check(declared: Any) -> None:
     # This node has no check: rclpy's would reject these two, with its own text.
     ask = declared(LifecycleNode, Parameters, 'platform.yaml')
@@ -217,19 +195,6 @@ def force_max(arguments: list[str], domain: int) -> tuple[Any, Any]:
         finally:
             node.destroy_node()
             context.try_shutdown()
-
-
-def test_a_value_for_a_renamed_node_is_checked(declared: Any) -> None:
-    with pytest.raises(ParameterError, match="command line: platform.mass: '0,5': must be a "):
-        declared(LifecycleNode, Parameters, 'platform.yaml', 'arm:platform.mass:=0,5', name='arm')
-
-
-def test_what_ros_declares_is_described_by_ros(declared: Any) -> None:
-    ask = declared(LifecycleNode, Parameters, 'platform.yaml')
-    time, mass, unknown = described(ask, 'use_sim_time', 'platform.mass', 'platform.mas')
-    assert time.type == ParameterType.PARAMETER_BOOL
-    assert mass.description.endswith('[kg]')
-    assert unknown.description == ''
 
 
 def test_the_trajectory_s_parameters_are_read_once(declared: Any) -> None:
@@ -351,9 +316,3 @@ def test_a_file_for_another_node_is_named(declared: Any, tmp_path: Path) -> None
         declared(LifecycleNode, Parameters, str(file), 'base_frame:=world')
     assert str(caught.value) == (f"{file}: is for stewart_dynamic, not for '/stewart_dynamics': "
                                  "rename the section, or use '/**'")
-
-
-def test_an_integer_from_ros_is_rejected(declared: Any, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match='150: is an integer, must be a double: write 150.0'):
-        declared(LifecycleNode, Parameters, 'platform.yaml', 'other:x:=1',
-                 'platform.mass:=150')

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
+import re
 import sys
 from types import ModuleType
 
 import numpy as np
 import pytest
-from running import PLATFORM, ROOT
+from running import log_lines, PLATFORM, Program, ROOT
 from stewart_dynamics import Motion, Parameters, StewartPlatform
 from stewart_dynamics.identification.identification_options import IdentificationOptions
 from stewart_dynamics.identification.identify import Identification
@@ -74,7 +75,7 @@ def test_the_demo_identifies_the_true_parameters(demo: ModuleType, tmp_path: Pat
 
 @pytest.mark.parametrize('option, said', [
     ('--params', 'nowhere.yaml'), ('--motion', 'nowhere.yaml'), ('--recorded', 'at least 2')])
-def test_what_cannot_be_run_is_reported_in_one_line(
+def test_a_run_with_bad_options_is_rejected_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
         said: str) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):
@@ -89,3 +90,23 @@ def test_what_cannot_be_run_is_reported_in_one_line(
     assert line.startswith('demo-identify: ')
     assert '\n' not in line
     assert said in line
+
+
+# The demo of the README: the real node on a recorded motion, and the table of its answers
+
+@pytest.mark.slow
+def test_the_demo_prints_what_the_node_has_answered(domain: int, tmp_path: Path) -> None:
+    program = Program([sys.executable, ROOT / 'demo' / 'demo.py'], domain, tmp_path)
+    try:
+        assert program.wait() == 0, program.stderr
+    finally:
+        program.kill()
+    table = program.stdout
+    assert 'Traceback' not in program.stderr
+    assert log_lines(program.stderr, 'ERROR')  # of the force limits and of the crossing
+    answered, = re.findall(r'^(\d+) setpoints in', table, re.MULTILINE)
+    assert int(answered) > 900  # the first may come before the node listens
+    assert [line.split()[0] for line in table.splitlines() if line.startswith('leg_')] == [
+        f'leg_{n}' for n in range(1, 7)]
+    assert 'det(J) crossed zero at t = 8.4' in table
+    assert 'stewart_replay' in table.splitlines()[-1]

@@ -41,7 +41,7 @@ def test_three_files_are_written_and_nothing_is_said(tmp_path, capsys):
     assert printed.err == ''
 
 
-def test_what_exists_is_kept_unless_it_may_be_replaced(tmp_path, capsys):
+def test_existing_files_are_kept_unless_replacement_is_requested(tmp_path, capsys):
     (tmp_path / 'a.sdf').write_text('mine')
     given = '--params', PLATFORM, '--output', tmp_path, '--name', 'a'
     assert run(*given) == 2

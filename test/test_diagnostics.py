@@ -19,8 +19,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import pytest
 from referees import symmetric_parameters
 from stewart_dynamics.mechanics.limits import Exceedance
@@ -28,6 +27,7 @@ from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity
 from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
 from stewart_dynamics.node.diagnostics.periodic_report import (
     ERROR, LogLine, OK, STALE, Status, WARN)
+from stewart_dynamics.ros.repeated_log import SECONDS, Series
 from stewart_dynamics.setpoints.inputs import ACCEL, POSE, TWIST
 from stewart_dynamics.setpoints.rejections import DROPPED, NOT_FINITE, NOT_JOINED, Rejection, TWICE
 from stewart_dynamics.setpoints.step import Output, Setpoint, Step
@@ -78,26 +78,14 @@ def logged(diagnostics: DynamicsDiagnostics, now: float) -> list[tuple[int, str]
     return [(level, text) for level, text, _ in diagnostics.report.make(now)[1]]
 
 
-def test_there_are_four_statuses() -> None:
-    assert [s.name for s in report(begun(), BEGIN)] == [
-        'setpoints', 'singularity', 'limits', 'timing']
-
-
 # Silence
 
-def test_nothing_yet_is_stale_and_names_every_topic() -> None:
+def test_status_before_any_message_is_stale_and_names_every_topic() -> None:
     of = status(begun(), 'setpoints', BEGIN + 0.01)
     assert of.level == STALE
     assert all(f'{topic} never came' in of.message for topic in TOPICS)
     for topic in TOPICS:
         assert dict(of.values)[f'{topic}: last heard (s ago)'] == 'never'
-
-
-def test_setpoints_that_are_answered_are_ok() -> None:
-    diagnostics = begun()
-    answered(diagnostics, BEGIN + 1.0)
-    for after in (0.0, 0.05, 0.1):
-        assert status(diagnostics, 'setpoints', BEGIN + 1.0 + after).level == OK
 
 
 @pytest.mark.parametrize('silent', TOPICS)
@@ -114,27 +102,6 @@ def test_a_silent_topic_is_named_and_since_when(silent: str) -> None:
     assert not any(topic in of.message for topic in TOPICS if topic != silent)
     assert dict(of.values)[f'{silent}: last heard (s ago)'] == '2.500'
     assert dict(of.values)['age of the last (s)'] == '2.500'
-
-
-def test_a_topic_that_never_came_is_named() -> None:
-    diagnostics = begun()
-    for topic in (POSE, TWIST):
-        diagnostics.setpoints.heard[topic] = BEGIN + 1.0
-    of = status(diagnostics, 'setpoints', BEGIN + 1.02)
-    assert of.level == STALE
-    assert f'{ACCEL} never came' in of.message
-    assert POSE not in of.message
-    assert TWIST not in of.message
-
-
-def test_topics_that_all_arrive_but_are_not_joined_are_stale() -> None:
-    diagnostics = begun()
-    for topic in TOPICS:
-        diagnostics.setpoints.heard[topic] = BEGIN + 1.0
-    of = status(diagnostics, 'setpoints', BEGIN + 1.02)
-    assert (of.level, of.message) == (
-        STALE, 'no setpoint: all topics arrive, but none is joined: '
-        'their stamps differ by more than setpoint.sync_tolerance, 0 s')
 
 
 def test_the_timeout_is_that_of_the_parameters() -> None:
@@ -156,12 +123,6 @@ def test_the_rate_is_that_of_the_last_seconds() -> None:
             answered(diagnostics, BEGIN + second + 0.1 * n)
         values = dict(status(diagnostics, 'setpoints', BEGIN + second + 1.0).values)
     assert (values['setpoints answered'], values['rate (Hz)']) == ('130', '10.0')
-
-
-def test_the_rate_of_no_time_is_zero() -> None:
-    diagnostics = begun()
-    answered(diagnostics, BEGIN)
-    assert dict(status(diagnostics, 'setpoints', BEGIN).values)['rate (Hz)'] == '0.0'
 
 
 def test_frequent_reports_do_not_change_the_rate() -> None:
@@ -252,25 +213,6 @@ def test_rejections_are_counted_with_their_reason_and_are_a_warning() -> None:
     assert dict(of.values)[f'rejected, {TWIST}: {NOT_FINITE}'] == '3'
 
 
-def test_several_writers_of_a_topic_are_an_error() -> None:
-    diagnostics = begun()
-    answered(diagnostics, BEGIN)
-    diagnostics.setpoints.found({POSE: 1, TWIST: 2, ACCEL: 1}, {}, '/node', 1)
-    of = status(diagnostics, 'setpoints', BEGIN)
-    assert (of.level, of.message) == (ERROR, f'{TWIST} has 2 writers')
-    assert dict(of.values)[f'{TWIST}: writers'] == '2'
-
-
-def test_another_node_of_the_same_name_is_an_error() -> None:
-    diagnostics = begun()
-    answered(diagnostics, BEGIN)
-    diagnostics.setpoints.found({}, {}, '/ns/node', 3)
-    of = status(diagnostics, 'setpoints', BEGIN)
-    assert (of.level, of.message) == (ERROR, '3 nodes are named /ns/node')
-    diagnostics.setpoints.found({}, {}, '/ns/node', 1)
-    assert status(diagnostics, 'setpoints', BEGIN).level == OK
-
-
 def test_another_node_of_the_same_name_is_logged_once() -> None:
     diagnostics = begun()
     logged = []
@@ -292,7 +234,7 @@ def test_an_error_is_not_hidden_by_silence_and_both_are_stated() -> None:
         + ', '.join(f'{topic} silent for 3.0 s' for topic in TOPICS))
 
 
-def test_where_all_is_rejected_stamps_are_not_the_reason() -> None:
+def test_the_status_names_the_rejection_if_all_messages_are_rejected() -> None:
     diagnostics = begun()
     for topic in TOPICS:
         diagnostics.setpoints.heard[topic] = BEGIN
@@ -457,18 +399,6 @@ def test_a_pose_that_cannot_be_solved_is_an_error(setpoint: Setpoint) -> None:
     assert not any('force' in key for key, _ in status(diagnostics, 'limits', BEGIN).values)
 
 
-@pytest.mark.parametrize('suppressed', [False, True])
-def test_inside_the_stop_condition_is_an_error(suppressed: bool) -> None:
-    stopped = Singularity(stopped=True, cause=Cause.CONDITION)
-    action = 'suppress_forces' if suppressed else 'warn'
-    diagnostics = begun(singularity__action=action)
-    answered(diagnostics, BEGIN, CLEAR._replace(singularity=stopped))
-    of = status(diagnostics, 'singularity', BEGIN)
-    assert of.level == ERROR
-    assert 'stop_condition' in of.message
-    assert ('suppressed' in of.message) == suppressed
-
-
 def test_the_worst_condition_is_kept_for_a_second_or_two() -> None:
     diagnostics = begun()
     key = 'worst condition number of the last second'
@@ -537,7 +467,7 @@ def test_a_position_in_millimetres_is_named_as_the_likely_mistake(
         '1' if suppressed else None)
 
 
-def test_of_a_clipped_force_the_demanded_one_is_reported() -> None:
+def test_the_demanded_force_is_reported_if_clipped() -> None:
     output = output_of(limits__force_max=100.0)
     assert output.demanded_forces is not None
     diagnostics = begun()
@@ -616,17 +546,7 @@ def test_a_level_holds_for_a_second_after_its_cause() -> None:
     assert status(diagnostics, 'limits', BEGIN + 4.8).level == ERROR
 
 
-def test_a_higher_level_is_not_hidden_by_a_lower_one() -> None:
-    diagnostics = begun()
-    answered(diagnostics, BEGIN, output_of(QUARTER))
-    for after in (0.2, 0.9):
-        answered(diagnostics, BEGIN + after, near(25.0))
-        assert status(diagnostics, 'singularity', BEGIN + after).level == ERROR
-    answered(diagnostics, BEGIN + 1.1, near(25.0))
-    assert status(diagnostics, 'singularity', BEGIN + 1.1).level == WARN
-
-
-def test_a_change_of_level_is_seen_until_it_is_reported() -> None:
+def test_a_change_of_level_is_pending_until_it_is_reported() -> None:
     diagnostics = begun()
     diagnostics.report.make(BEGIN)
     assert not diagnostics.report.level_changed(BEGIN)
@@ -672,7 +592,7 @@ def _check_values(diagnostics: DynamicsDiagnostics, now: float) -> None:
 @given(st.lists(st.tuples(
     st.tuples(*[sizes] * 3), rotations | st.just(UPRIGHT), st.tuples(*[sizes] * 12),
     st.sampled_from([0.0, 0.01, 0.2, 2.0])), max_size=6))
-def test_no_value_is_other_than_a_number_and_every_key_has_its_unit(
+def test_every_value_is_finite_and_every_key_has_its_unit(
         motions: list[tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float]],
 ) -> None:
     step = Step(PARAMETERS.replaced({
@@ -707,3 +627,65 @@ def test_a_level_lasts_as_long_as_the_output_that_caused_it() -> None:
     assert levels == sorted(levels, reverse=True), 'it was OK or rose in between'
     # and when setpoints end there
     assert status(diagnostics, 'singularity', BEGIN + 100.0).level == WARN
+
+
+# The log lines of repeated events
+
+def test_the_first_is_logged_at_once_and_the_last_when_the_series_ends() -> None:
+    series = Series()
+    assert series.add('a', 'one', 0.0) == 'one'
+    assert series.add('a', 'two', 1.0) is None
+    assert series.add('a', 'three', 2.0) is None
+    assert series.over(2.0 + 0.99 * SECONDS) == []
+    assert series.over(2.0 + SECONDS) == ['three (the last of 3)']
+    assert series.over(100.0) == []
+    assert series.add('a', 'anew', 101.0) == 'anew'
+
+
+def test_a_single_one_is_logged_once() -> None:
+    series = Series()
+    assert series.add('a', 'one', 0.0) == 'one'
+    assert series.over(100.0) == []
+
+
+def test_frequent_events_are_logged_every_five_seconds_with_their_number() -> None:
+    series = Series()
+    lines = [(n, line) for n in range(101)
+             if (line := series.add('a', f'number {n}', 0.1 * n)) is not None]
+    assert lines == [(0, 'number 0'), (50, 'number 50 (and 49 before it)'),
+                     (100, 'number 100 (and 49 before it)')]
+    # the last one has been logged
+    assert series.over(100.0) == []
+
+
+def test_kinds_do_not_hide_each_other() -> None:
+    series = Series()
+    assert series.add('a', 'one', 0.0) == 'one'
+    assert series.add('b', 'two', 0.0) == 'two'
+    assert series.add('a', 'three', 1.0) is None
+    assert series.over(SECONDS) == []
+    assert series.over(1.0 + SECONDS) == ['three (the last of 2)']
+
+
+def test_two_in_a_series_that_are_far_apart_are_both_logged() -> None:
+    series = Series()
+    assert series.add('a', 'one', 0.0) == 'one'
+    assert series.add('a', 'two', SECONDS) == 'two'
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(st.lists(st.tuples(st.sampled_from('ab'), st.floats(0.0, 4.0)), min_size=1))
+def test_first_and_last_are_logged_and_none_is_lost(events: list[tuple[str, float]]) -> None:
+    series, now = Series(), 0.0
+    said: list[str] = []
+    for n, (kind, pause) in enumerate(events):
+        now += pause
+        said += series.over(now)
+        line = series.add(kind, f'{kind} {n}.', now)
+        said += [line] if line is not None else []
+    said += series.over(now + 2.0 * SECONDS)
+    for kind in {kind for kind, _ in events}:
+        own = [n for n, (of, _) in enumerate(events) if of == kind]
+        lines = [line for line in said if line.startswith(kind)]
+        assert lines[0] == f'{kind} {own[0]}.'
+        assert lines[-1].startswith(f'{kind} {own[-1]}.')

@@ -16,29 +16,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import math
-from pathlib import Path
 from typing import Any
 
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from lifecycle_msgs.msg import Transition
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
 from referees import rng
-from running import DynamicsNode, executable, HOME, log_lines, nanoseconds, NODE, wrench_message
+from running import DynamicsNode, LATCHED, log_lines, nanoseconds, NODE
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from stewart_dynamics import StewartPlatform
 from stewart_dynamics.arrays import NO_WRENCH
 from stewart_dynamics.external_wrench.estimate import ExternalWrench, Measurement
-from stewart_dynamics.external_wrench.measured_legs import MeasuredLegs
+from stewart_dynamics.external_wrench.measured_legs import LegHistory, MeasuredLegs
+from stewart_dynamics.external_wrench.payload import identify, numbers_of, PayloadOutcome
 from stewart_dynamics.setpoints.output_messages import OutputMessages
-from test_external_wrench import BEGIN
-from test_external_wrench import HEXAPOD, LOAD, measured, MILLISECOND, resting, six, swing, times
-from test_external_wrench import HOME as AT_HOME
-from test_measured_legs import joint_state, JOINTS, message_of, ZERO_LENGTHS
-from test_simulator_node import Simulator, STEPPED
+from test_external_wrench import (
+    BEGIN, HEXAPOD, HOME as AT_HOME, joint_state, JOINTS, LOAD, measured, message_of, MILLISECOND,
+    resting, six, swing, times, ZERO_LENGTHS)
+from test_payload import excited, LOADED
 
 Start = Callable[..., DynamicsNode]
 
@@ -131,7 +131,7 @@ def values(messages: list[WrenchStamped]) -> Any:
                      for each in messages]).reshape(-1, 6)
 
 
-def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> None:
+def test_published_wrenches_have_the_librarys_bits(begin: Callable[..., Felt]) -> None:
     """Messages of a hexapod in motion, measured with noise at irregular times."""
     felt = begin()
     random = rng(11)
@@ -160,25 +160,6 @@ def test_what_is_published_has_the_librarys_bits(begin: Callable[..., Felt]) -> 
     felt.node.until(lambda: felt.node.values(STATUS).get('wrenches') == '299', 'it is reported')
     # No setpoint has come: there is no distance to one.
     assert not any('setpoint' in key for key in felt.node.values(STATUS))
-
-
-def test_a_load_that_is_known_is_not_external(felt: Felt) -> None:
-    felt.until_status(OK, 'no overload')
-    felt.node.publish('wrench', wrench_message(LOAD))
-
-    def gone() -> bool:
-        stamp = felt.rest()
-        felt.until_answered(stamp)
-        return bool(np.max(np.abs(values(felt.received()[-1:]))) < 1e-6)
-
-    felt.node.until(gone, 'the load is known')
-
-
-def test_diagnostics_say_how_far_it_is_from_the_setpoint(felt: Felt) -> None:
-    felt.node.answer(HOME._replace(position=(0.0, 0.03, 1.14)))
-    felt.until_status(OK, 'no overload')
-    felt.node.until(lambda: felt.node.values(STATUS).get(
-        'distance from the last setpoint (m)') == '0.05', 'the distance is reported')
 
 
 def test_thresholds_are_checked_and_can_be_changed_while_it_is_active(felt: Felt) -> None:
@@ -215,41 +196,6 @@ def test_names_in_another_order_after_the_hexapod_is_connected_again(felt: Felt)
 
 
 # Faults, as docs/faults.md has them
-
-SPOILT = {
-    'lacks one of the joints': {'names': [*JOINTS[:5], 'elbow']},
-    'without effort': {'effort': []},
-    'not as many numbers as names': {'velocity': [0.0] * 5},
-    'not finite': {'position': [math.nan] + [0.3] * 5},
-    'forward kinematics did not converge': {'position': [9.0] + [0.3] * 5},
-    'out of range: numbers overflow': {'velocity': [1e308] * 6}}
-
-
-def test_invalid_measured_legs_are_rejected(felt: Felt) -> None:
-    felt.rest()
-    felt.until_answered(felt.rest())
-    for number, (reason, fields) in enumerate(SPOILT.items()):
-        at = resting(HEXAPOD, AT_HOME, LOAD, [felt.stamp + MILLISECOND])[0]
-        felt.publish(joint_state(at.stamp, **{
-            'names': JOINTS, 'position': at.lengths - ZERO_LENGTHS, 'velocity': at.rates,
-            'effort': at.forces, **fields}))
-        felt.until_answered(felt.rest(step=2 * MILLISECOND))
-        assert len(felt.raw) == number + 2
-        felt.node.until(
-            lambda key=f'rejected, {LEGS}: {reason}': felt.node.values(STATUS).get(key) == '1',
-            f'{reason} is counted')
-
-    def told() -> bool:
-        felt.publish(message_of(resting(HEXAPOD, AT_HOME, LOAD, [felt.stamp])[0])[:60])
-        felt.rest()
-        status = felt.node.status(STATUS)
-        return bool(status.level == WARN) and 'measured_legs: malformed' in status.message
-
-    felt.node.until(told, 'diagnostics say what is rejected')
-    assert any('measured_legs rejected: lacks one of the joints: leg_6; there are ' in line
-               for line in log_lines(felt.node.program.stderr, 'WARN'))
-    felt.until_status(OK, 'no overload')
-
 
 def test_measured_legs_without_a_stamp_or_late_are_rejected(felt: Felt) -> None:
     felt.rest()
@@ -302,41 +248,147 @@ def test_measured_legs_are_forgotten_at_a_deactivation(felt: Felt) -> None:
 
 # In the loop with the simulator
 
-@pytest.mark.slow
-def test_a_wrench_on_the_simulator_in_motion_is_found_within_5_percent(
-        start: Start, tmp_path: Path) -> None:
-    """Step by step: this is the controller, PD and feed-forward; and it lets go again."""
-    rule = '~/measured_legs:=/stewart_simulator/leg_states'
-    node = start(command=[executable('stewart_dynamics'), '--ros-args', '-r', rule])
-    found = node.peer.listen(f'{NODE}/external_wrench', WrenchStamped)
-    simulator = Simulator(node.domain, tmp_path / 'simulator', STEPPED)
-    try:
-        simulator.until_there()
+
+# The service that identifies the payload, of the node in a process of its own
+
+PAYLOAD = 'payload'
+# No test depends on the time between measurements and a request [s].
+TIMEOUT = 60.0
+TIMES = [2.0 + n / 100.0 for n in range(600)]
+
+
+class Carried:
+    """A node, and a hexapod with a payload whose legs are measured."""
+
+    def __init__(self, node: DynamicsNode) -> None:
+        self.node = node
+        self.raw = node.peer.listen(f'{NODE}/payload', InertiaStamped, LATCHED)
+        self._writer = node.peer.writer(f'{NODE}/measured_legs', JointState)
+        self._client = node.peer.node.create_client(Trigger, f'{NODE}/identify_payload')
+        stamps = [BEGIN + round(time * 1e9) for time in TIMES]
+        self.messages = [message_of(each) for each in measured(
+            LOADED, excited(TIMES), NO_WRENCH, stamps)]
         node.until_active()
-        node.until(lambda: node.peer.node.count_subscribers('/stewart_simulator/leg_states') == 2,
-                   'the node hears the simulator')
-        loads = {}
-        for load, steps in ((NO_WRENCH, 100), (LOAD, 200), (NO_WRENCH, 200)):
-            simulator.load(load)
-            for _ in range(steps):
-                loads[_step(simulator)] = load
-        node.until(lambda: len(found) >= len(loads), 'all wrenches have come')
-    finally:
-        simulator.program.stop()
-        simulator.peer.close()
-    messages = [deserialize_message(data, WrenchStamped) for data in found]
-    assert [nanoseconds(each.header.stamp) for each in messages] == list(loads)
-    off = values(messages) - list(loads.values())
-    settled = np.r_[50:100, 200:300, 400:500]  # 0.2 s after the load has changed
-    assert np.max(np.linalg.norm(off[settled, :3], axis=1)) < 0.05 * np.linalg.norm(LOAD[:3])
-    assert np.max(np.linalg.norm(off[settled, 3:], axis=1)) < 0.05 * np.linalg.norm(LOAD[3:])
+        node.until(self._writer.get_subscription_count, 'the node hears measured legs')
+        node.until(self._client.service_is_ready, 'the service is there')
+
+    def move(self, messages: Sequence[bytes] = ()) -> None:
+        """Publish measurements, by default those of the motion, and wait until they are used."""
+        messages = messages or self.messages
+        for message in messages:
+            self._writer.publish(message)
+        self.node.until(lambda: self.node.values('external wrench').get('wrenches') == str(
+            len(messages) - 1), 'all measurements are used')
+
+    def begin(self) -> Any:
+        """Send a request, and return its future."""
+        return self._client.call_async(Trigger.Request())
+
+    def identify(self) -> Trigger.Response:
+        """Return the answer to a request."""
+        future = self.begin()
+        self.node.until(future.done, 'the service answers')
+        return future.result()
 
 
-def _step(simulator: Simulator) -> int:
-    """Command the forces of the present moment and return the next one's stamp."""
-    state = simulator.last()
-    stamp = nanoseconds(state.header.stamp)
-    wanted = StewartPlatform(HEXAPOD).inverse_dynamics(swing((stamp - 10 ** 9) * 1e-9))
-    return simulator.step(
-        wanted.forces + 61.0 * 900.0 * (wanted.lengths - ZERO_LENGTHS - state.position)
-        + 61.0 * 42.0 * (wanted.rates - state.velocity))
+@pytest.fixture
+def carried(fresh: Start) -> Iterator[Carried]:
+    """Return a node and a hexapod for this alone; the node must be at work afterwards."""
+    each = Carried(fresh(f'setpoint.timeout:={TIMEOUT}'))
+    yield each
+    each.node.state_of(each.node.send())
+
+
+def expected(messages: list[bytes]) -> PayloadOutcome:
+    """Return what the library gives for these messages."""
+    parameters, history = HEXAPOD.replaced({'setpoint.timeout': TIMEOUT}), LegHistory(10.0)
+    legs = MeasuredLegs(parameters, ExternalWrench(parameters), lambda *_: None,
+                        lambda _: None, history)
+    for each in messages:
+        assert legs.take(each, NO_WRENCH, None) is not None
+    *_, outcome = identify(history, StewartPlatform(parameters))
+    assert outcome is not None
+    return outcome
+
+
+def test_the_answer_has_the_librarys_numbers_and_sets_no_parameter(carried: Carried) -> None:
+    outcome = expected(carried.messages)
+    assert outcome.payload is not None
+    assert abs(outcome.payload.fitted.body.mass - 172.0) < 0.2
+    carried.move()
+    answer = carried.identify()
+    assert answer.success
+    assert answer.message == outcome.message
+    node = carried.node
+    node.until(lambda: carried.raw, 'the payload is published')
+    message = deserialize_message(carried.raw[-1], InertiaStamped)
+    assert message.header.frame_id == 'platform'
+    assert nanoseconds(message.header.stamp) == outcome.payload.stamp
+    inertia = message.inertia
+    assert [inertia.m, inertia.com.x, inertia.com.y, inertia.com.z, inertia.ixx, inertia.ixy,
+            inertia.ixz, inertia.iyy, inertia.iyz, inertia.izz] == numbers_of(
+                outcome.payload.fitted.body)
+    node.until_status(PAYLOAD, OK, 'identified from 6.0 s')
+    values = node.values(PAYLOAD)
+    assert float(values['mass (kg)']) == pytest.approx(172.0, abs=0.2)
+    assert float(values['mass, half of the 95 % interval (kg)']) < 0.5
+    # The forces are still those of the file.
+    node.answer()
+    # It is latched: who comes later has it, too.
+    assert len(carried.raw) == 1
+    late = node.peer.listen(f'{NODE}/payload', InertiaStamped, LATCHED)
+    node.until(lambda: late == carried.raw, 'the payload comes to a late subscriber')
+
+
+def test_setpoints_are_answered_meanwhile_and_all_requests_are(carried: Carried) -> None:
+    carried.move()
+    futures = [carried.begin() for _ in range(3)]
+    for _ in range(20):
+        carried.node.answer()
+    carried.node.until(lambda: all(each.done() for each in futures), 'all are answered')
+    assert len({each.result().message for each in futures}) == 1
+    assert all(each.result().success for each in futures)
+
+
+def test_numbers_not_identifiable_at_rest_keep_their_values(carried: Carried) -> None:
+    stamps = [BEGIN + round(time * 1e9) for time in TIMES]
+    carried.move([message_of(each) for each in resting(LOADED, AT_HOME, NO_WRENCH, stamps)])
+    answer = carried.identify()
+    assert answer.success
+    unknown, _, given = answer.message.partition('; not identified, as in the parameters: ')[
+        2].partition('; ')
+    assert unknown == ('center of mass z, inertia ixx, inertia ixy, inertia ixz, inertia iyy, '
+                       'inertia iyz, inertia izz')
+    assert ', 0.12], inertia: [13.0, 0.3, -0.4, 14.0, 0.2, 22.0]' in given
+    carried.node.until_status(PAYLOAD, OK, 'identified')
+    values = carried.node.values(PAYLOAD)
+    assert values['inertia izz, half of the 95 % interval (kg m^2)'] == 'not identified'
+
+
+def test_a_request_is_answered_when_the_node_is_deactivated(carried: Carried) -> None:
+    node = carried.node
+    carried.move()
+    future = carried.begin()
+    assert node.change(Transition.TRANSITION_DEACTIVATE)
+    node.until(future.done, 'the service answers')
+    # The work takes a hundred pieces with pauses: it may be done before.
+    assert future.result().message in ('the node is deactivated', expected(
+        carried.messages).message)
+    assert carried.identify().message == 'the node is not active'
+    assert node.change(Transition.TRANSITION_ACTIVATE)
+    assert carried.identify().message == 'no measured legs'
+    node.until_active()
+
+
+def test_requests_behind_deactivation_and_cleanup_are_answered(carried: Carried) -> None:
+    node = carried.node
+    carried.move()
+    for _ in range(5):  # a service of ROS keeps ten requests
+        futures = [
+            node.begin_change(Transition.TRANSITION_DEACTIVATE), carried.begin(),
+            node.begin_change(Transition.TRANSITION_CLEANUP), carried.begin(), carried.begin(),
+            node.begin_change(Transition.TRANSITION_CONFIGURE),
+            node.begin_change(Transition.TRANSITION_ACTIVATE), carried.begin()]
+        node.until(lambda waiting=futures: all(future.done() for future in waiting),
+                   'all are answered')
+    node.until_active()

@@ -20,30 +20,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import closing
 import math
-import os
 from pathlib import Path
-import re
 import signal
-import subprocess
 import sys
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import Transition
 import numpy as np
 import pytest
-from rcl_interfaces.srv import DescribeParameters, SetParameters
-from rclpy.parameter import Parameter as RosParameter
+from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from running import (
-    bits, DEADLINE, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
-    Peer, Planner, PLATFORM, Program, raw, rejected, ROOT, Sample, says, SEPARATE, STEP,
+    bits, DynamicsNode, FEEDER, Feeder, HOME, log_lines, nanoseconds, NODE, OUTPUTS,
+    Peer, Planner, Program, raw, ROOT, Sample, says, SEPARATE, STEP,
     wrench_message)
-from stewart_dynamics import ParameterError, Parameters, StewartPlatform
+from stewart_dynamics import StewartPlatform
 from stewart_dynamics.ros.security import PROFILES
-import yaml
 
 Start = Callable[..., DynamicsNode]
 
@@ -52,8 +46,6 @@ OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 MOVING = Sample((0.05, -0.03, 1.12), (0.1, -0.05, 0.2, math.sqrt(1 - 0.0525)),
                 (0.1, -0.05, 0.08, 0.2, -0.1, 0.15), (0.5, 0.4, -0.6, 0.3, 0.7, -0.2))
 NOT_JOINED = 'dropped: not all topics had its stamp'
-DROPPED = 'dropped: more came at once than can be answered'
-SPECIAL = (math.nan, math.inf, -math.inf)
 
 
 # In every case the node is at work when the fault has ended, and all that it has published was
@@ -89,74 +81,6 @@ def _started(start: Start) -> Iterator[Start]:
     yield started
     for each in begun:
         each.at_work()
-
-
-# Invalid numbers
-
-def _spoilt(numbers: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
-    """Yield the numbers with one of them invalid, each in each way."""
-    for n in range(len(numbers)):
-        for value in SPECIAL:
-            yield (*numbers[:n], value, *numbers[n + 1:])
-
-
-SPOILT = [(topic, MOVING._replace(**{field: numbers}))
-          for topic, field in (('setpoint/pose', 'position'), ('setpoint/pose', 'quaternion'),
-                               ('setpoint/twist', 'twist'), ('setpoint/accel', 'accel'))
-          for numbers in _spoilt(getattr(MOVING, field))]
-
-
-def test_nan_and_infinity_in_each_field_are_rejected(at_work: DynamicsNode) -> None:
-    node = at_work
-    for number, (bad_topic, sample) in enumerate(SPOILT):
-        node.send(sample)
-        for topic in SEPARATE:
-            node.rejects(topic, 'not finite' if topic == bad_topic else NOT_JOINED)
-        if number % 8 == 0:
-            node.answer(MOVING)
-    node.answer(MOVING)
-    for load in _spoilt((1.0,) * 6):
-        node.publish('wrench', wrench_message(load))
-        node.rejects('wrench', 'not finite')
-    node.until_counted()
-    assert log_lines(node.program.stderr, 'WARN')
-
-
-def test_nan_and_infinity_in_each_field_of_one_message_are_rejected(renew: Start) -> None:
-    node = renew('setpoint.source:=combined')
-    for _, sample in SPOILT:
-        node.send(sample)
-        node.rejects('setpoint/combined', 'not finite')
-
-    def told() -> bool:
-        node.send(MOVING._replace(position=(0.0, 0.0, math.nan)))
-        node.rejects('setpoint/combined', 'not finite')
-        status = node.status('setpoints')
-        return bool(status.level == STALE) and 'setpoint/combined: not finite' in status.message
-
-    node.until(told, 'diagnostics say why there is no setpoint')
-
-
-@pytest.mark.parametrize('quaternion', [
-    (0.0,) * 4, (0.0, 0.0, 0.0, 1.0011), (0.0, 0.0, 0.0, 0.9989), (0.0, 0.0, 0.0, 2.0),
-    (5e-324,) * 4, (1e200,) * 4, (1.7e308,) * 4,
-], ids=str)
-def test_a_quaternion_not_of_unit_length_is_rejected(
-        at_work: DynamicsNode, quaternion: tuple[float, ...]) -> None:
-    node = at_work
-    node.send(MOVING._replace(quaternion=quaternion))
-    node.rejects('setpoint/pose', 'quaternion not of unit length')
-    for topic in SEPARATE[1:]:
-        node.rejects(topic, NOT_JOINED)
-
-
-def test_a_quaternion_of_flipped_sign_is_the_same_rotation(at_work: DynamicsNode) -> None:
-    node = at_work
-    flipped = MOVING._replace(quaternion=tuple(-q for q in MOVING.quaternion))
-    states = [node.answer(sample) for sample in (MOVING, flipped, MOVING, flipped)]
-    for state in states[1:]:
-        for field in ('position', 'velocity', 'effort'):
-            assert bits(getattr(state, field)) == bits(getattr(states[0], field))
 
 
 # Stamps
@@ -199,10 +123,8 @@ def test_after_a_stamp_of_the_far_future_normal_ones_are_followed(at_work: Dynam
     node.answer(MOVING)
 
 
-@pytest.mark.parametrize('topic', SEPARATE)
-def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(
-        at_work: DynamicsNode, topic: str) -> None:
-    node = at_work
+def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(at_work: DynamicsNode) -> None:
+    node, topic = at_work, 'setpoint/twist'
     far = node.stamp(0) + 4 * 10**17  # 12 years
     node.publish(topic, MOVING.messages(far)[topic])
     for _ in range(3):
@@ -212,18 +134,6 @@ def test_a_stamp_of_the_far_future_on_one_topic_delays_nothing(
     node.answer(MOVING)
     node.rejects(topic, NOT_JOINED)
     node.asked[far] = 0
-
-
-def test_a_zero_stamp_among_others_is_a_time(at_work: DynamicsNode) -> None:
-    node = at_work
-    node.answer(MOVING)
-    node.answer(MOVING, stamp=0)
-    node.until_said('followed as a restart')
-    node.send(MOVING, 0)
-    for topic in SEPARATE:
-        node.rejects(topic, 'same stamp twice')
-    node.until_counted()
-    node.asked[0] = 1
 
 
 def test_a_bag_that_loops_is_followed(at_work: DynamicsNode) -> None:
@@ -272,31 +182,20 @@ def test_simulated_time_stands_still_and_jumps(begin: Start) -> None:
     # Diagnostics do not need the clock: they report that a topic is silent.
     node.until_status('setpoints', STALE, 'silent for ')
     node.answer(MOVING)
-    message.clock.sec = 1
-    clock.publish(message)
-    for _ in range(3):
-        node.answer(MOVING)
-
-
-def test_a_time_before_zero_on_clock_is_not_followed(begin: Start) -> None:
-    node = begin('use_sim_time:=true')
-    clock = node.peer.writer('/clock', Clock)
-    message = Clock()
-    message.clock.sec = -5
 
     def said() -> bool:
+        message.clock.sec = -5
         clock.publish(message)  # best effort: the node may have missed the first
         return '/clock: -5 s: not followed' in node.program.stderr
 
-    node.until(said, 'it is said')
+    node.until(said, 'a negative time is rejected')
     node.answer(MOVING)
 
 
 # Topics that are late or too many
 
-@pytest.mark.parametrize('late', SEPARATE)
-def test_a_late_topic_is_waited_for(at_work: DynamicsNode, late: str) -> None:
-    node = at_work
+def test_a_late_topic_is_waited_for(at_work: DynamicsNode) -> None:
+    node, late = at_work, 'setpoint/pose'
     before = len(node.raw['leg_states'])
     stamps = [node.stamp() for _ in range(50)]
     for stamp in stamps:
@@ -320,52 +219,9 @@ def test_a_late_topic_is_waited_for(at_work: DynamicsNode, late: str) -> None:
     node.asked[stamp] = 0
 
 
-def test_the_oldest_samples_are_dropped_if_a_topic_is_too_late(
-        at_work: DynamicsNode) -> None:
-    node = at_work
-    stamps = [node.stamp() for _ in range(1010)]
-    for n, stamp in enumerate(stamps, 1):
-        node.publish('setpoint/pose', HOME.messages(stamp)['setpoint/pose'])
-        if n > 1000:
-            node.rejects('setpoint/pose', NOT_JOINED)
-        if n == 500:  # the middleware's queue is full here: wait until its messages are taken
-            node.publish('setpoint/pose', HOME.messages(stamps[0])['setpoint/pose'])
-            node.rejects('setpoint/pose', 'same stamp twice')
-            node.until_counted()
-    node.until_counted()
-    for topic in SEPARATE[1:]:
-        node.publish(topic, HOME.messages(stamps[10])[topic])
-    node.state_of(stamps[10])
-    node.answer()
-    node.rejects('setpoint/pose', NOT_JOINED, 999)
-
-
-@pytest.mark.slow
-def test_the_newest_of_ten_thousand_messages_at_once_is_answered(begin: Start) -> None:
-    node = begin(NUMBA_DISABLE_JIT='1')  # it takes a millisecond or more for a setpoint
-    stamps = [node.stamp() for _ in range(10_000 // 3 + 1)]
-    for stamp in stamps:
-        for topic, message in MOVING.messages(stamp).items():
-            node.publish(topic, message)
-    node.check(node.state_of(stamps[-1]), node.result_of(MOVING))
-    node.until_reported('timing', WARN, 'dropped: ')
-    assert int(node.values('timing')['dropped']) > 100
-    answered = [nanoseconds(state.header.stamp) for state in node.received('leg_states')]
-    assert answered == sorted(answered)
-    node.until_status('timing', OK, 'on time')
-    values = node.values('setpoints')
-    node.expected.update({key: int(number) for key, number in values.items()
-                          if key.startswith('rejected, ')})
-    passed = node.expected[f'rejected, setpoint: {DROPPED}']
-    incomplete = node.expected[f'rejected, setpoint/pose: {NOT_JOINED}']
-    # Messages that the middleware drops, of more than a thousand on one topic, are not counted.
-    assert len(answered) + passed + incomplete <= len(stamps)
-    assert 'more came at once than can be answered' in node.program.stderr
-
-
-def test_the_first_and_the_last_of_a_series_of_rejections_are_logged(
-        at_work: DynamicsNode) -> None:
-    node = at_work
+def test_the_first_and_the_last_of_a_series_of_rejections_are_logged(start: Start) -> None:
+    node = start()
+    node.until_active()
     for _ in range(50):
         node.publish('wrench', raw(wrench_message((1.0,) * 6))[:20])
         node.rejects('wrench', 'malformed')
@@ -376,21 +232,10 @@ def test_the_first_and_the_last_of_a_series_of_rejections_are_logged(
                 if 'wrench rejected: malformed' in line]
 
     assert len(said()) == 1
-    node.until(lambda: len(said()) > 1, 'the last is said when no more come')
-    _, last = said()
-    assert last.endswith('(the last of 50)')
-
-
-def test_at_the_end_the_last_of_a_series_is_logged(start: Start) -> None:
-    node = start()
-    node.until_active()
-    for _ in range(20):
-        node.publish('wrench', raw(wrench_message((1.0,) * 6))[:20])
-        node.rejects('wrench', 'malformed')
-    node.until_counted()
     node.at_work()
-    node.stop()
-    assert '(the last of 20)' in node.program.stderr.splitlines()[-1]
+    node.stop()  # otherwise it is logged when no more come
+    assert said()[-1] == node.program.stderr.splitlines()[-1]
+    assert said()[-1].endswith('(the last of 50)')
 
 
 # Publishers
@@ -427,24 +272,6 @@ def test_an_incompatible_quality_of_service_is_named(at_work: DynamicsNode) -> N
     assert 'its messages are not received' in said
     node.answer(MOVING)
     node.peer.node.destroy_publisher(deaf)
-
-
-def test_two_publishers_on_one_topic_are_reported(at_work: DynamicsNode) -> None:
-    node = at_work
-    second = node.peer.writer(f'{NODE}/setpoint/pose', PoseStamped)
-    node.until_status('setpoints', ERROR, 'setpoint/pose has 2 writers')
-    # Both are received: the node cannot know which of them is right.
-    node.answer(MOVING)
-    stamp = node.stamp()
-    node.asked[stamp] += 1
-    messages = MOVING.messages(stamp)
-    second.publish(messages.pop('setpoint/pose'))
-    for topic, message in messages.items():
-        node.publish(topic, message)
-    node.check(node.state_of(stamp), node.result_of(MOVING))
-    assert node.values('setpoints')['setpoint/pose: writers'] == '2'
-    node.peer.node.destroy_publisher(second)
-    node.until(lambda: node.status('setpoints').level != ERROR, 'one writer is left')
 
 
 def test_a_second_node_of_the_same_name_is_reported(at_work: DynamicsNode) -> None:
@@ -596,16 +423,16 @@ def test_lifecycles_under_load_leave_nothing_behind(
                       for topic in OUTPUTS}
         return node.program.held(), publishers
 
-    for _ in range(20):
+    for _ in range(10):
         cycle()
     after, publishers = held()
-    cycles, grown = 20, list[int]()
+    cycles, grown = 10, list[int]()
     # A leak grows in each round; memory that is allocated once grows in only one of them.
-    while not grown or (grown[-1] >= 800 and len(grown) < 3):
+    while not grown or (grown[-1] >= 400 and len(grown) < 3):
         before = after
-        for _ in range(40):
+        for _ in range(20):
             cycle()
-        cycles += 40
+        cycles += 20
         after, publishers_after = held()
         assert publishers_after == publishers == dict.fromkeys(OUTPUTS, 1)
         for what in ('descriptors', 'threads'):
@@ -614,18 +441,14 @@ def test_lifecycles_under_load_leave_nothing_behind(
     feeder.end()
     assert node.program.stderr.count('dynamics ready after') == 1 + cycles
     # A leaked publisher takes 30 kB; without leaks the middleware takes 3 to 7 kB per cycle.
-    assert grown[-1] < 800, grown
+    assert grown[-1] < 400, grown
     _expect_what_was_cut_off(node)
 
 
-@pytest.mark.parametrize('configured', [False, True], ids=['unconfigured', 'inactive'])
-def test_it_is_shut_down_from_unconfigured(start: Start, configured: bool) -> None:
+def test_an_unconfigured_node_is_shut_down(start: Start) -> None:
     node = start('autostart:=false')
     node.until_said('unconfigured: autostart is false')
     shutdown = Transition.TRANSITION_UNCONFIGURED_SHUTDOWN
-    if configured:
-        assert node.change(Transition.TRANSITION_CONFIGURE)
-        shutdown = Transition.TRANSITION_INACTIVE_SHUTDOWN
     assert node.change(shutdown)
     assert node.state == 'finalized'
     # There is no way back, and it is logged.
@@ -662,23 +485,6 @@ def test_calls_do_not_cost_a_setpoint(at_work: DynamicsNode, tmp_path: Path) -> 
         node.platform.parameters.replaced({'platform.mass': each}))).forces)
         for each in (mass, mass + 1.0)}
     assert {bits(state.effort) for state in node.received('leg_states')[before:]} == either
-
-
-def test_a_killed_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
-    node = at_work
-    controller = Program([sys.executable, FEEDER], node.domain, tmp_path / 'controller',
-                         **_by_udp(tmp_path, LEASE))
-    forces = f'{NODE}/leg_forces'
-    node.until(lambda: node.peer.node.count_subscribers(forces) == 2, 'the controller is there')
-    before = len(node.raw['leg_states'])
-    feeder = Feeder(node, tmp_path / 'feeder', 250, 750)
-    feeder.begin()
-    _until_answered(node, feeder)
-    controller.kill()
-    node.until(lambda: feeder.ended, 'all are sent')
-    feeder.end()
-    node.until(lambda: len(node.raw['leg_states']) == before + 750, 'all are answered')
-    node.until(lambda: node.peer.node.count_subscribers(forces) == 1, 'it is forgotten')
 
 
 def test_a_stopped_subscriber_costs_no_setpoint(at_work: DynamicsNode, tmp_path: Path) -> None:
@@ -743,21 +549,6 @@ def test_a_singularity_between_two_samples_is_reported(at_work: DynamicsNode) ->
         node.program.stderr, 'ERROR')) == said + 2
 
 
-def test_no_forces_are_published_through_a_singularity_where_they_are_suppressed(
-        at_work: DynamicsNode) -> None:
-    node = at_work
-    assert node.set_parameters(singularity__action='suppress_forces').successful
-    node.answer()
-    for degrees in (89.0, 89.9, 90.1, 91.0):
-        sample = _turned(degrees, math.radians(100.0))
-        assert node.result_of(sample).condition_number > 100.0
-        assert len(node.state_of(node.send(sample)).effort) == 0
-    node.until_status('singularity', ERROR, 'inside stop_condition: forces suppressed')
-    node.answer()
-    assert node.set_parameters(singularity__action='warn').successful
-    node.answer()
-
-
 def test_a_hexapod_that_is_singular_at_home_starts_and_gives_no_forces(
         start: Start, tmp_path: Path) -> None:
     # Similar hexagons: whatever the pose, the legs cannot hold a turn about the vertical.
@@ -782,124 +573,6 @@ def test_a_hexapod_that_is_singular_at_home_starts_and_gives_no_forces(
     node.until_status('singularity', ERROR, 'J_inv cannot be solved: no forces')
     node.check_answers()
     assert any('singular' in line for line in log_lines(node.program.stderr, 'WARN'))
-
-
-# Parameters
-
-@pytest.mark.parametrize('name, value, reason', [
-    ('platform.mass', 150, 'platform.mass: 150: is an integer, must be a double: write 150.0'),
-    ('platform.mass', 'heavy', "platform.mass: 'heavy': must be a double"),
-    ('platform.inertia', [1.0], 'platform.inertia: [1.0]: must have 6 entries, has 1'),
-    ('platfrom.mass', 1.0, 'platfrom.mass: unknown parameter; do you mean platform.mass?'),
-])
-def test_both_services_reject_a_bad_parameter(
-        at_work: DynamicsNode, name: str, value: Any, reason: str) -> None:
-    node = at_work
-    change = RosParameter(name, value=value)
-    assert reason in node.set_atomically([change]).reason
-    answer, = node.call('set_parameters', SetParameters.Request(
-        parameters=[change.to_parameter_msg()])).results
-    assert not answer.successful
-    assert reason in answer.reason
-
-
-IMPOSSIBLE = [
-    ('legs.cylinder.mass', '-12.0', '-12.0 kg: must be at least 0'),
-    ('legs.piston.mass', '[6.0, 6.0, 6.0, -6.0, 6.0, 6.0]', ''),
-    ('platform.mass', 'heavy', ''),
-    ('legs.piston.inertia', '-0.3', '-0.3 kg m^2: must be at least 0'),
-    ('limits.length_min', '-0.9', '-0.9 m: must be at least 0'),
-    ('limits.length_max', '-1.6', '-1.6 m: must be more than 0'),
-    ('platform.inertia', '[13.0, 20.0, 0.0, 14.0, 0.0, 22.0]', 'must be positive definite'),
-    ('platform.inertia', '[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]', 'must be positive definite'),
-]
-
-
-def test_impossible_legs_and_inertias_are_rejected(domain: int, tmp_path: Path) -> None:
-    given = Parameters.from_yaml(PLATFORM).given
-    for name, value, reason in IMPOSSIBLE:
-        with pytest.raises(ParameterError, match=f'^command line: {name}: .*{re.escape(reason)}'):
-            Parameters({**given, name: yaml.safe_load(value)}, 'command line')
-    for n in (0, -1):
-        name, value, reason = IMPOSSIBLE[n]
-        line = rejected(domain, tmp_path / str(n), '--params-file', PLATFORM, '-p',
-                        f'{name}:={value}')
-        assert line.startswith('stewart_dynamics: ')
-        assert f'{name}: ' in line
-        assert reason in line
-
-
-# Prints why each file is rejected, and the most memory [kB] after the first and after all.
-MEASURED = """\
-import sys
-from stewart_dynamics import ParameterError, Parameters
-for path in sys.argv[1:]:
-    try:
-        Parameters.check_file(path)
-    except ParameterError as exc:
-        print(exc)
-    if path in (sys.argv[1], sys.argv[-1]):
-        print(*(line.split()[1] for line in open('/proc/self/status') if 'VmHWM' in line))
-"""
-
-
-HOSTILE = {
-    'aliases that expand': (
-        'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
-            f'{this}: &{this} [{", ".join([f"*{before}"] * 9)}]\n'
-            for before, this in zip('abcdefgh', 'bcdefghi', strict=True)),
-        'has a YAML alias (*): write the value out'),
-    'an alias of itself': ('/**: &a\n  ros__parameters: *a\n', 'has a YAML alias (*)'),
-    'a tag that calls': (
-        '/**: !!python/object/apply:os.system ["touch called"]\n', 'not YAML: '),
-    'a tag that opens': ('/**: !!python/name:os.system\n', 'not YAML: '),
-    'lists in lists': ('[' * 90_000, ': '),
-    'names in names': ('{a: ' * 20_000, ': '),
-    'dashes': ('- ' * 45_000, ': '),
-    'an integer without an end': (
-        '/**:\n  ros__parameters:\n    platform.mass: ' + '9' * 90_000 + '\n', ': '),
-    'base sixty': ('%YAML 1.1\n---\n/**: 1' + ':1' * 40_000 + '.0\n', ': '),
-}
-
-
-def test_a_hostile_parameter_file_is_rejected_in_little_time_and_memory(
-        domain: int, tmp_path: Path) -> None:
-    files = []
-    for n, (content, _) in enumerate(HOSTILE.values()):
-        files.append(tmp_path / f'{n}.yaml')
-        files[-1].write_text(content, encoding='utf-8')
-    _rejected_in_little_memory(tmp_path, dict(zip(files, (
-        reason for _, reason in HOSTILE.values()), strict=True)))
-    # The node checks the file before ROS reads it.
-    line = rejected(domain, tmp_path / 'node', '--params-file', files[0])
-    assert line.startswith(f'stewart_dynamics: {files[0]}: ')
-    assert next(iter(HOSTILE.values()))[1] in line
-    assert not list(tmp_path.rglob('called'))
-
-
-def test_a_parameter_file_of_100_mb_or_without_an_end_is_rejected(tmp_path: Path) -> None:
-    large, pipe = tmp_path / 'large.yaml', tmp_path / 'pipe'
-    large.touch()
-    os.truncate(large, 100_000_000)
-    os.mkfifo(pipe)
-    _rejected_in_little_memory(tmp_path, {
-        large: 'larger than ', pipe: 'not a regular file',
-        Path('/dev/zero'): 'not a regular file'})
-
-
-def _rejected_in_little_memory(folder: Path, reasons: dict[Path, str]) -> None:
-    """Check that files are rejected for these reasons, with hardly more memory than any other."""
-    file = folder / 'usual.yaml'
-    file.write_text('/**:\n  ros__parameters:\n    mass: 1.0\n', encoding='utf-8')
-    done = subprocess.run([sys.executable, '-c', MEASURED, file, *reasons], cwd=folder,
-                          capture_output=True, text=True, timeout=DEADLINE, check=True)
-    assert done.stderr == ''
-    _, usual, *lines, largest = done.stdout.splitlines()
-    for line, (path, reason) in zip(lines, reasons.items(), strict=True):
-        assert line.startswith(f'{path}: ')
-        assert reason in line
-        assert len(line) < 500
-    assert int(largest) < int(usual) + 50_000
 
 
 # Planned trajectories
@@ -943,7 +616,7 @@ def test_trajectories_for_which_the_queue_is_full_are_rejected(renew: Start) -> 
     planner.fill()
     node.until_reported(
         'planned trajectory', ERROR, 'rejected: queue full: 5 are in work or wait')
-    node.until_status('planned trajectory', OK, 'accepted: 50000 points')
+    node.until_status('planned trajectory', OK, 'accepted: 20000 points')
     node.until(lambda: int(node.values('planned trajectory')['rejected: queue full']) > 0,
                'they are counted')
 
@@ -965,9 +638,16 @@ def test_a_trajectory_in_work_is_dropped_when_the_node_ends(renew: Start) -> Non
     node.until(dropped, 'a trajectory in work is dropped')
     node.until_active()
 
+    outcomes = -1
+
     def answered() -> bool:
-        # Messages still in the middleware may come first and fill the queue.
-        planner.send([HOME, HOME])
+        """Send one more when the last is rejected: messages still under way may fill the queue."""
+        nonlocal outcomes
+        values = node.values('planned trajectory')
+        number = sum(int(values.get(key, 0)) for key in ('accepted', 'rejected'))
+        if number != outcomes:
+            planner.send([HOME, HOME])
+            outcomes = number
         return 'accepted: 2 points' in node.status('planned trajectory').message
 
     node.until(answered, 'the next trajectory is answered')

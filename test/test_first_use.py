@@ -91,25 +91,6 @@ def test_later_functions_are_compiled_while_setpoints_are_answered(
     node.until_counted()
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
-def test_where_parameters_announce_measured_legs_their_code_is_ready_before_active(
-        start: Callable[..., DynamicsNode], kept: Path) -> None:
-    node = start('external_wrench.force_max:=1000.0', STEWART_DYNAMICS_CACHE_DIR=str(kept))
-    node.until_active()
-    said = node.program.stderr
-    assert 0 < said.index(f'compiling {LATER[1]} ') < said.index('dynamics ready after')
-    felt = Felt(node)
-    felt.until_connected()
-
-    def felt_now() -> Any:
-        felt.rest()
-        return felt.raw
-
-    node.until(felt_now, 'the external wrench comes')
-    assert NOT_COMPILED not in node.program.stderr
-
-
 @pytest.mark.skipif(not COMPILED, reason='nothing is compiled here')
 def test_all_that_the_node_may_need_is_compiled_in_advance() -> None:
     compile_all()

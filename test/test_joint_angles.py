@@ -59,7 +59,7 @@ def with_axes(p: Parameters, random: np.random.Generator, **changes: Any) -> Par
 
 # The angles
 
-def test_they_are_the_angles_between_legs_and_given_axes() -> None:
+def test_joint_angles_are_those_between_legs_and_given_axes() -> None:
     random = rng()
     for _ in range(5):
         p = with_axes(random_parameters(random), random)
@@ -85,17 +85,6 @@ def test_by_default_they_are_measured_from_the_legs_at_home() -> None:
         truth = expected(p, motion, legs, legs @ home.rotation)
         for angles, each in zip(platform.joint_angles(motion), truth.swapaxes(0, 1), strict=True):
             np.testing.assert_allclose(angles, each, rtol=0.0, atol=1e-14)
-
-
-def test_one_pose_and_many_give_the_same_bits() -> None:
-    random = rng()
-    p = with_axes(random_parameters(random), random)
-    platform, motion = StewartPlatform(p), random_motion(p, random, 20)
-    many = np.concatenate(platform.joint_angles(motion), axis=1)
-    for n in range(20):
-        one = platform.joint_angles(Pose(motion.position[n], motion.rotation[n]))
-        assert one[0].shape == (6,)
-        assert np.array_equal(np.concatenate(one), many[n])
 
 
 def test_small_angles_keep_their_digits() -> None:
@@ -209,22 +198,6 @@ def test_the_step_reports_angles_above_their_limit_for_one_and_for_many() -> Non
         assert many.exceeding[n] == bool(output.exceedances)
         found += bool(output.exceedances)
     assert 5 < found < 60
-
-
-def test_the_step_gives_the_same_forces_with_limits_of_angles_and_no_angles_without() -> None:
-    motion, _ = moved()
-    setpoints = Batch(np.arange(101), motion.rows, np.zeros((1, 6)), np.zeros(101, dtype=bool),
-                      np.arange(101))
-    without = Step(SYMMETRIC).many(setpoints, None)
-    limited = Step(SYMMETRIC.replaced({BASE_ANGLE_MAX: 0.1})).many(setpoints, None)
-    assert np.array_equal(without.results, limited.results)
-    assert np.array_equal(without.forces, limited.forces)
-    assert without.joint_angles.shape == (101, 0)
-    assert not without.exceeding.any()
-    assert limited.exceeding.any()
-    output = Step(SYMMETRIC)(Setpoint(0, tuple(motion.rows[100].tolist())), None)
-    assert output is not None
-    assert (output.joint_angles, output.exceedances) == ((), ())
 
 
 def swing(points: int, turn: float = 0.4) -> tuple[Array, Motion, Any]:

@@ -20,15 +20,19 @@ from __future__ import annotations
 import importlib.util
 from typing import Any, NamedTuple
 
+from hypothesis import given, settings, strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    derivative, each_relative, energies, friction, moved, random_motion, random_parameters,
-    random_wrench, relative, rng, ROOT)
-
-from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.mechanics.dynamics import lagrange
+    derivative, each_relative, energies, friction, moved, PinocchioReferee, QUARTER_TURN,
+    random_base_motion, random_motion, random_parameters, random_wrench, relative, rng, ROOT,
+    size_of, symmetric_parameters, uncompiled)
+from stewart_dynamics import Motion, MotionError, Parameters, StewartPlatform
+from stewart_dynamics.mechanics.dynamics import forward_dynamics, lagrange
+from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdownRows, SOURCES
+from stewart_dynamics.mechanics.rows import NO_BASE
+from stewart_dynamics.parameters.table import inertia_matrix
 
 Array = NDArray[np.float64]
 
@@ -167,15 +171,6 @@ def test_jacobian_rate_is_the_derivative_of_j_inv(case: Case) -> None:
                          derivative(jacobian_after, 1e-3)) < 1e-9
 
 
-def test_both_coriolis_matrices_of_a_leg_give_the_same_force(case: Case) -> None:
-    at = lagrange.legs(case.parameters, case.motion.position, case.motion.rotation)
-    joint_rates = case.motion.linear_velocity[:, None] + np.cross(
-        case.motion.angular_velocity[:, None], at.arms)
-    papers, christoffel = (np.einsum('nlij,nlj->nli', lagrange.leg_coriolis(
-        case.parameters, at, joint_rates, which), joint_rates) for which in (False, True))
-    assert each_relative(christoffel, papers) < 1e-12
-
-
 def test_a_leg_s_mass_is_its_piston_s_along_it_and_its_turning_inertia_across(
         case: Case) -> None:
     p = case.parameters
@@ -189,12 +184,6 @@ def test_a_leg_s_mass_is_its_piston_s_along_it_and_its_turning_inertia_across(
     across = about_base / at.lengths ** 2
     along = np.broadcast_to(p['legs.piston.mass'], across.shape)
     assert relative(values, np.sort(np.stack([across, across, along], axis=-1), axis=-1)) < 1e-13
-
-
-def test_skew_is_the_cross_product() -> None:
-    random = rng()
-    a, b = random.normal(size=(2, 4, 3))
-    assert np.allclose(times_vector(lagrange.skew(a), b), np.cross(a, b), rtol=0, atol=1e-15)
 
 
 # docs/misprints.md
@@ -231,3 +220,226 @@ def test_every_misprint_with_a_reading_of_its_own_changes_the_forces(misprints: 
     for key in misprints.KEYS:
         median, worst = misprints.effect(p, states, {key})
         assert 0.0 < median < worst
+
+
+# Force breakdown by source: the parts sum to the forces, and each equals its own formula
+
+MANY = 20
+GRAVITY, PLATFORM, LEGS, VELOCITY, FRICTION, WRENCH = range(6)
+
+
+def split(p: Parameters, motion: Motion, wrench: Array) -> Array:
+    """Return the forces by source of a batch."""
+    return ForceBreakdownRows(p)(motion.rows, wrench)
+
+
+def off(value: Array, truth: Array, forces: Array) -> float:
+    """Return the largest error in any sample, by the largest force of any source there."""
+    return float(np.max(np.abs(value - truth).max(axis=1) / np.abs(forces).max(axis=(1, 2))))
+
+
+def solved(p: Parameters, motion: Motion, load: Array) -> Array:
+    """Return the leg forces that hold a load (N, 6): J_inv^-T load."""
+    j_inv = lagrange.inverse_jacobian(lagrange.legs(p, motion.position, motion.rotation))
+    f: Array = np.linalg.solve(np.swapaxes(j_inv, -1, -2), load[..., None])[..., 0]
+    return f
+
+
+def platform_load(p: Parameters, motion: Motion) -> Array:
+    """Return what accelerates the platform alone, no velocities (N, 6): Newton and Euler."""
+    c = motion.rotation @ p['platform.center_of_mass']
+    turn = motion.rotation @ inertia_matrix(p['platform.inertia']) @ np.swapaxes(
+        motion.rotation, -1, -2)
+    alpha = motion.angular_acceleration
+    force = p['platform.mass'] * (motion.linear_acceleration + np.cross(alpha, c))
+    moment = np.einsum('nij,nj->ni', turn, alpha) + np.cross(c, force)
+    return np.concatenate([force, moment], axis=1)
+
+
+@pytest.mark.parametrize('hexapod', range(25))
+def test_each_source_equals_that_of_the_reference_matrices(hexapod: int) -> None:
+    random = rng(hexapod)
+    p = random_parameters(random)
+    motion = random_motion(p, random, MANY)
+    wrench = random_wrench(p, random, MANY)
+    forces = split(p, motion, wrench)
+    x, r, v, w = (motion.position, motion.rotation, motion.linear_velocity,
+                  motion.angular_velocity)
+    twist = np.concatenate([v, w], axis=1)
+    acceleration = motion.rows[:, 18:24]
+    inertia = np.einsum('nij,nj->ni', lagrange.mass_matrix(p, x, r), acceleration)
+    of_platform = platform_load(p, motion)
+    velocity = np.einsum('nij,nj->ni', lagrange.coriolis_matrix(p, x, r, v, w), twist)
+    rates = np.einsum('nij,nj->ni', lagrange.inverse_jacobian(lagrange.legs(p, x, r)), twist)
+    truths = {
+        GRAVITY: solved(p, motion, lagrange.gravity_vector(p, x, r)),
+        PLATFORM: solved(p, motion, of_platform),
+        LEGS: solved(p, motion, inertia - of_platform),
+        VELOCITY: solved(p, motion, velocity), FRICTION: friction(p, rates),
+        WRENCH: -solved(p, motion, wrench)}
+    for source, truth in truths.items():
+        assert np.abs(truth).max() > 1.0, SOURCES[source]
+        assert off(forces[:, source], truth, forces) < 1e-11, SOURCES[source]
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(st.integers(0, 10 ** 6), st.integers(1, 100), st.booleans())
+def test_the_breakdown_sum_to_the_force(seed: int, many: int, loaded: bool) -> None:
+    random = rng(seed)
+    p = random_parameters(random)
+    motion = random_motion(p, random, many)
+    wrench = random_wrench(p, random, many) if loaded else np.zeros((many, 6))
+    forces = split(p, motion, wrench)
+    assert forces.shape == (many, len(SOURCES), 6)
+    whole = StewartPlatform(p).inverse_dynamics(motion, wrench).forces
+    assert off(forces.sum(axis=1), whole, forces) < 1e-12
+
+
+def test_many_are_split_as_each_alone() -> None:
+    random = rng()
+    p = random_parameters(random)
+    motion = random_motion(p, random, 2500)
+    wrench = random_wrench(p, random, 2500)
+    forces = split(p, motion, wrench)
+    breakdown = ForceBreakdownRows(p)
+    for n in (0, 1023, 1024, 1025, 2499):
+        alone = breakdown(motion.rows[n:n + 1], wrench[n:n + 1])
+        np.testing.assert_array_equal(forces[n], alone[0])
+    same = np.repeat(wrench[:1], 2500, axis=0)
+    np.testing.assert_array_equal(split(p, motion, wrench[:1]), split(p, motion, same))
+
+
+def near_a_singularity(turn: float, p: Parameters) -> Motion:
+    """Return the symmetric hexapod turned towards a quarter, where J_inv cannot be solved."""
+    c, s = np.cos(turn), np.sin(turn)
+    return Motion([[0.0, 0.0, size_of(p)]], [[[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]],
+                  [[0.1, 0.2, 0.3]], [[0.1, 0.2, 0.3]], [[1.0, 2.0, 3.0]], [[1.0, 2.0, 3.0]])
+
+
+def test_a_singular_sample_has_no_force_breakdown() -> None:
+    p = symmetric_parameters()
+    rows = np.concatenate([near_a_singularity(0.1, p).rows, near_a_singularity(0.2, p).rows])
+    rows[1, 3:12] = QUARTER_TURN.ravel()
+    forces = ForceBreakdownRows(p)(rows, np.ones((2, 6)))
+    assert np.isfinite(forces[0]).all()
+    assert np.isnan(forces[1]).all()
+
+
+def test_absent_sources_have_no_force() -> None:
+    random = rng()
+    p = random_parameters(random)
+    still = Motion([[0.0, 0.0, size_of(p)]], np.eye(3))
+    forces = split(p, still, np.zeros((1, 6)))
+    assert np.abs(forces[0, GRAVITY]).min() > 0.0
+    assert not forces[0, 1:].any()
+    motion = random_motion(p, random, MANY)
+    hexapod = p.replaced({'gravity': [0.0, 0.0, 0.0], 'actuator.viscous_friction': 0.0,
+                          'actuator.coulomb_friction': 0.0, 'actuator.reflected_mass': 0.0,
+                          **{f'legs.{part}.{what}': 0.0 for part in ('cylinder', 'piston')
+                             for what in ('mass', 'inertia')}})
+    forces = split(hexapod, motion, np.zeros((MANY, 6)))
+    assert not forces[:, [GRAVITY, FRICTION, WRENCH]].any()
+    assert np.abs(forces[:, LEGS]).max() < 1e-12 * np.abs(forces[:, PLATFORM]).max()
+
+
+# Forward dynamics: identities with the inverse dynamics, and independent physics
+
+SAMPLES = 20
+STILL = np.array([NO_BASE])
+
+
+def accelerations(motion: Motion) -> Any:
+    """Return linear and angular accelerations, six numbers a sample."""
+    return np.concatenate([motion.linear_acceleration, motion.angular_acceleration], axis=-1)
+
+
+@pytest.mark.parametrize('seed', range(50))
+def test_the_forces_of_a_motion_give_its_accelerations_back(seed: int) -> None:
+    random = rng(seed)
+    p = random_parameters(random)
+    platform = StewartPlatform(p)
+    motion, wrench = random_motion(p, random, SAMPLES), random_wrench(p, random, SAMPLES)
+    forces = platform.inverse_dynamics(motion, wrench).forces
+    back = platform.forward_dynamics(motion, forces, wrench)
+    assert each_relative(accelerations(back), accelerations(motion)) < 1e-12
+    assert np.array_equal(back.rows[:, :18], motion.rows[:, :18])
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_pinocchios_forces_give_the_accelerations(seed: int) -> None:
+    pytest.importorskip('pinocchio')
+    random = rng(seed)
+    p = random_parameters(random)
+    referee = PinocchioReferee(p, random)
+    motion, wrench = random_motion(p, random, 5), random_wrench(p, random, 5)
+    forces = [referee.forces(Motion(*parts), load) for *parts, load in zip(
+        motion.position, motion.rotation, motion.linear_velocity, motion.angular_velocity,
+        motion.linear_acceleration, motion.angular_acceleration, wrench, strict=True)]
+    back = StewartPlatform(p).forward_dynamics(motion, forces, wrench)
+    assert each_relative(accelerations(back), accelerations(motion)) < 1e-11
+
+
+def test_a_singular_pose_has_accelerations() -> None:
+    p = random_parameters(rng())
+    platform = StewartPlatform(p.replaced({'geometry.platform_joints': (
+        0.5 * p['geometry.base_joints']).ravel()}))  # parallel legs: no forces hold a turn
+    motion = Motion([0.0, 0.0, 1.0], np.eye(3), [0.1, 0.2, 0.3], [0.1, 0.2, 0.3])
+    assert np.all(np.isfinite(accelerations(platform.forward_dynamics(motion, np.ones(6)))))
+
+
+def test_any_leading_shape_gives_the_same_samples() -> None:
+    p = random_parameters(rng())
+    platform = StewartPlatform(p)
+    motion = random_motion(p, rng(), 12)
+    forces, wrench = np.arange(12.0 * 6).reshape(12, 6), random_wrench(p, rng(), 12)
+    truth = platform.forward_dynamics(motion, forces, wrench).rows
+    shaped = Motion(*(part.reshape(3, 4, *part.shape[1:]) for part in (
+        motion.position, motion.rotation, motion.linear_velocity, motion.angular_velocity)))
+    found = platform.forward_dynamics(shaped, forces.reshape(3, 4, 6), wrench.reshape(3, 4, 6))
+    assert np.array_equal(found.rows.reshape(12, -1), truth)
+    one = Motion(motion.position[5], motion.rotation[5], motion.linear_velocity[5],
+                 motion.angular_velocity[5])
+    assert np.array_equal(platform.forward_dynamics(one, forces[5], wrench[5]).rows, truth[5])
+    assert platform.forward_dynamics(one, forces).shape == (12,)
+    assert platform.forward_dynamics(motion, forces[0], wrench[0]).shape == (12,)
+
+
+def test_a_large_batch_on_many_threads_is_its_samples_bit_for_bit() -> None:
+    p = random_parameters(rng())
+    platform = StewartPlatform(p)
+    motion = random_motion(p, rng(), 20_000)
+    forces = rng().uniform(-1000.0, 1000.0, (20_000, 6))
+    rows = motion.rows.copy()
+    forward_dynamics.solve(
+        platform.constants, rows, forces, np.zeros((1, 6)), STILL,
+        np.empty(forward_dynamics.WORK))
+    assert np.array_equal(platform.forward_dynamics(motion, forces).rows, rows)
+
+
+@pytest.mark.parametrize(('forces', 'wrench', 'text'), [
+    (np.zeros(5), None, 'forces: shape (5,): must end in (6,)'),
+    ([np.nan] * 6, None, 'forces[0]: nan: must be finite'),
+    (np.zeros((4, 6)), None, 'motion (3,), forces (4,)'),
+    (np.zeros(6), np.zeros(5), 'wrench: shape (5,)'),
+    ([1e308] * 6, None, 'overflow')])
+def test_arguments_of_wrong_shape_are_rejected(forces: Any, wrench: Any, text: str) -> None:
+    p = random_parameters(rng())
+    with pytest.raises(MotionError) as error:
+        StewartPlatform(p).forward_dynamics(random_motion(p, rng(), 3), forces, wrench)
+    assert text in str(error.value)
+
+
+def test_uncompiled_results_are_the_compiled_ones_bit_for_bit() -> None:
+    p = random_parameters(rng())
+    rows, forces = random_motion(p, rng(), 10).rows, np.arange(60.0).reshape(10, 6)
+    hexapod, wrench = StewartPlatform(p).constants, random_wrench(p, rng(), 10)
+    base = random_base_motion(p, rng(), 10).rows
+    base[::3] = np.nan
+    given = {'hexapod': hexapod, 'rows': rows.copy(), 'forces': forces, 'wrench': wrench,
+             'base': base, 'work': np.empty(forward_dynamics.WORK)}
+    plain = uncompiled(
+        'from stewart_dynamics.mechanics.dynamics.forward_dynamics import solve\n'
+        "solve(given['hexapod'], given['rows'], given['forces'], given['wrench'],\n"
+        "      given['base'], given['work'])\n", given)
+    forward_dynamics.solve(hexapod, rows, forces, wrench, base, np.empty(forward_dynamics.WORK))
+    assert np.array_equal(plain['rows'], rows)

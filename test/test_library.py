@@ -42,7 +42,7 @@ def test_all_names_resolve_and_are_listed() -> None:
         from stewart_dynamics import Nothing  # noqa: F401
 
 
-def test_what_type_checkers_see_is_what_is_resolved() -> None:
+def test_type_checkers_see_the_names_that_are_resolved() -> None:
     tree = ast.parse(Path(stewart_dynamics.__file__).read_text(encoding='utf-8'))
     seen = {alias.name: node.module for node in ast.walk(tree)
             if isinstance(node, ast.ImportFrom) and node.module

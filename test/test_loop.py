@@ -24,7 +24,6 @@ from pathlib import Path
 import re
 import signal
 import sys
-import time
 from types import ModuleType
 from typing import Any
 
@@ -87,14 +86,6 @@ def test_the_same_run_gives_the_same_bits(run: Callable[..., Any]) -> None:
         assert one.tobytes() == other.tobytes()
 
 
-def test_a_program_that_does_not_start_ends_the_demo_with_its_output(
-        run: Callable[..., Any], demo: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(demo.PROGRAMS, 'leg_controller', [
-        sys.executable, '-c', 'raise SystemExit("no legs here")'])
-    with pytest.raises(demo.Failure, match='leg_controller ended with exit code 1: no legs here'):
-        run(True, 1.0, number=1)
-
-
 @pytest.mark.slow
 def test_a_program_that_ends_early_ends_the_demo(domain: int, tmp_path: Path) -> None:
     program = Program([sys.executable, ROOT / 'demo' / 'loop.py', '--seconds', '1000.0',
@@ -119,20 +110,6 @@ def test_a_program_that_ends_early_ends_the_demo(domain: int, tmp_path: Path) ->
     assert not list((tmp_path / 'looped').iterdir())
 
 
-def test_without_a_terminal_a_line_for_each_stage_has_its_expected_time(
-        demo: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-        ) -> None:
-    clock = [0.0]
-    monkeypatch.setattr(time, 'monotonic', lambda: clock[0])
-    with demo.Progress(30.0) as progress:
-        progress.stage('first', 10.0)
-        progress.reached(10 ** 10)
-        clock[0] = 50.0
-        progress.stage('second', 20.0)
-    assert capsys.readouterr().out == (
-        'first: 10 s of motion, about 25 s\nsecond: 20 s of motion, about 100 s\n')
-
-
 def _children(pid: int) -> list[int]:
     """Return the processes that one has started."""
     return [int(child) for child in
@@ -144,7 +121,7 @@ def _children(pid: int) -> list[int]:
     ('--motion', ROOT / 'config' / 'trajectory_sine.yaml', 'must begin at rest'),
     ('--seconds', '-1.0', 'motion.duration: -1.0'),
     ('--bandwidth', '0.0', 'bandwidth')])
-def test_what_cannot_be_run_is_reported_in_one_line(
+def test_a_run_with_bad_options_is_rejected_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
         value: str | Path, said: str) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):

@@ -457,19 +457,6 @@ def test_no_answer_is_drawn_twice_at_whatever_rate(fresh: Start) -> None:
     assert len(seen) > 50
 
 
-def test_markers_are_published_no_more_often_than_the_rate(fresh: Start) -> None:
-    node = fresh('visualization_rate:=0.001')
-    node.until_active()
-    _look(node)
-    # The first answer is due, and the next one in 1000 s, with or without subscribers.
-    for _ in range(100):
-        node.answer()
-    seen = _look(node)
-    for _ in range(100):
-        node.answer()
-    assert len(seen) <= 1
-
-
 def test_without_a_rate_there_is_no_such_topic(fresh: Start) -> None:
     node = fresh('visualization_rate:=0.0')
     node.until_active()
@@ -489,12 +476,6 @@ def test_a_later_subscriber_gets_no_earlier_markers(fresh: Start) -> None:
     assert node.state == 'active'
     seen = _seen(node)
     assert before not in _stamps(seen)
-
-
-def test_the_rate_changes_only_while_unconfigured(node: DynamicsNode) -> None:
-    result = node.set_parameters(visualization_rate=10.0)
-    assert not result.successful
-    assert 'only changed while the node is unconfigured' in result.reason
 
 
 def test_a_payload_and_thresholds_change_the_markers_while_active(node: DynamicsNode) -> None:

@@ -26,9 +26,9 @@ import numpy as np
 import pytest
 from referees import ROOT
 from stewart_dynamics import (
-    MotionError, ParameterError, Parameters, Pose, PoseError, StewartError, StewartPlatform)
+    MotionError, ParameterError, Parameters, PoseError, StewartError)
 from stewart_dynamics.parameters.table import PARAMETERS
-from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_document, read_yaml
+from stewart_dynamics.parameters.yaml_file import flat, other_nodes, read_yaml
 from stewart_dynamics.reference_motion.parameters import ReferenceMotionParameters
 from stewart_dynamics.simulator.parameters import SimulatorParameters
 import yaml
@@ -107,11 +107,6 @@ def test_one_value_holds_for_all_legs(tmp_path: Path) -> None:
     assert np.array_equal(in_brackets['legs.cylinder.mass'], np.full(6, 12.0))
 
 
-def test_a_number_without_a_point_but_with_an_exponent_is_a_double(tmp_path: Path) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD))
-    assert np.array_equal(p['legs.piston.inertia'], np.full(6, 1e-3))
-
-
 def test_arrays_are_read_only(tmp_path: Path) -> None:
     p = Parameters.from_yaml(written(tmp_path, GOOD))
     arrays = [value for value in p.values() if isinstance(value, np.ndarray)]
@@ -151,12 +146,6 @@ def test_replaced_geometry_takes_its_own_characteristic_length(tmp_path: Path) -
         2.0 * p['singularity.characteristic_length'], rel=1e-15)
 
 
-@pytest.mark.parametrize('section', ['stewart_dynamics', '/stewart_dynamics', '/**'])
-def test_the_section_may_be_the_node_s(tmp_path: Path, section: str) -> None:
-    p = Parameters.from_yaml(written(tmp_path, GOOD.replace('/**', section)))
-    assert p['platform.mass'] == 150.0
-
-
 def test_a_later_section_overrides_an_earlier_one_and_other_nodes_are_ignored(
         tmp_path: Path) -> None:
     later = """\
@@ -166,23 +155,6 @@ other_node:
   ros__parameters: {platform: {mass: 170.0}, anything: 1}
 """
     assert Parameters.from_yaml(written(tmp_path, GOOD + later))['platform.mass'] == 160.0
-
-
-def test_names_may_be_dotted_in_the_file(tmp_path: Path) -> None:
-    text = GOOD + '    singularity.warn_time: 0.25\n'
-    assert Parameters.from_yaml(written(tmp_path, text))['singularity.warn_time'] == 0.25
-
-
-@pytest.mark.parametrize('file', sorted(path.name for path in (ROOT / 'config').glob('*.yaml')))
-def test_the_package_s_own_files_hold_sections_that_can_be_read(file: str) -> None:
-    document = read_document(ROOT / 'config' / file)
-    assert all('ros__parameters' in content for content in document.values())
-
-
-def test_the_hexapod_of_the_package_can_be_computed() -> None:
-    platform = StewartPlatform.from_yaml(ROOT / 'config' / 'platform.yaml')
-    lengths = platform.inverse_kinematics(Pose([0.0, 0.0, 1.0], np.eye(3)))
-    assert np.all(lengths > 0.0)
 
 
 # Invalid files: the line that is changed, its new text, and the words of the error

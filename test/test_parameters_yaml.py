@@ -119,7 +119,7 @@ def test_a_document_of_any_form_is_read(tmp_path: Path) -> None:
         'a': [{'b': 1, 'c': [['x'], {'y': 2.0}]}, ['d']], '1': {}, '2.0': []}
 
 
-def test_what_launch_writes_is_read(tmp_path: Path) -> None:
+def test_files_written_by_launch_are_read(tmp_path: Path) -> None:
     # launch_ros: yaml.dump, with tuples for the lists in ``parameters=[{...}]``.
     given = {'/**': {'ros__parameters': {
         'limits.force_max': (1000.0, 1e-5, -0.0), 'joints': ('a', 'true', '1e3', '2.0'),

@@ -16,21 +16,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 import math
 from typing import Any
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 import messages
 import numpy as np
 import pytest
-from referees import rng
+from referees import rng, ROOT
 from scipy.spatial.transform import Rotation
 from stewart_dynamics import (
     BaseMotion, check_planned_trajectory, Motion, MotionError, Parameters, StewartPlatform)
 from stewart_dynamics.arrays import NO_WRENCH, Six
+from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.mechanics import batch
+from stewart_dynamics.node.diagnostics.dynamics import DynamicsDiagnostics
+from stewart_dynamics.node.diagnostics.outcomes import PlannedTrajectoryDiagnostics
+from stewart_dynamics.node.diagnostics.periodic_report import ERROR, LogLine, OK, WARN
+from stewart_dynamics.node.tasks import LENGTH, TaskQueue
 from stewart_dynamics.planned import messages as planned, trajectory as planned_trajectory
 from stewart_dynamics.planned.messages import PlannedOutcome
 from stewart_dynamics.planned.trajectory import NOT_INCREASING, PIECE, TOO_FAR
@@ -351,7 +356,7 @@ def test_bad_input_is_rejected_with_its_reason(case: str, names: tuple[str, ...]
     assert '\n' not in outcome.message
 
 
-def test_of_too_many_points_none_is_read() -> None:
+def test_too_many_points_are_rejected_unread() -> None:
     _, rows = some(1)
     one = messages.trajectory(STAMP, [1], rows)
     at = one.index(b'platform\0') + 12
@@ -400,3 +405,130 @@ def test_any_numbers_are_accepted_or_rejected(points: list[tuple[int, list[float
     times = np.cumsum([time for time, _ in points]).tolist()
     rows = [(*numbers[:3], *HOME[3:], *numbers[3:]) for _, numbers in points]
     outcome_of(messages.trajectory(STAMP, times, rows))
+
+
+# Planned trajectories are worked on one after the other, a piece at each tick of the timer
+
+class Timed:
+    """A queue, its timer, and the outcomes of the trajectories."""
+
+    def __init__(self) -> None:
+        self.running = False
+        self.pieces: list[str] = []
+        self.done: list[tuple[str, float]] = []
+        self.queue = TaskQueue(
+            self._start, Preparation(),
+            lambda outcome, came: self.done.append((outcome.message, came)))
+
+    def _start(self) -> None:
+        self.running = True
+
+    def tick(self) -> None:
+        """Tick, as the timer does once after each start."""
+        self.running = False
+        self.queue.tick()
+
+    def work(self, name: str, pieces: int = 2) -> Iterator[PlannedOutcome | None]:
+        """Yield None after each piece, and the outcome at the end."""
+        for _ in range(pieces):
+            self.pieces.append(name)
+            yield None
+        yield PlannedOutcome(name)
+
+
+def test_each_tick_is_one_piece_and_the_timer_runs_while_there_is_work() -> None:
+    timed = Timed()
+    assert not timed.running
+    timed.queue.add(timed.work('first'), 1.0)
+    timed.queue.add(timed.work('second', pieces=1), 2.0)
+    for pieces, done in ((['first'], []), (['first'] * 2, []),
+                         (['first'] * 2, [('first', 1.0)]),
+                         (['first', 'first', 'second'], [('first', 1.0)])):
+        assert timed.running
+        timed.tick()
+        assert timed.pieces == pieces
+        assert timed.done == done
+    timed.tick()
+    assert timed.done == [('first', 1.0), ('second', 2.0)]
+    assert not timed.running
+
+
+def test_the_queue_counts_trajectories_in_work_and_waiting() -> None:
+    timed = Timed()
+    for n in range(LENGTH):
+        assert not timed.queue.full
+        timed.queue.add(timed.work(str(n), pieces=0), 0.0)
+    assert timed.queue.full
+    timed.tick()
+    assert not timed.queue.full
+
+
+def test_dropped_trajectories_are_counted_and_not_continued() -> None:
+    timed = Timed()
+    assert timed.queue.drop() == 0
+    for name in ('first', 'second'):
+        timed.queue.add(timed.work(name), 0.0)
+    timed.tick()
+    assert timed.queue.drop() == 2
+    timed.tick()  # the timer may be due already
+    assert timed.pieces == ['first']
+    assert not timed.done
+    assert not timed.running
+
+
+# The status of planned trajectories, within the node's diagnostics
+
+PLATFORM = ROOT / 'config' / 'platform.yaml'
+BEGIN = 100.0
+ACCEPTED = PlannedOutcome('accepted: 2 points', answer=b'1')
+REJECTED = PlannedOutcome('rejected: x', 'why', values=(('points', '3'),))
+
+
+def test_planned_trajectories_have_a_status_once_there_was_one() -> None:
+    diagnostics = DynamicsDiagnostics(Parameters.from_yaml(PLATFORM), ['setpoint/pose'], (), BEGIN)
+    report, planned = diagnostics.report, diagnostics.planned_trajectory
+    assert [each.name for each in report.make(BEGIN)[0]][-1] == 'timing'
+    planned.done(ACCEPTED, 0.25)
+    assert report.make(BEGIN)[0][-1] == ('planned trajectory', OK, 'accepted: 2 points', (
+        ('accepted', '1'), ('rejected', '0'), ('time it took (s)', '0.250')))
+    assert not report.level_changed(BEGIN)
+    planned.done(REJECTED, 0.1)
+    assert report.level_changed(BEGIN)
+    # It lasts until the next.
+    for now in (BEGIN, BEGIN + 100.0):
+        status = report.make(now)[0][-1]
+        assert status.name == 'planned trajectory'
+        assert status.level == ERROR
+        assert dict(status.values) == {
+            'accepted': '1', 'rejected': '1', 'rejected: why': '1', 'points': '3',
+            'time it took (s)': '0.100'}
+    planned.done(ACCEPTED._replace(warning=True), 0.1)
+    assert report.make(BEGIN)[0][-1].level == WARN
+
+
+def test_outcomes_that_took_long_are_logged() -> None:
+    planned = PlannedTrajectoryDiagnostics()
+    for outcome, seconds in ((ACCEPTED, 1.9), (ACCEPTED, 2.14), (ACCEPTED, 3.0), (REJECTED, 4.0)):
+        planned.done(outcome, seconds)
+    assert planned.log_lines(BEGIN) == [
+        LogLine(OK, 'planned trajectory: accepted: 2 points (took 2.1 s)'),
+        LogLine(OK, 'planned trajectory: accepted: 2 points (took 3.0 s)'),
+        LogLine(ERROR, 'planned trajectory rejected: x (took 4.0 s)', 'why')]
+
+
+def test_each_rejection_is_logged_and_of_other_outcomes_the_changes() -> None:
+    planned = DynamicsDiagnostics(
+        Parameters.from_yaml(PLATFORM), ['setpoint/pose'], (), BEGIN).planned_trajectory
+    planned.done(ACCEPTED, 0.1)
+    assert planned.log_lines(BEGIN) == []
+    for _ in range(2):
+        planned.done(REJECTED, 0.1)
+    assert planned.log_lines(BEGIN) == 2 * [
+        LogLine(ERROR, 'planned trajectory rejected: x', 'why')]
+    assert planned.log_lines(BEGIN) == []
+    for outcome in (ACCEPTED, ACCEPTED, ACCEPTED._replace(warning=True), REJECTED):
+        planned.done(outcome, 0.1)
+    assert planned.log_lines(BEGIN) == [
+        LogLine(OK, 'planned trajectory: accepted: 2 points'),
+        LogLine(WARN, 'planned trajectory: accepted: 2 points'),
+        LogLine(ERROR, 'planned trajectory rejected: x', 'why')]

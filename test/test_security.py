@@ -49,7 +49,6 @@ from running import (  # noqa: E402
 
 from stewart_dynamics.errors import StewartError  # noqa: E402
 from stewart_dynamics.ros.security import check_environment, PROFILES  # noqa: E402
-from stewart_dynamics.simulator import messages as simulator_messages  # noqa: E402
 
 SECURITY = ROOT / 'security'
 ONE_HOST = SECURITY / 'one_host.xml'
@@ -157,60 +156,39 @@ def test_the_policy_is_what_the_node_does(start: Start, fresh: Start) -> None:
     assert {f'{NODE}/{topic}' for topic in INPUTS} < union['subscribe']
 
 
-def test_the_policy_is_what_the_source_does(domain: int, tmp_path: Path) -> None:
-    """The same for stewart_trajectory, with both of its outputs and simulated time."""
+@pytest.mark.parametrize(('name', 'files', 'runs'), [
+    # Parameters of each run, and the number of topics that the program publishes then.
+    ('stewart_trajectory', ['trajectory_hold.yaml'], [
+        (['output:=separate', 'start_timeout:=1000.0'], 5),
+        (['output:=combined', 'start_timeout:=1000.0', 'use_sim_time:=true'], 3)]),
+    ('stewart_simulator', ['platform.yaml', 'simulator.yaml'], [
+        (['use_sim_time:=false'], 6), (['use_sim_time:=true'], 7)])])
+def test_the_policy_is_what_the_other_programs_do(
+        domain: int, tmp_path: Path, name: str, files: list[str],
+        runs: list[tuple[list[str], int]]) -> None:
     peer = Peer(domain)
     union: dict[str, set[str]] = {}
-    name = 'stewart_trajectory'
-    for number, arguments in enumerate([('output:=separate',),
-                                        ('output:=combined', 'use_sim_time:=true')]):
+    for number, (overrides, topics) in enumerate(runs):
         program = Program(
-            [executable(name), '--ros-args', '--params-file',
-             ROOT / 'config' / 'trajectory_hold.yaml', '-p', 'start_timeout:=1000.0',
-             *(part for argument in arguments for part in ('-p', argument))],
+            [executable(name), '--ros-args',
+             *(part for file in files for part in ('--params-file', ROOT / 'config' / file)),
+             *(part for each in overrides for part in ('-p', each))],
             domain, tmp_path / str(number))
         peer.watched = program
         try:
-            # They are created last: the services exist long before.
-            peer.until(lambda number=number: any('/setpoint/' in topic for topic in done_beside(
-                peer).get('publish', ())) and len(done_beside(peer)['publish'])
-                == (5, 3)[number], 'its topics are known')
-            for right, names in done_beside(peer).items():
-                union.setdefault(right, set()).update(names)
-        finally:
-            peer.watched = None
-            program.stop()
-        peer.until(lambda: not done_beside(peer), 'the source has gone')
-    peer.close()
-    assert union == granted('/stewart_trajectory')
-
-
-def test_the_policy_is_what_the_simulator_does(domain: int, tmp_path: Path) -> None:
-    """The same for stewart_simulator, in real time and step by step."""
-    peer = Peer(domain)
-    union: dict[str, set[str]] = {}
-    name = 'stewart_simulator'
-    for number, stepped in enumerate(('false', 'true')):
-        program = Program(
-            [executable(name), '--ros-args', '--params-file', PLATFORM, '--params-file',
-             ROOT / 'config' / 'simulator.yaml', '-p', f'use_sim_time:={stepped}'],
-            domain, tmp_path / str(number))
-        peer.watched = program
-        try:
-            # They are created last: a subscription, and /clock where it has one.
-            peer.until(lambda number=number: f'/{name}/wrench' in done_beside(peer).get(
-                'subscribe', ()) and len(done_beside(peer)['publish']) == (6, 7)[number],
+            # The simulator's subscription to wrenches is created last, and /clock.
+            peer.until(lambda topics=topics: len(done_beside(peer).get(
+                'publish', ())) == topics and (name == 'stewart_trajectory' or (
+                    f'/{name}/wrench' in done_beside(peer).get('subscribe', ()))),
                 'its topics are known')
             for right, names in done_beside(peer).items():
                 union.setdefault(right, set()).update(names)
         finally:
             peer.watched = None
             program.stop()
-        peer.until(lambda: not done_beside(peer), 'the simulator has gone')
+        peer.until(lambda: not done_beside(peer), 'the program has gone')
     peer.close()
-    assert union == granted('/stewart_simulator')
-    assert {f'/{name}/{topic}' for topic in simulator_messages.OUTPUT_TYPES} < union['publish']
-    assert {f'/{name}/{topic}' for topic in simulator_messages.INPUT_TYPES} < union['subscribe']
+    assert union == granted(f'/{name}')
 
 
 # Programs do not start with less security than requested
@@ -311,8 +289,8 @@ def test_a_sound_environment_is_let_be(environment: Callable[..., None],
     ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, 'set it to SYSTEM_DEFAULT'),
     ({'ROS_LOCALHOST_ONLY': '1'}, 'and ROS_LOCALHOST_ONLY not at all'),
 ])
-def test_what_would_be_open_is_rejected(environment: Callable[..., None], tmp_path: Path,
-                                        changes: dict[str, str], text: str) -> None:
+def test_an_open_environment_is_rejected(environment: Callable[..., None], tmp_path: Path,
+                                         changes: dict[str, str], text: str) -> None:
     """Each is a mistake that ROS or Fast DDS ignores, which leaves the program open to others."""
     environment(**KEYSTORE, **TLS)
     check_environment(['--enclave', '/mine'])
@@ -646,7 +624,7 @@ def test_tls(crowd: Crowd, keys: Callable[..., Path]) -> None:
 
 
 @pytest.mark.slow
-def test_what_lets_intruders_in(crowd: Crowd, keys: Callable[..., Path]) -> None:
+def test_intruders_enter_without_each_protection(crowd: Crowd, keys: Callable[..., Path]) -> None:
     """
     The same intruders succeed where just that is missing which is to keep each of them out.
 
@@ -715,8 +693,8 @@ def test_keys_are_private_and_never_overwritten(keys: Callable[..., Path]) -> No
     (['node=127.0.0.1:7001'], 'node: given twice, or ca or node, which are created in any case'),
     (['a=127.0.0.1:7001', 'a=127.0.0.1:7002'], 'a: given twice'),
 ])
-def test_what_no_keys_can_be_made_for_is_said(tmp_path: Path, peers: list[str],
-                                              text: str) -> None:
+def test_invalid_peers_of_make_keys_are_rejected(tmp_path: Path, peers: list[str],
+                                                 text: str) -> None:
     """The error is one line, and no file is left."""
     done = subprocess.run([SECURITY / 'make_keys.sh', tmp_path / 'keys', *peers], check=False,
                           capture_output=True, text=True)

@@ -77,14 +77,6 @@ def test_base_terms_cut_the_error(run: Callable[..., Any], name: str, times: flo
         assert 0.0 < times * forward.errors.rms[series] < without.errors.rms[series], series
 
 
-@pytest.mark.parametrize('name', ['PD + forces, base motion', 'PD + forces, IMU'])
-@pytest.mark.slow
-def test_the_same_run_gives_the_same_bits(run: Callable[..., Any], name: str) -> None:
-    first, second = (run(name, number) for number in (0, 1))
-    for one, other in zip(first.errors, second.errors, strict=True):
-        assert one.tobytes() == other.tobytes()
-
-
 def test_setpoints_are_the_inverse_of_the_base_motion(demo: ModuleType) -> None:
     """The platform is at rest in the world; the derivatives are those of the pose."""
     ship = demo.Ship(PLATFORM, ROOT / 'config' / 'ship.yaml', 10.0)
@@ -116,7 +108,7 @@ def test_a_platform_that_is_turned_in_the_world_stays_so(demo: ModuleType) -> No
     ('--params', 'nowhere.yaml', 'nowhere.yaml'),
     ('--ship', 'large', 'the legs would exceed limits.'),
     ('--ship', 'nowhere.yaml', 'nowhere.yaml')])
-def test_what_cannot_be_run_is_reported_in_one_line(
+def test_a_run_with_bad_options_is_rejected_in_one_line(
         demo: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str,
         value: str, said: str) -> None:
     for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_DOMAIN_ID'):

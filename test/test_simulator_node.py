@@ -61,7 +61,6 @@ TYPES: dict[str, Any] = {
     'leg_states': JointState, 'pose': PoseStamped, 'twist': TwistStamped, 'accel': AccelStamped}
 GIVEN = {**read_yaml(PLATFORM, 'stewart_simulator'), **read_yaml(FILE, 'stewart_simulator')}
 NO_LOAD = (0.0,) * 6
-UNLIMITED = ('limits.length_min', 'limits.length_max', 'limits.velocity_max', 'limits.force_max')
 SPECIAL = (math.nan, math.inf, -math.inf)
 
 
@@ -69,19 +68,7 @@ class Simulator:
     """
     The simulator, and a peer that commands it and keeps its states.
 
-    Parameters
-    ----------
-    domain : int
-        Its ROS domain.
-    folder : Path
-        Gets its output.
-    overrides : str
-        Parameters on the command line, ``name:=value``.
-    files : sequence of Path
-        Its parameter files; by default those of config/.
-    inside : bool, optional
-        Whether it is to be in this process, and not in one of its own.
-
+    It has the parameter files of config/ by default, and is ``inside`` this process or in its own.
     """
 
     def __init__(self, domain: int, folder: Path, *overrides: str, files: Sequence[Path] = (),
@@ -380,51 +367,29 @@ def test_when_commands_stop_the_brakes_engage_until_the_next(begin: Start) -> No
     assert len(simulator.said('INFO', 'a command came: brakes released')) == 1
 
 
-def test_a_load_moves_it(begin: Start) -> None:
-    simulator = begin()
-    simulator.command(holding())
-    simulator.load((0.0, 0.0, 400.0, 0.0, 0.0, 0.0))
-    simulator.until(lambda: simulator.last('pose').pose.position.z > 1.15, 'it rises')
-    simulator.load((0.0, 0.0, -2000.0, 0.0, 0.0, 0.0))
-    simulator.until(lambda: simulator.last('pose').pose.position.z < 1.1, 'it sinks')
-
-
 # Faults: see docs/faults.md
 
-@pytest.mark.parametrize('mode', ['real time', 'stepped'])
-def test_bad_commands_are_rejected_and_the_last_holds(begin: Start, mode: str) -> None:
-    simulator = begin(*([STEPPED] if mode == 'stepped' else []))
+def test_bad_commands_are_rejected_and_the_last_holds(begin: Start) -> None:
+    simulator = begin(STEPPED)
     good = holding()
-    if mode == 'stepped':
-        simulator.step(good)
-    else:
-        simulator.command(good)
-        simulator.until(lambda: simulator.last().effort[0] == good[0], 'it is heard')
-    for n in range(6):
-        for special in SPECIAL:
-            simulator.command([*good[:n], special, *good[n + 1:]])
-    for many in (0, 1, 5, 7, 100):
+    simulator.step(good)
+    for special in SPECIAL:
+        simulator.command([*good[:5], special])
+    for many in (0, 5, 7):
         simulator.command([1.0] * many)
     simulator.command(b'\0\1\0\0\0')
-    simulator.command(b'\0\7\0\0' + bytes(68))
     for reason in ('not finite: (', 'not six numbers: 0 numbers', 'malformed: '):
         simulator.until_said('WARN', f'commands rejected: {reason}')
-    before = stamp_of(simulator.raw['leg_states'][-1])
-    if mode == 'stepped':
-        # Time stood; the next is one period.
-        assert simulator.step(good) == FIRST + 2 * PERIOD
-    else:
-        simulator.until(lambda: stamp_of(simulator.raw['leg_states'][-1]) > before, 'it goes on')
+    # Time stood; the next is one period.
+    assert simulator.step(good) == FIRST + 2 * PERIOD
     assert {tuple(state.effort) for state in simulator.states()} == {NO_LOAD, tuple(good)}
-    simulator.until_said('WARN', '(the last of 18)')
 
 
 def test_bad_wrenches_are_rejected_and_the_last_holds(begin: Start) -> None:
     simulator = begin(STEPPED)
     simulator.load((0.0, 0.0, 500.0, 0.0, 0.0, 0.0))
-    for n in range(6):
-        for special in SPECIAL:
-            simulator.load([0.0] * n + [special] + [0.0] * (5 - n))
+    for special in SPECIAL:
+        simulator.load([0.0] * 5 + [special])
     simulator.load((1e6, 0.0, 0.0, 0.0, 0.0, 0.0), frame='world')
     simulator.until_said('WARN', 'wrench rejected: wrong frame_id')
     simulator.until_said('WARN', 'wrench rejected: not finite')
@@ -442,39 +407,18 @@ def test_forces_above_their_limit_saturate(begin: Start) -> None:
     assert 'commands: leg_6: 1e+300 N exceeds limits.force_max, clipped to 6000 N' in line
 
 
-@pytest.mark.parametrize('mode', ['real time', 'stepped'])
-def test_the_hexapod_rests_if_a_step_cannot_be_computed(
-        begin: Start, unlimited: Path, mode: str) -> None:
-    simulator = begin(*([STEPPED] if mode == 'stepped' else []), files=(unlimited, FILE))
-    if mode == 'stepped':
-        assert simulator.step([1e300] * 6) == FIRST + PERIOD
-    else:
-        simulator.command([1e300] * 6)
-    simulator.until_said('ERROR', 'held at rest permanently')
-    assert simulator.said('ERROR', 'motion cannot be computed')
-    if mode == 'stepped':
-        assert simulator.step(holding()) == FIRST + 2 * PERIOD
-        assert simulator.step(holding()) == FIRST + 3 * PERIOD
-    else:
-        many = len(simulator.raw['leg_states'])
-        simulator.until(lambda: len(simulator.raw['leg_states']) > many + 20, 'it goes on')
+def test_the_hexapod_rests_if_a_step_cannot_be_computed(begin: Start, unlimited: Path) -> None:
+    simulator = begin(STEPPED, files=(unlimited, FILE))
+    assert simulator.step([1e300] * 6) == FIRST + PERIOD
+    simulator.until_said('ERROR', 'motion cannot be computed')
+    for n in (2, 3):
+        assert simulator.step(holding()) == FIRST + n * PERIOD
     last = simulator.last()
     assert not np.any([*last.velocity, *last.effort])
-    assert len(simulator.said('ERROR', '')) == 1
+    assert simulator.said('ERROR', '') == simulator.said('ERROR', 'held at rest permanently')
 
 
 TOO_STIFF = 'actuator.coulomb_friction:=4000.0', 'actuator.reflected_mass:=0.0'
-
-
-def test_a_hexapod_too_stiff_for_real_time_skips_time(begin: Start) -> None:
-    simulator = begin(*TOO_STIFF)
-    simulator.command(holding())
-    simulator.until_said('WARN', 'fell behind by')
-    # Its stamps go on with the clock, with periods left out.
-    begun = stamp_of(simulator.raw['leg_states'][0])
-    simulator.until(lambda: stamp_of(simulator.raw['leg_states'][-1]) > begun + 1_000_000_000,
-                    'stamps go on')
-    assert max(np.diff(simulator.stamps())) > PERIOD
 
 
 def test_a_simulator_that_was_stopped_takes_what_is_due_and_skips_the_rest(

@@ -58,7 +58,7 @@ def state_after(state: Singularity, platform: StewartPlatform, motion: Motion) -
                        float(row[DETERMINANT_RATE]), float(row[CONDITION]))
 
 
-def test_it_begins_with_no_warning() -> None:
+def test_the_first_state_has_no_warning() -> None:
     state = after((0.2, 0.0, 3.0))
     assert not state.warning
     assert not state.stopped

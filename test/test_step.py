@@ -22,16 +22,22 @@ from typing import Any
 
 from hypothesis import strategies as st
 import numpy as np
+from numpy.typing import NDArray
 import pytest
 from referees import (
-    QUARTER_TURN, random_motion, random_parameters, random_wrench, rng, symmetric_parameters)
-
-from stewart_dynamics import Motion, Parameters, StewartPlatform
-from stewart_dynamics.arrays import NO_WRENCH, Six
+    QUARTER_TURN, random_base_motion, random_motion, random_parameters, random_wrench, relative,
+    rng, symmetric_parameters)
+from stewart_dynamics import BaseMotion, Motion, Parameters, StewartPlatform
+from stewart_dynamics.arrays import Array, NO_WRENCH, Six
 from stewart_dynamics.mechanics.frames.rotation import from_quaternion
-from stewart_dynamics.mechanics.limits import Exceedance, JITTER, JUMP
+from stewart_dynamics.mechanics.limits import (
+    ANGLES, any_exceeded, BASE_ANGLE_MAX, CLEARANCE_MIN, Exceedance, FORCE_MAX, JITTER, JUMP,
+    LENGTH_MAX, LENGTH_MIN, LIMITS, Limits, OF_JOINTS, OF_RESULTS, PLATFORM_ANGLE_MAX, TOLERANCE,
+    VELOCITY_MAX)
+from stewart_dynamics.mechanics.rows import FORCES, LENGTHS, NO_BASE, RATES, RESULT
 from stewart_dynamics.mechanics.singularity_warning import Cause, Singularity, UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import LEG_SHAPE
+from stewart_dynamics.setpoints.base_wrench import BaseWrench
 from stewart_dynamics.setpoints.step import Batch, Output, Setpoint, State, Step
 
 PARAMETERS = symmetric_parameters()
@@ -64,7 +70,7 @@ def answered(step: Step, setpoint: Setpoint, wrench: Six = NO_WRENCH,
 
 # Results
 
-def test_it_gives_what_the_library_gives_bit_for_bit() -> None:
+def test_the_step_gives_the_librarys_bits() -> None:
     random = rng()
     for _ in range(5):
         parameters = random_parameters(random)
@@ -85,7 +91,7 @@ def test_it_gives_what_the_library_gives_bit_for_bit() -> None:
             assert output.condition == result.condition_number
 
 
-def test_it_keeps_no_state() -> None:
+def test_the_step_keeps_no_state() -> None:
     given = [setpoint._replace(wrench=wrench) for setpoint, wrench in rows(PARAMETERS, 30)]
     states = [None, State(), State(Singularity(Cause.CONDITION, True, -1.0)),
               State(stamp=STAMP - 1, lengths=(1.0,) * 6)]
@@ -365,3 +371,165 @@ def test_a_restart_is_no_crossing() -> None:
     assert output.singularity.crossings == 1
     assert not output.singularity.warning
     assert output.warning_changed
+
+
+# The base wrench of setpoints: the library's, for one and for many, and finite numbers only
+
+MANY = 50
+
+
+def setpoints_of(batch: Batch) -> list[Setpoint]:
+    bases = [None] * len(batch.stamps) if batch.bases is None else [
+        tuple(row) for row in batch.bases.tolist()]
+    return [Setpoint(STAMP, tuple(motion), tuple(wrench), False, base)
+            for motion, wrench, base in zip(
+                batch.motions.tolist(), batch.wrenches.tolist(), bases, strict=True)]
+
+
+def batch_of(motions: Array, wrenches: Array, bases: Array | None) -> Batch:
+    stamps = np.full(len(motions), STAMP)
+    return Batch(stamps, motions, wrenches, np.zeros(len(motions), dtype=bool), stamps, bases)
+
+
+def assert_alike(found: Array, of_one: BaseWrench, batch: Batch) -> None:
+    """Check that the call for one gives the rows of the call for many, bit for bit."""
+    for row, setpoint in zip(found.tolist(), setpoints_of(batch), strict=True):
+        assert of_one(setpoint) == (None if row[0] != row[0] else tuple(row))
+
+
+@pytest.mark.parametrize('moving', [False, True], ids=['still', 'moving'])
+def test_the_base_wrench_is_the_librarys_bit_for_bit(moving: bool) -> None:
+    random = rng()
+    for _ in range(5):
+        parameters = random_parameters(random)
+        motion = random_motion(parameters, random, MANY)
+        wrenches = random_wrench(parameters, random, MANY)
+        base = random_base_motion(parameters, random, MANY) if moving else None
+        batch = batch_of(motion.rows, wrenches, None if base is None else base.rows)
+        found = BaseWrench(parameters).many(batch)
+        assert np.array_equal(
+            found, StewartPlatform(parameters).base_wrench(motion, wrenches, base))
+        assert_alike(found, BaseWrench(parameters), batch)
+
+
+def test_an_unknown_base_has_no_base_wrench() -> None:
+    random = rng()
+    motion = random_motion(PARAMETERS, random, MANY)
+    bases = random_base_motion(PARAMETERS, random, MANY).rows.copy()
+    bases[10:20] = NO_BASE
+    batch = batch_of(motion.rows, random_wrench(PARAMETERS, random, MANY), bases)
+    found = BaseWrench(PARAMETERS).many(batch)
+    unknown = np.zeros(MANY, dtype=bool)
+    unknown[10:20] = True
+    assert np.array_equal(np.isnan(found), np.repeat(unknown[:, None], 6, axis=1))
+    assert_alike(found, BaseWrench(PARAMETERS), batch)
+
+
+def test_overflowing_numbers_have_no_base_wrench() -> None:
+    motions = np.array([HOME.motion] * 3)
+    motions[1, 18:21] = 1e308
+    found = BaseWrench(PARAMETERS).many(batch_of(motions, np.zeros((3, 6)), None))
+    assert np.isnan(found).all(axis=1).tolist() == [False, True, False]
+    assert_alike(found, BaseWrench(PARAMETERS), batch_of(motions, np.zeros((3, 6)), None))
+
+
+def weight_of(parameters: Parameters) -> float:
+    return float(parameters['platform.mass'] + parameters['legs.cylinder.mass'].sum()
+                 + parameters['legs.piston.mass'].sum())
+
+
+@pytest.mark.parametrize('setpoint', [HOME, QUARTER, FLAT], ids=['home', 'a quarter turn', 'flat'])
+def test_at_rest_it_is_the_weight_also_where_the_forces_cannot_be_solved(
+        setpoint: Setpoint) -> None:
+    found = BaseWrench(PARAMETERS)(setpoint)
+    assert found is not None
+    assert relative(found[:3], weight_of(PARAMETERS) * PARAMETERS['gravity']) < 1e-12
+    tilted = BaseMotion([0.0, 6.0, -8.0])
+    found = BaseWrench(PARAMETERS)(setpoint._replace(base=tuple(tilted.rows.tolist())))
+    assert found is not None
+    assert relative(found[:3], weight_of(PARAMETERS) * tilted.gravity) < 1e-12
+
+
+# The limits of the legs: one rule for a row, a sample and an array, and its tolerance
+
+GIVEN = {LENGTH_MIN: [0.9, 0.91, 0.92, 0.93, 0.94, 0.95], LENGTH_MAX: 1.5, VELOCITY_MAX: 0.5,
+         FORCE_MAX: 6000.0, BASE_ANGLE_MAX: 0.5,
+         PLATFORM_ANGLE_MAX: [0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}
+PLACES = {LENGTH_MIN: LENGTHS, LENGTH_MAX: LENGTHS, VELOCITY_MAX: RATES, FORCE_MAX: FORCES}
+
+
+def row() -> NDArray[np.float64]:
+    """Return a result within all limits of GIVEN."""
+    result = np.zeros(RESULT)
+    result[LENGTHS] = 1.2
+    return result
+
+
+@pytest.mark.parametrize('limit', OF_RESULTS)
+@pytest.mark.parametrize('leg', range(6))
+def test_row_sample_and_array_agree_on_each_limit_of_each_leg(limit: str, leg: int) -> None:
+    limits = Limits(symmetric_parameters().replaced(GIVEN))
+    bound = float(limits.bounds[limit][leg])
+    outward = -1.0 if limit == LENGTH_MIN else 1.0
+    signs = (1.0, -1.0) if limit in (VELOCITY_MAX, FORCE_MAX) else (1.0,)
+    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+                             (2.0 * TOLERANCE, True), (0.1, True)):
+        for sign in signs:
+            result = row()
+            result[PLACES[limit].start + leg] = value = sign * bound * (1.0 + excess * outward)
+            assert any_exceeded(limits.thresholds[:4].ravel(), result) == (
+                exceeded and limit != FORCE_MAX, exceeded and limit == FORCE_MAX)
+            for other in OF_RESULTS:
+                expected = [exceeded and other == limit and n == leg for n in range(6)]
+                assert limits.exceeds(other, result[PLACES[other]]).tolist() == expected
+            of_sample = (tuple(result[at].tolist()) for at in (LENGTHS, RATES, FORCES))
+            assert limits.exceeded(*of_sample) == (
+                (Exceedance(limit, leg, value, bound),) if exceeded else ())
+
+
+@pytest.mark.parametrize('limit', OF_JOINTS)
+@pytest.mark.parametrize('leg', range(6))
+def test_sample_and_array_agree_on_the_angle_of_each_joint(limit: str, leg: int) -> None:
+    limits = Limits(symmetric_parameters().replaced(GIVEN))
+    bound = float(limits.bounds[limit][leg])
+    for excess, exceeded in ((0.0, False), (0.5 * TOLERANCE, False), (-0.01, False),
+                             (2.0 * TOLERANCE, True), (0.1, True)):
+        angles = np.zeros(12)
+        angles[ANGLES[limit].start + leg] = value = bound * (1.0 + excess)
+        for other in OF_JOINTS:
+            expected = [exceeded and other == limit and n == leg for n in range(6)]
+            assert limits.exceeds(other, angles[ANGLES[other]]).tolist() == expected
+        assert limits.exceeded_angles(tuple(angles.tolist())) == (
+            (Exceedance(limit, leg, value, bound),) if exceeded else ())
+
+
+def test_a_limit_that_is_not_given_is_never_exceeded() -> None:
+    limits = Limits(symmetric_parameters())
+    huge = rng().choice([-1e300, 1e300], (5, 6))
+    assert not any(limits.exceeds(limit, huge).any() for limit in LIMITS)
+    assert limits.exceeded((1e300,) * 6, (-1e300,) * 6, (1e300,) * 6) == ()
+    assert limits.exceeded_angles((3.14,) * 12) == ()
+    assert np.isinf(limits.force_max).all() and not limits.bounds
+
+
+def test_unknown_forces_exceed_no_limit() -> None:
+    limits = Limits(symmetric_parameters().replaced({FORCE_MAX: 1.0}))
+    result = row()
+    result[FORCES] = np.nan
+    assert any_exceeded(limits.thresholds[:4].ravel(), result) == (False, False)
+    assert limits.exceeded((1.2,) * 6, (0.0,) * 6, None) == ()
+
+
+@pytest.mark.parametrize(('exceedance', 'words'), [
+    (Exceedance(LENGTH_MIN, 0, 0.9, 0.95), 'a: length 0.9 m is 0.05 m below limits.length_min'),
+    (Exceedance(PLATFORM_ANGLE_MAX, 2, 0.75, 0.5),
+     'c: platform joint angle 0.75 rad is 0.25 rad above limits.platform_joint_angle_max'),
+    (Exceedance(CLEARANCE_MIN, 3, -0.25, 0.5),
+     'd: clearance -0.25 m is 0.75 m below limits.leg_clearance_min'),
+    (Exceedance(LENGTH_MAX, 1, 1.75, 1.5), 'b: length 1.75 m is 0.25 m above limits.length_max'),
+    (Exceedance(VELOCITY_MAX, 2, -0.75, 0.5),
+     'c: rate -0.75 m/s is 0.25 m/s above limits.velocity_max'),
+    (Exceedance(FORCE_MAX, 5, -7000.0, 6000.0),
+     'f: force -7000 N is 1000 N above limits.force_max')])
+def test_the_text_says_which_leg_and_by_how_much(exceedance: Exceedance, words: str) -> None:
+    assert exceedance.words('abcdef') == words

@@ -17,9 +17,7 @@
 
 from __future__ import annotations
 
-import copy
 import inspect
-import pickle
 import sys
 from typing import Any
 
@@ -29,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 from referees import (
-    each_relative, QUARTER_TURN, random_motion, random_parameters, random_wrench, relative, rng,
+    QUARTER_TURN, random_motion, random_parameters, random_wrench, relative, rng,
     ROOT, rotation_about, symmetric_parameters)
 
 from stewart_dynamics import (
@@ -59,7 +57,7 @@ def passing_a_singularity() -> Motion:
 
 # Pose or Motion
 
-def test_where_a_pose_is_taken_a_motion_will_do(platform: StewartPlatform) -> None:
+def test_a_motion_is_accepted_in_place_of_a_pose(platform: StewartPlatform) -> None:
     motion = random_motion(platform.parameters, rng(), 5)
     pose = Pose(motion.position, motion.rotation)
     for call in (platform.inverse_kinematics, platform.inverse_jacobian, platform.mass_matrix,
@@ -266,13 +264,6 @@ def test_representations_are_short(platform: StewartPlatform) -> None:
         assert len(repr(result)) < 150
 
 
-def test_a_platform_that_was_used_can_be_copied_and_pickled(platform: StewartPlatform) -> None:
-    motion = random_motion(platform.parameters, rng(), 3)
-    truth = platform.force_breakdown(motion)
-    for other in (copy.deepcopy(platform), pickle.loads(pickle.dumps(platform))):
-        assert np.array_equal(other.force_breakdown(motion), truth)
-
-
 # Arbitrary input
 
 CALLS = {name: call for name, call in inspect.getmembers(StewartPlatform, inspect.isfunction)
@@ -336,13 +327,6 @@ def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataO
     parts = result if isinstance(result, tuple) else [
         result.rows if isinstance(result, Pose | Motion) else result]
     assert all(np.isfinite(part).all() for part in parts)
-
-
-def test_christoffel_symbols_give_the_same_force(platform: StewartPlatform) -> None:
-    motion = random_motion(platform.parameters, rng(), 10)
-    twist = np.concatenate([motion.linear_velocity, motion.angular_velocity], axis=-1)[..., None]
-    assert each_relative(platform.coriolis_matrix(motion, christoffel=True) @ twist,
-                         platform.coriolis_matrix(motion) @ twist) < 1e-12
 
 
 # Results as text, as a table and as a figure
