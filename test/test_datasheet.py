@@ -101,22 +101,18 @@ def test_travel_is_about_the_pivot_and_the_table_ends_at_the_limits(
         assert figures['travel'][key]['limit'] == found.limit
     rows = list(csv.DictReader((sheet / 'workspace.csv').open()))
     ends = np.array([[float(each[axis]) for axis in AXES] for each in rows])
-    assert len(ends) == 6 * 360
+    assert len(ends) > 6 * 200
     center = home.position + PIVOT
-    for factor, within in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
-        offsets = ends.copy()
-        offsets[:, :2] *= factor
-        offsets[:, 3:] *= factor
-        sections = np.array([each['section'] != 'tilt' for each in rows])
-        offsets[sections, 2] *= factor
-        rates = np.linalg.norm(offsets[:, 3:], axis=1)
-        turns = np.array([rotation_about(each[3:] / rate, rate) if rate else np.eye(3)
-                          for each, rate in zip(offsets, rates, strict=True)])
-        result = platform.inverse_dynamics(Motion.from_pose(
-            Pose(center + offsets[:, :3] - turns @ PIVOT, turns)), singular='nan')
-        inside = ((result.lengths > 0.95) & (result.lengths < 1.65)).all(axis=1) & (
-            result.condition_number < 100.0)
-        assert (inside == within).all()
+    rates = np.linalg.norm(ends[:, 3:], axis=1)
+    turns = np.array([rotation_about(each[3:] / rate, rate) if rate else np.eye(3)
+                      for each, rate in zip(ends, rates, strict=True)])
+    result = platform.inverse_dynamics(Motion.from_pose(
+        Pose(center + ends[:, :3] - turns @ PIVOT, turns)), singular='nan')
+    room = np.minimum(result.lengths - 0.95, 1.65 - result.lengths).min(axis=1)
+    assert room.min() > -1e-8
+    lengths = np.array([each['limit'].startswith('length_') for each in rows])
+    assert np.abs(room[lengths]).max() < 1e-8
+    assert result.condition_number[~lengths] == pytest.approx(100.0, rel=1e-5)
 
 
 def test_ranges_at_once_are_reachable_and_no_larger_ones_are(figures: dict[str, Any]) -> None:
@@ -203,6 +199,7 @@ def test_a_motion_that_exceeds_a_limit_is_not_possible(
     assert not found['possible']
     assert found['factor'] < 1.0
     assert found['limit'] == limit
+    assert found['amplitude']['value'] < 1.0
 
 
 def test_a_bag_through_a_singularity_is_not_possible(

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array, Integers
+from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet.workspace import Boundary
 from stewart_dynamics.reporting.curves import Curves
 from stewart_dynamics.reporting.vector_picture import Chart, Picture, tick_text, ticks
@@ -34,18 +35,26 @@ DASHES = {'length_max': None, 'length_min': '6 3', 'base_joint_angle_max': '2 2.
 _MILLI = 1e3
 
 
-def section_chart(boundary: Boundary, first: int, second: int, set_: Array | None) -> Picture:
-    """Draw a section [mm], and the rectangle in it of a set of ranges (6, 2) [m]."""
+def section_chart(section: Section, origin: Array, axes: tuple[int, int], ranges: Array | None,
+                  ) -> Picture:
+    """Draw a section around a position [mm], and the rectangle in it of ranges (6, 2) [m]."""
+    first, second = axes
     names = 'XYZ'[first], 'XYZ'[second]
     picture = Picture(_WIDTH, 330.0, f'Workspace, {names[0]}-{names[1]} section')
-    points = _MILLI * boundary.points[:, [first, second]]
-    x, y = _equal_ranges(points, (272.0, 252.0))
+
+    def flat(points: Array) -> Array:
+        moved: Array = _MILLI * (points - origin)[:, axes]
+        return moved
+
+    loops = [flat(each) for each in section.loops]
+    x, y = _equal_ranges(np.concatenate(loops) if loops else np.zeros((1, 2)), (272.0, 252.0))
     chart = Chart(picture, (52.0, 30.0, 272.0, 252.0), x, y)
-    picture.path(chart.at(points), closed=True, css='area')
+    picture.path(*map(chart.at, loops), closed=True, css='area', fill_rule='evenodd')
     chart.draw_axes(f'{names[0]} [mm]', f'{names[1]} [mm]')
-    _draw_boundary(chart, points, boundary)
-    if set_ is not None:
-        (a, b), (c, d) = _MILLI * set_[first], _MILLI * set_[second]
+    for part in section.boundary:
+        _draw_edge(picture, chart.at(flat(part.points)), part.limit, part.leg)
+    if ranges is not None:
+        (a, b), (c, d) = _MILLI * ranges[first], _MILLI * ranges[second]
         picture.path(chart.at([[a, c], [b, c], [b, d], [a, d]]), closed=True, css='set')
     _cross(picture, chart.at([0.0, 0.0]))
     return picture
@@ -73,7 +82,8 @@ def tilt_chart(boundaries: Sequence[Boundary], names: Sequence[str]) -> Picture:
         points = center + values[:, None] * ways
         if n == 0:
             picture.path(points, closed=True, css='area')
-            _draw_pieces(picture, points, each)
+            for limit, leg, which in _pieces(each):
+                _draw_edge(picture, points[which], limit, leg)
         else:
             picture.path(points, closed=True, css=f'other other{n}')
     for ring in rings[1:]:
@@ -143,15 +153,10 @@ def _equal_ranges(points: Array, size: tuple[float, float],
     return (float(x0), float(x1)), (float(y0), float(y1))
 
 
-def _draw_boundary(chart: Chart, points: Array, boundary: Boundary) -> None:
-    _draw_pieces(chart.picture, chart.at(points), boundary)
-
-
-def _draw_pieces(picture: Picture, points: Array, boundary: Boundary) -> None:
-    """Draw pieces of a closed boundary, each in the color of its leg."""
-    for limit, leg, which in _pieces(boundary):
-        picture.path(points[which], css=f'edge leg{leg}' if leg >= 0 else 'edge',
-                     stroke_dasharray=DASHES.get(limit))
+def _draw_edge(picture: Picture, points: Array, limit: str, leg: int) -> None:
+    """Draw a part of a boundary in the color of its leg, dashed by its limit."""
+    picture.path(points, css=f'edge leg{leg}' if leg >= 0 else 'edge',
+                 stroke_dasharray=DASHES.get(limit))
 
 
 def _pieces(boundary: Boundary) -> Iterator[tuple[str, int, Integers]]:

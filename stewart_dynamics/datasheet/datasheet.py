@@ -111,7 +111,8 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
     sheet['stiffness'] = None if order.leg_stiffness is None else ratings.stiffness(
         hexapod, order.leg_stiffness, ranges, _LEVELS)
     progress.stage('workspace')
-    sections = [workspace.section(hexapod, *plane) for plane in workspace.PLANES]
+    sections = {name: hexapod.section(normal) for name, normal in zip(
+        workspace.PLANES, 'yxz', strict=True) if hexapod.limited('length_max')}
     tilts = {name: workspace.tilt(hexapod, part * (sheet['travel'][
         'z+' if part > 0.0 else 'z-']['value'] or 0.0)) for name, part in _HEIGHTS.items()}
     sheet['tilt'] = _smallest_tilt(tilts['at the pose'], hexapod)
@@ -127,8 +128,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
                         None if recorded is None else recorded.seconds, used)
     with whole_folder(folder, options, DATASHEET) as partial:
         write_json(partial / DATASHEET, sheet)
-        write_files({partial / TABLE: workspace.table(
-            [*sections, *tilts.values()], hexapod.joints)})
+        write_files({partial / TABLE: workspace.table(sections, tilts, hexapod)})
         write_page(partial / PAGE, sheet, hexapod, pictures)
     return sheet
 

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import box_verdict, motion_verdict
 from stewart_dynamics.datasheet.figures import (
@@ -47,7 +48,7 @@ class Pictures(NamedTuple):
 
     hexapod: RatedHexapod
     sheet: Mapping[str, Any]
-    sections: list[Boundary]
+    sections: Mapping[str, Section]
     tilts: Mapping[str, Boundary]
     ranges: Array | None
     """Ranges (6, 2) that are reachable at once."""
@@ -66,8 +67,8 @@ class Pictures(NamedTuple):
 
     def workspace(self) -> list[Picture]:
         """Return sections, tilt, rotation over height, and payload where it is limited."""
-        found = [charts.section_chart(each, *plane[1:], self.ranges)
-                 for each, plane in zip(self.sections, PLANES, strict=True)]
+        found = [charts.section_chart(each, self.hexapod.origin.position, PLANES[name],
+                                      self.ranges) for name, each in self.sections.items()]
         found.append(charts.tilt_chart(list(self.tilts.values()), list(self.tilts)))
         low, high = (self.sheet['travel'][key]['value'] for key in ('z-', 'z+'))
         if low and high:

@@ -52,7 +52,12 @@ def motion_verdict(found: dict[str, Any]) -> str:
         _limit(found))
     if factor == 0.0:
         return f'at no speed, by {where}'
-    return f'up to {down(factor)} times as fast, limited by {where}'
+    text = f'up to {down(factor)} times as fast, limited by {where}'
+    larger = found['amplitude']
+    if larger and larger['value'] is not None:
+        text += (f'; up to {down(larger["value"])} times as large about its first pose, limited '
+                 f'by {_limit(larger)}')
+    return text
 
 
 def box_verdict(found: dict[str, Any]) -> str:

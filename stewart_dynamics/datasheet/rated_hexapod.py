@@ -23,6 +23,7 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.capability import Capability, Extent
 from stewart_dynamics.capability.reachable import Reachable
+from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
@@ -65,8 +66,8 @@ class RatedHexapod:
         With the payload, and the origin of the platform frame at the pivot.
     loads : Capability
         Capability of that platform, for rates and loads.
-    pose : Pose
-        Pose of the pivot.
+    origin, pose : Pose
+        Pose of the platform frame as given, and of the pivot.
     pivot : (3,)
         As given.
 
@@ -85,13 +86,13 @@ class RatedHexapod:
         self.pivot = np.zeros(3) if pivot is None else np.asarray(pivot, dtype=float)
         self.given = parameters if payload is None else _loaded(parameters, payload)
         whole = StewartPlatform(self.given)
-        self._origin = whole.home_pose() if pose is None else pose
+        self.origin = whole.home_pose() if pose is None else pose
         self._limits = Capability(whole)
         self.platform = StewartPlatform(_moved(self.given, self.pivot))
         self.loads = Capability(self.platform)
-        self.pose = Pose(self._origin.position + self._origin.rotation @ self.pivot,
-                         self._origin.rotation)
-        self._check(whole, self._origin)
+        self.pose = Pose(self.origin.position + self.origin.rotation @ self.pivot,
+                         self.origin.rotation)
+        self._check(whole, self.origin)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -110,11 +111,15 @@ class RatedHexapod:
 
     def reachable(self, ranges: Array) -> Reachable:
         """Return ``Capability.reachable`` of ranges (6, 2) from the pose."""
-        return self._limits.reachable(ranges, self._origin, self.pivot)
+        return self._limits.reachable(ranges, self.origin, self.pivot)
 
     def reachable_factor(self, ranges: Array) -> Extent:
         """Return ``Capability.reachable_factor`` of ranges (6, 2) from the pose."""
-        return self._limits.reachable_factor(ranges, self._origin, self.pivot)
+        return self._limits.reachable_factor(ranges, self.origin, self.pivot)
+
+    def section(self, normal: str) -> Section:
+        """Return ``Capability.section`` through the pose."""
+        return self._limits.section(self.origin, normal)
 
     def moved_by(self, direction: Array, by: float = 1.0) -> Pose:
         """Return the pose after a translation and a rotation vector (6,), base axes."""

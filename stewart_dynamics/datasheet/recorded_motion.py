@@ -31,6 +31,7 @@ from stewart_dynamics.errors import BagError
 from stewart_dynamics.mechanics import limits
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.bag_topics import find_topics
@@ -39,8 +40,10 @@ from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.setpoints.joining import Setpoints
 from stewart_dynamics.setpoints.step import Batch
 
-LENGTH, RATE, FORCE, ANGLE, SINGULARITY = (
-    'length', 'rate', 'force', 'joint angle', 'singularity')
+LENGTH, RATE, FORCE, ANGLE, CLEARANCE, SINGULARITY = (
+    'length', 'rate', 'force', 'joint angle', 'leg clearance', 'singularity')
+# Largest number of samples of which the amplitude is computed.
+_MOST = 100_000
 
 
 class RecordedMotion(NamedTuple):
@@ -129,6 +132,12 @@ def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array
     if known:
         angles = dict(zip(limits.OF_JOINTS, platform.joint_angles(recorded.motion), strict=True))
         found[ANGLE] = np.max([angles[name] / p[name] for name in known], axis=0)
+    clearances = clearance_to_check(p)
+    if clearances is not None:
+        distances = clearances(recorded.motion.rows)
+        with np.errstate(divide='ignore'):
+            found[CLEARANCE] = np.where(
+                distances > 0.0, p[limits.CLEARANCE_MIN] / distances, np.inf)
     found = {name: each.max(axis=-1) for name, each in found.items()}
     condition = result.condition_number / p['singularity.stop_condition']
     crossed = np.diff(np.sign(result.determinant), prepend=np.sign(result.determinant[0])) != 0.0
@@ -153,14 +162,17 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
     if singular:
         at = int(used[SINGULARITY].argmax())
         return found | {'factor': 0.0, 'limit': 'singularity', 'leg': None,
-                        'at_s': float(recorded.seconds[at]), 'payload': None}
+                        'at_s': float(recorded.seconds[at]), 'amplitude': None, 'payload': None}
     speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
     found |= _named('factor', speed, recorded, joints)
-    payload = None
+    amplitude = payload = None
+    if len(recorded.seconds) <= _MOST:
+        larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
+        amplitude = answer(float(larger.value), str(larger.limit), int(larger.leg), joints)
     if p[limits.FORCE_MAX] is not None:
         more = c.payload(recorded.motion, np.zeros(3))
         payload = answer(float(more.value), str(more.limit), int(more.leg), joints)
-    return found | {'payload': payload}
+    return found | {'amplitude': amplitude, 'payload': payload}
 
 
 def _named(name: str, extent: Any, recorded: RecordedMotion, joints: Any) -> dict[str, Any]:

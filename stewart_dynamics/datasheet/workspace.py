@@ -16,29 +16,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array
+from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
 from stewart_dynamics.mechanics.frames.motion import Pose
 
-_RAYS = 360
-PLANES = (('xz', 0, 2), ('yz', 1, 2), ('xy', 0, 1))
-"""Names of the sections, and the axes in them."""
+_AZIMUTHS = 360
+PLANES = {'xz': (0, 2), 'yz': (1, 2), 'xy': (0, 1)}
+"""Sections, and the axes in them."""
 
 
 class Boundary(NamedTuple):
-    """Travels in all directions of a plane, and the limits that end them."""
+    """Tilt toward all azimuths, and the limits that end it."""
 
-    name: str
     directions: Array
     """(N, 6), base axes."""
     begin: Array
-    """(6,) translation and rotation vector from the pose, at which the rays begin."""
+    """(6,) translation from the pose, at which the platform tilts."""
     values: Array
-    """Travel along each direction (N,) [m or rad]; infinite if nothing limits."""
+    """Travel along each direction (N,) [rad]; infinite if nothing limits."""
     limits: list[str]
     legs: list[int]
 
@@ -49,25 +50,18 @@ class Boundary(NamedTuple):
         return ends
 
 
-def section(hexapod: RatedHexapod, name: str, first: int, second: int) -> Boundary:
-    """Return the travel from the pose in all directions of a plane, without rotation."""
-    around = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
-    directions = np.zeros((_RAYS, 6))
-    directions[:, first], directions[:, second] = np.cos(around), np.sin(around)
-    return _boundary(hexapod, name, directions, np.zeros(6))
-
-
 def tilt(hexapod: RatedHexapod, height: float) -> Boundary:
     """
     Return the tilt toward all azimuths at a height above the pose.
 
     Row n is a lean toward the azimuth ``2 pi n / N`` from x to y, base axes.
     """
-    around = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
-    directions = np.zeros((_RAYS, 6))
+    around = np.linspace(0.0, 2.0 * np.pi, _AZIMUTHS, endpoint=False)
+    directions = np.zeros((_AZIMUTHS, 6))
     directions[:, 3], directions[:, 4] = -np.sin(around), np.cos(around)
     begin = np.array([0.0, 0.0, height, 0.0, 0.0, 0.0])
-    return _boundary(hexapod, 'tilt', directions, begin)
+    found = hexapod.travel(hexapod.moved_by(begin), directions)
+    return Boundary(directions, begin, found.value, found.limit.tolist(), found.leg.tolist())
 
 
 def rotations_over_height(hexapod: RatedHexapod, low: float, high: float, count: int = 41,
@@ -77,7 +71,7 @@ def rotations_over_height(hexapod: RatedHexapod, low: float, high: float, count:
 
     ``tilt`` is the smallest of all azimuths.
     """
-    around = np.linspace(0.0, 2.0 * np.pi, _RAYS // 5, endpoint=False)
+    around = np.linspace(0.0, 2.0 * np.pi, _AZIMUTHS // 5, endpoint=False)
     directions = np.zeros((len(around) + 2, 6))
     directions[:-2, 3], directions[:-2, 4] = -np.sin(around), np.cos(around)
     directions[-2:, 5] = 1.0, -1.0
@@ -89,18 +83,22 @@ def rotations_over_height(hexapod: RatedHexapod, low: float, high: float, count:
                      'θZ': values[:, -2:].min(axis=1)}
 
 
-def _boundary(hexapod: RatedHexapod, name: str, directions: Array, begin: Array) -> Boundary:
-    found = hexapod.travel(hexapod.moved_by(begin), directions)
-    return Boundary(name, directions, begin, found.value, found.limit.tolist(),
-                    found.leg.tolist())
-
-
-def table(boundaries: list[Boundary], joints: tuple[str, ...]) -> str:
-    """Return the ends of all travels as CSV."""
+def table(sections: Mapping[str, Section], tilts: Mapping[str, Boundary],
+          hexapod: RatedHexapod) -> str:
+    """Return the boundaries of sections and tilts as CSV, displacements from the pose."""
     lines = ['section,x,y,z,rx,ry,rz,limit,leg']
-    for each in boundaries:
+    names = [*hexapod.joints, '']  # -1: no leg
+
+    def add(section: str, numbers: Array, limit: str, leg: int) -> None:
+        text = ','.join(f'{value:.9g}' for value in numbers)
+        lines.append(f'{section},{text},{limit},{names[leg]}')
+
+    for name, section in sections.items():
+        for part in section.boundary:
+            for point in part.points - hexapod.origin.position:
+                add(name, np.append(point, np.zeros(3)), part.limit, part.leg)
+    for each in tilts.values():
         for point, limit, leg in zip(each.points, each.limits, each.legs, strict=True):
             if np.isfinite(point).all():
-                numbers = ','.join(f'{value:.9g}' for value in point)
-                lines.append(f'{each.name},{numbers},{limit},{joints[leg] if leg >= 0 else ""}')
+                add('tilt', point, limit, leg)
     return '\n'.join(lines) + '\n'
