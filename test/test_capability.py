@@ -67,6 +67,20 @@ def random_travel(random: np.random.Generator, size: float) -> tuple[Array, Arra
     return direction, size * random.uniform(-0.5, 0.5, 3)
 
 
+@pytest.mark.parametrize('away', [0.0, 1e-17, 1e-9])
+def test_an_axis_through_a_platform_joint_does_not_end_the_travel(away: float) -> None:
+    capability = Capability(StewartPlatform(PLATFORM.parameters.replaced({
+        'limits.base_joint_angle_max': 1.2, 'limits.platform_joint_angle_max': 1.2})))
+    home = PLATFORM.home_pose()
+    for joint in PLATFORM.parameters['geometry.platform_joints']:
+        axis = np.append(np.zeros(3), joint / np.linalg.norm(joint))
+        near = axis + [0.0, 0.0, 0.0, 0.0, 0.0, 1e-6]
+        found, nearby = (capability.travel(home, each, [away, 0.0, 0.0]) for each in (axis, near))
+        assert found.value > 0.3
+        assert found.value == pytest.approx(nearby.value, rel=1e-4)
+        assert found.limit == nearby.limit
+
+
 def test_the_wrench_at_the_limit_brings_a_leg_to_its_largest_force() -> None:
     for seed in range(200):
         random = rng(seed)

@@ -148,7 +148,9 @@ def _end_of_length(leg: Array, velocity: Vector3, rate: float, bound: float, lon
     """Return the first t in [0, end] at which a leg leaves a bound of its length, or end."""
     curving = rate * rate * leg[_REACH]
     speed = leg[_SPEED]
-    scale_of_t = bound / speed
+    if speed <= rate * leg[_REACH] and leg[_REACH] < 0.5 * _ROUNDING * bound:
+        return end  # the platform turns about an axis through the joint
+    scale_of_t = bound / max(speed, rate * bound)
     t = 0.0
     for _ in range(_MOST_STEPS):
         line, change = _line(leg, velocity, rate, t)
@@ -201,8 +203,9 @@ def _end_of_angle(leg: Array, velocity: Vector3, rate: float, bound: float, at_p
         value = dot(axis, s) - least
         if value < -_ROUNDING:
             return t
-        step = min(_safe_step(max(value, 0.0), slope, curvature), 0.5 * length / speed)
-        if step <= _EXACT * (t + length / speed):
+        step = min(_safe_step(max(value, 0.0), slope, curvature),
+                   0.5 * length / max(speed, _ROUNDING * rate * length))
+        if step <= _EXACT * (t + length / max(speed, rate * length)):
             return t
         t += step
         if t >= end:
