@@ -106,7 +106,7 @@ bench-identify: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/identification.py --write
 
 bench-coverage: $(INSTALLED)
-	$(VENV)/bin/python benchmarks/coverage.py --write
+	$(VENV)/bin/python benchmarks/interval_coverage.py --write
 
 bench-lack-of-fit: $(INSTALLED)
 	$(VENV)/bin/python benchmarks/lack_of_fit.py --write
