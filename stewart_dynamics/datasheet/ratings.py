@@ -116,12 +116,12 @@ def stiffness(hexapod: RatedHexapod, leg_stiffness: float, ranges: Array | None,
     Return stiffness by axis [N/m, N m/rad] and natural frequencies [Hz], and their worst.
 
     The stiffness of an axis is the load along it per deflection along it, all other axes being
-    free: the reciprocal of the diagonal of the compliance.
+    free: the reciprocal of the diagonal of the compliance. Forces of the legs at rest count.
     """
     def of(poses: Pose) -> tuple[Array, Array]:
-        k = hexapod.platform.stiffness(poses, leg_stiffness)
+        k = hexapod.loads.stiffness(poses, leg_stiffness)
         compliance = np.diagonal(np.linalg.inv(k), axis1=-2, axis2=-1)
-        return 1.0 / compliance, hexapod.platform.natural_modes(poses, leg_stiffness).frequencies
+        return 1.0 / compliance, hexapod.loads.modes(poses, leg_stiffness).frequencies
 
     axes, frequencies = of(hexapod.pose)
     found: dict[str, Any] = {
