@@ -119,7 +119,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),
-        down=down, span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
+        clearance=hexapod.limited('leg_clearance_min'), down=down, span=span, MM=MM,
+        DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 

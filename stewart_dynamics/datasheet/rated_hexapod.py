@@ -26,6 +26,7 @@ from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
@@ -146,6 +147,10 @@ class RatedHexapod:
             result.lengths, result.rates, result.forces)))
         if not found and limits.of_joints:
             found = limits.exceeded_angles(np.concatenate(whole.joint_angles(pose)).tolist())
+        clearances = clearance_to_check(self.given)
+        if not found and clearances is not None:
+            found = limits.exceeded_clearance(
+                clearances(Motion.from_pose(pose).rows[None])[0].tolist())
         if found:
             raise PoseError(f'pose: {found[0].words(self.joints)}')
 
