@@ -42,7 +42,7 @@ import math
 
 from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.capability.travel import (
-    BASE_ANGLE_MAX, largest_eigenvalue, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX)
+    BASE_ANGLE_MAX, largest_eigenvalue, LENGTH_MAX, LENGTH_MIN, PLATFORM_ANGLE_MAX, put6)
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, joints_of)
@@ -54,6 +54,8 @@ from stewart_dynamics.mechanics.vectors import (
 
 # A cell: middle and half widths of d and r, and a bound that holds in it.
 _HALF, _BOUND, CELL = 6, 12, 13
+# Place of a gradient after a translation in the row of scratch memory behind the cells.
+_GRADIENT = 3
 DEPTH = 1024
 """Largest number of cells that wait at a time."""
 
@@ -125,10 +127,9 @@ def _gradient(k: tuple[float, float, float], r: Vector3, turned: Vector3, n: Vec
 @inlined
 def _reach(g: Vector6, cell: Array) -> float:
     """Return the largest change of a linear function of this gradient over a cell."""
-    reach = 0.0
-    for n in range(6):
-        reach += abs(g[n]) * cell[_HALF + n]
-    return reach
+    return (abs(g[0]) * cell[_HALF] + abs(g[1]) * cell[_HALF + 1] + abs(g[2]) * cell[_HALF + 2]
+            + abs(g[3]) * cell[_HALF + 3] + abs(g[4]) * cell[_HALF + 4]
+            + abs(g[5]) * cell[_HALF + 5])
 
 
 @compiled
@@ -266,22 +267,24 @@ def _search(leg: Array, code: int, limit: float, cells: Array, waiting: int, mos
             upper = max(upper, bound)
             continue
         cell[_BOUND] = bound
+        put6(point, _GRADIENT, g)
         shrunk, widest, at = False, -1.0, 0
         # The shortest leg has its translation in closed form.
         for n in range(3 if code == LENGTH_MIN else 0, 6):
-            half = cell[_HALF + n]
-            if half > 0.0 and abs(g[n]) > change[n]:
-                cell[n] += math.copysign(half, g[n])
+            half, slope = cell[_HALF + n], point[_GRADIENT + n]
+            bend = change[0] if n < 3 else change[3]
+            if half > 0.0 and abs(slope) > bend:
+                cell[n] += math.copysign(half, slope)
                 cell[_HALF + n] = 0.0
                 shrunk = True
-            elif half * (abs(g[n]) + change[n]) > widest:
-                widest, at = half * (abs(g[n]) + change[n]), n
+            elif half * (abs(slope) + bend) > widest:
+                widest, at = half * (abs(slope) + bend), n
         if shrunk:
             top += 1
             continue
         # both halves; the one where the quantity rises is taken first
         half = 0.5 * cell[_HALF + at]
-        step = math.copysign(half, g[at])
+        step = math.copysign(half, point[_GRADIENT + at])
         cell[_HALF + at] = half
         for n in range(CELL):
             cells[top + 1, n] = cell[n]
@@ -376,7 +379,7 @@ def _condition(constants: Array, legs: Array, cell: Array, stop: float, rows: Ar
         for axis in range(3):
             unit = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0,
                     1.0 if axis == 2 else 0.0)
-            change = scale(inverse, subtract(unit, scale(s[axis], s)))
+            change = scale(inverse, subtract(unit, scale(dot(s, unit), s)))
             _put3(work, 6 * axis, change)
             _put3(work, 6 * axis + 3, cross(arm, change))
             once = cross(r, unit)
@@ -406,13 +409,12 @@ def _condition(constants: Array, legs: Array, cell: Array, stop: float, rows: Ar
     smallest = 1.0 / math.sqrt(largest_eigenvalue(gram(
         inverted[0], inverted[1], inverted[2], inverted[3], inverted[4], inverted[5])))
     margin = smallest - largest / stop
-    for n in range(6):
-        rows[0, 42 + n] = inverted[0][n]
-        rows[1, 42 + n] = inverted[1][n]
-        rows[2, 42 + n] = inverted[2][n]
-        rows[3, 42 + n] = inverted[3][n]
-        rows[4, 42 + n] = inverted[4][n]
-        rows[5, 42 + n] = inverted[5][n]
+    put6(rows[0], 42, inverted[0])
+    put6(rows[1], 42, inverted[1])
+    put6(rows[2], 42, inverted[2])
+    put6(rows[3], 42, inverted[3])
+    put6(rows[4], 42, inverted[4])
+    put6(rows[5], 42, inverted[5])
     for n in range(6):
         for j in range(6):
             rows[n, 48 + j] = 0.0

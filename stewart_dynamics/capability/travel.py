@@ -46,7 +46,7 @@ from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Symmetric, tridiagonal)
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, read3, read9, rotate, scale, subtract, Vector3)
+    add, cross, dot, read3, read9, rotate, scale, subtract, Vector3, Vector6)
 
 LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, SINGULARITY, NOTHING = range(6)
 """Codes of the limit that ends a travel."""
@@ -75,6 +75,13 @@ def _length(a: Vector3) -> float:
 @inlined
 def _put3(array: Array, at: int, a: Vector3) -> None:
     array[at], array[at + 1], array[at + 2] = a
+
+
+@inlined
+def put6(array: Array, at: int, a: Vector6) -> None:
+    """Write six numbers; at an index that varies an exception would remain possible."""
+    array[at], array[at + 1], array[at + 2] = a[0], a[1], a[2]
+    array[at + 3], array[at + 4], array[at + 5] = a[3], a[4], a[5]
 
 
 @inlined
@@ -284,13 +291,12 @@ def _margin(constants: Array, legs: Array, velocity: Vector3, rate: float, stop:
     largest = math.sqrt(largest_eigenvalue(gram(r0, r1, r2, r3, r4, r5)))
     smallest = 1.0 / math.sqrt(largest_eigenvalue(gram(
         inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5])))
-    for n in range(6):
-        legs[0, _INVERSE + n] = inverse[0][n]
-        legs[1, _INVERSE + n] = inverse[1][n]
-        legs[2, _INVERSE + n] = inverse[2][n]
-        legs[3, _INVERSE + n] = inverse[3][n]
-        legs[4, _INVERSE + n] = inverse[4][n]
-        legs[5, _INVERSE + n] = inverse[5][n]
+    put6(legs[0], _INVERSE, inverse[0])
+    put6(legs[1], _INVERSE, inverse[1])
+    put6(legs[2], _INVERSE, inverse[2])
+    put6(legs[3], _INVERSE, inverse[3])
+    put6(legs[4], _INVERSE, inverse[4])
+    put6(legs[5], _INVERSE, inverse[5])
     relative = 0.0
     for row_of_inverse in range(6):
         for column in range(6):
