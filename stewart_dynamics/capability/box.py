@@ -127,9 +127,10 @@ def _gradient(k: tuple[float, float, float], r: Vector3, turned: Vector3, n: Vec
 @inlined
 def _reach(g: Vector6, cell: Array) -> float:
     """Return the largest change of a linear function of this gradient over a cell."""
-    return (abs(g[0]) * cell[_HALF] + abs(g[1]) * cell[_HALF + 1] + abs(g[2]) * cell[_HALF + 2]
-            + abs(g[3]) * cell[_HALF + 3] + abs(g[4]) * cell[_HALF + 4]
-            + abs(g[5]) * cell[_HALF + 5])
+    reach: float = (
+        abs(g[0]) * cell[_HALF] + abs(g[1]) * cell[_HALF + 1] + abs(g[2]) * cell[_HALF + 2]
+        + abs(g[3]) * cell[_HALF + 3] + abs(g[4]) * cell[_HALF + 4] + abs(g[5]) * cell[_HALF + 5])
+    return reach
 
 
 @compiled
