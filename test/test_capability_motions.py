@@ -140,6 +140,33 @@ def test_with_times_the_motion_between_the_samples_counts(ask: str) -> None:
         assert accepted == (factor < 1.0)
 
 
+def test_a_motion_through_a_singularity_is_possible_at_no_speed() -> None:
+    """Turned past det(J) = 0 about z: near it, beyond it, and between two samples."""
+    platform = StewartPlatform(PLATFORM.parameters.replaced({
+        'limits.length_min': None, 'limits.length_max': None, 'limits.force_max': None}))
+    capability = Capability(platform)
+    end = capability.travel(HOME, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]).value
+
+    def turning(*angles: float) -> Motion:
+        return Motion.from_pose(Pose(np.broadcast_to(HOME.position, (len(angles), 3)),
+                                     Rotation.from_rotvec(np.outer(angles, [0.0, 0.0, 1.0])
+                                                          ).as_matrix() @ HOME.rotation))
+
+    beyond = 2.0 * end
+    assert platform.inverse_dynamics(turning(beyond)).condition_number[0] < 100.0
+    assert capability.speed_factor(turning(0.0, end - 1e-9)).value > 0.0
+    for angles, sample in (((0.0, end + 1e-9), 1), ((0.0, 0.5, beyond), 2)):
+        found = capability.speed_factor(turning(*angles))
+        assert (found.value, found.limit, found.leg, found.sample) == (
+            0.0, 'singularity', -1, sample)
+    there = turning(end - 0.01, end - 0.01)
+    overshooting = Motion(there.position, there.rotation, np.zeros(3), [
+        [0.0, 0.0, 0.1], [0.0, 0.0, -0.1]])
+    assert capability.speed_factor(overshooting).value > 0.0
+    found = capability.speed_factor(overshooting, times=[0.0, 1.0])
+    assert (found.value, found.limit) == (0.0, 'singularity')
+
+
 def test_a_motion_that_starts_outside_cannot_grow() -> None:
     outside = Pose(HOME.position + [0.0, 0.0, 5.0], HOME.rotation)
     found = Capability(PLATFORM).amplitude_factor(motion(0), outside)

@@ -37,6 +37,7 @@ from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_t
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
+from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
 from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
@@ -433,7 +434,8 @@ class Capability:
         Played k times as fast, leg rates are k times as large, and leg forces
         ``g + k c1 + k^2 c2`` with a Coulomb friction that is linear below
         ``actuator.coulomb_velocity``: so the answer is the smallest root of all samples. Below 1
-        the motion is not possible as it is.
+        the motion is not possible as it is; 0 where a length, a joint angle, a clearance or a
+        singularity, up to ``singularity.stop_condition``, ends it at any speed.
 
         Parameters
         ----------
@@ -454,9 +456,12 @@ class Capability:
             constant(wrench, base)
             return timed(self.platform, times, motion, lambda each, _: self.speed_factor(
                 each, wrench, base), faster)
-        found = [self._speed_of_rates(motion), self._speed_of_forces(motion, wrench, base),
-                 self._of_path(motion)]
-        known = [each for each in found if each is not None]
+        solved = self.platform.inverse_dynamics(motion, singular='nan')
+        ended = self._of_path(motion, solved)
+        if ended is not None:
+            return ended
+        known = [each for each in (self._speed_of_rates(solved), self._speed_of_forces(
+            motion, wrench, base)) if each is not None]
         if not known:
             raise self._unlimited((limits.VELOCITY_MAX, limits.FORCE_MAX))
         return min(known, key=lambda each: float(each.value))
@@ -527,10 +532,14 @@ class Capability:
         name = list(bounds)[column // 6]
         return Extent(factor, _short(name), column % 6, sample)
 
-    def _of_path(self, motion: Motion) -> Extent | None:
-        """Return an extent of 0 where lengths or joint angles are exceeded at any speed."""
-        values = {limits.LENGTH_MIN: (lengths := self.platform.inverse_kinematics(motion)),
-                  limits.LENGTH_MAX: lengths}
+    def _of_path(self, motion: Motion, solved: InverseDynamics) -> Extent | None:
+        """
+        Return an extent of 0 where the path exceeds a limit at any speed.
+
+        Lengths, joint angles, clearance, and the condition number; a determinant of the other sign
+        than at the first sample is beyond a singularity.
+        """
+        values = {limits.LENGTH_MIN: solved.lengths, limits.LENGTH_MAX: solved.lengths}
         if limits.CLEARANCE_MIN in self._limits.bounds:
             values[limits.CLEARANCE_MIN] = LegClearance(self.platform.parameters)(
                 motion_rows(motion))
@@ -541,14 +550,16 @@ class Capability:
             if exceeded.any():
                 sample, leg = (int(n) for n in np.argwhere(exceeded)[0])
                 return Extent(0.0, _short(name), leg, sample)
-        return None
+        side = np.ravel(solved.determinant)
+        singular = ~(np.ravel(solved.condition_number) <= self.platform.parameters[
+            'singularity.stop_condition']) | ~(side * side[:1] > 0.0)
+        return Extent(0.0, 'singularity', -1, int(singular.argmax())) if singular.any() else None
 
-    def _speed_of_rates(self, motion: Motion) -> Extent | None:
+    def _speed_of_rates(self, solved: InverseDynamics) -> Extent | None:
         fastest = self._limits.bounds.get(limits.VELOCITY_MAX)
         if fastest is None:
             return None
-        rates = self.platform.inverse_dynamics(motion, singular='nan').rates
-        return _of_all(largest_multiple(np.zeros(6), rates, fastest), 'velocity_max')
+        return _of_all(largest_multiple(np.zeros(6), solved.rates, fastest), 'velocity_max')
 
     def _speed_of_forces(self, motion: Motion, wrench: ArrayLike | None,
                          base: BaseMotion | None) -> Extent | None:
