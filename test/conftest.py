@@ -25,12 +25,17 @@ from subprocess import DEVNULL
 import sys
 from typing import Any, TYPE_CHECKING
 
+from hypothesis import settings
 import pytest
 
 if TYPE_CHECKING:
     from running import DynamicsNode, NodeProcess
 
 COMPILE_ALL = 'from stewart_dynamics.compile_all import compile_all; compile_all()'
+
+# The same examples in every run, which may take long on a loaded computer.
+settings.register_profile('repeatable', deadline=None, derandomize=True)
+settings.load_profile('repeatable')
 
 # The module running needs ROS; the tests of the library do not, so it is imported where used.
 

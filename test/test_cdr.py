@@ -55,7 +55,7 @@ LENGTHS = {kind: {pose: 7, combined: 19}.get(reader, 6)
 KINDS = pytest.mark.parametrize('kind', READERS)
 ENDIAN = pytest.mark.parametrize('little_endian', [True, False], ids=['little', 'big'])
 
-moderately = settings(derandomize=True, deadline=None, max_examples=100)
+moderately = settings(max_examples=100)
 # A string of CDR can hold anything but a zero.
 texts = st.text(st.characters(exclude_characters='\0', exclude_categories=['Cs']), max_size=40)
 stamps = st.integers(-2 ** 31 * SECOND, 2 ** 31 * SECOND - 1)
@@ -238,7 +238,7 @@ def _survives(data: bytes) -> None:
         assert isinstance(read.frame, bytes)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.binary(max_size=300))
 @example(b'')
 @example(b'\0')
@@ -250,7 +250,7 @@ def test_no_bytes_raise_anything_else(data: bytes) -> None:
 
 
 @KINDS
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.data())
 def test_no_corrupted_message_raises_anything_else(kind: str, data: st.DataObject) -> None:
     spoiled = bytearray(valid(kind, data.draw(st.booleans())))

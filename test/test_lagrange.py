@@ -282,7 +282,7 @@ def test_each_source_equals_that_of_the_reference_matrices(hexapod: int) -> None
         assert off(forces[:, source], truth, forces) < 1e-11, SOURCES[source]
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 10 ** 6), st.integers(1, 100), st.booleans())
 def test_the_breakdown_sum_to_the_force(seed: int, many: int, loaded: bool) -> None:
     random = rng(seed)

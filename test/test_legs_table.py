@@ -120,7 +120,7 @@ def test_the_tables_give_every_number_back(tmp_path: Path) -> None:
 
 
 @given(st.data())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_tables_give_any_number_back(
         tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     number = data.draw(st.integers(1, 4))

@@ -125,7 +125,7 @@ def test_the_quaternion_of_one_matrix_is_that_of_many() -> None:
         assert np.array_equal(np.abs(exact), [*axis, 0.0])
 
 
-@settings(derandomize=True, max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
     lambda q: np.linalg.norm(q) > 1e-3))
 def test_any_quaternion_is_converted_both_ways_up_to_its_sign(numbers: list[float]) -> None:

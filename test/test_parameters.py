@@ -384,7 +384,7 @@ values = st.recursive(plain, lambda inner: st.one_of(
     st.dictionaries(st.text(max_size=5), inner, max_size=3)), max_leaves=12)
 
 
-@settings(derandomize=True, max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.dictionaries(st.one_of(st.sampled_from(NAMES), st.text(max_size=8)), values,
                        max_size=4))
 @np.errstate(all='ignore')
@@ -428,7 +428,7 @@ scalars = st.sampled_from([
     '"\\0"'])
 
 
-@settings(derandomize=True, max_examples=150, deadline=None,
+@settings(max_examples=150,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.one_of(
     st.text(max_size=60), st.text(alphabet=f'/*:rosparmet_{SPECIAL}', max_size=60),
@@ -441,7 +441,7 @@ def test_any_text_is_accepted_or_rejected_in_one_line(tmp_path: Path, text: str)
     check_any(file)
 
 
-@settings(derandomize=True, max_examples=150, deadline=None,
+@settings(max_examples=150,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.one_of(
     st.binary(max_size=60), st.tuples(cuts, st.binary(max_size=4)).map(
@@ -453,7 +453,7 @@ def test_any_bytes_are_accepted_or_rejected_in_one_line(tmp_path: Path, data: by
     check_any(file)
 
 
-@settings(derandomize=True, max_examples=150, deadline=None,
+@settings(max_examples=150,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(
     st.one_of(st.sampled_from(NAMES), st.text(alphabet='aA.*/: \n', max_size=5)),
@@ -632,7 +632,7 @@ def test_a_written_file_has_units_and_short_lines(tmp_path: Path) -> None:
 TEXTS = st.text(st.characters(codec='utf-8'), min_size=1, max_size=8).filter(str.isprintable)
 
 
-@settings(derandomize=True, max_examples=100, deadline=None,
+@settings(max_examples=100,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.one_of(TEXTS, st.sampled_from([
     'null', '~', 'yes', 'n', '1e3', '0x1F', '- a', 'a: b', '#', "'", '"', ' a ', '!!str', '*a',

@@ -374,7 +374,7 @@ def test_more_samples_than_allowed_are_not_taken(monkeypatch: pytest.MonkeyPatch
     assert 'more than 100 samples' in outcome.message
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data())
 def test_any_trajectory_is_accepted_or_rejected(data: st.DataObject) -> None:
     times, rows = some(data.draw(st.integers(1, 6)))
@@ -392,13 +392,13 @@ def test_any_trajectory_is_accepted_or_rejected(data: st.DataObject) -> None:
             assert np.isfinite([*point.positions, *point.velocities, *point.effort]).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=600))
 def test_any_bytes_are_rejected(data: bytes) -> None:
     assert outcome_of(data).reason
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.tuples(st.integers(1, 10**12), st.lists(st.floats(
     allow_nan=False, allow_infinity=False), min_size=15, max_size=15)), min_size=1, max_size=5))
 def test_any_numbers_are_accepted_or_rejected(points: list[tuple[int, list[float]]]) -> None:

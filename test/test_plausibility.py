@@ -444,7 +444,7 @@ def test_home_on_the_given_side_must_be_within_the_limits() -> None:
 NUMBERS = st.one_of(st.floats(-3.0, 3.0), st.floats(allow_nan=False, allow_infinity=False))
 
 
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(NUMBERS, min_size=18, max_size=18), st.lists(NUMBERS, min_size=18, max_size=18),
        st.dictionaries(st.sampled_from([
            'geometry.zero_length', 'limits.length_min', 'limits.length_max', 'platform.mass',

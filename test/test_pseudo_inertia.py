@@ -43,7 +43,7 @@ def body_of_points(seed: int) -> Array:
     return ten
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 10 ** 6))
 def test_points_of_mass_are_a_body(seed: int) -> None:
     ten = body_of_points(seed)
@@ -54,7 +54,7 @@ def test_points_of_mass_are_a_body(seed: int) -> None:
     np.testing.assert_allclose(from_log_cholesky(eta), ten, rtol=1e-9, atol=1e-9)
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=10, max_size=10))
 def test_any_log_cholesky_parameters_are_a_body(eta: list[float]) -> None:
     ten = from_log_cholesky(np.array(eta))

@@ -57,7 +57,7 @@ def joined(messages: Sequence[bytes]) -> tuple[bytes, list[int], list[int]]:
     return data, starts, [len(message) for message in messages]
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.data())
 def test_efforts_are_what_rosbags_wrote(data: st.DataObject) -> None:
     text = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=12)

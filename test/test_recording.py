@@ -432,7 +432,7 @@ def test_empty_bags(tmp_path: Path) -> None:
 
 @given(st.lists(st.tuples(st.sampled_from('abc'), st.integers(0, 12), st.integers(1, 300)),
                 min_size=1, max_size=60))
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_messages_come_in_the_order_in_which_rosbags_has_them(
         tmp_path_factory: pytest.TempPathFactory, of: list[tuple[str, int, int]]) -> None:
     # chunks overlap in any way, and are not in order, nor are the messages in them
@@ -633,7 +633,7 @@ def test_a_compressed_file_is_unpacked_up_to_a_limit(
 
 @given(st.binary(max_size=300), st.sampled_from([MAGIC, b'SQLite format 3\0', b'']),
        st.sampled_from(['.mcap', '.db3', '.mcap.zstd']))
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 def test_random_bytes_never_raise(
         tmp_path_factory: pytest.TempPathFactory, content: bytes, begin: bytes, suffix: str,
         ) -> None:
@@ -661,7 +661,7 @@ RECORDS = st.one_of(
 @given(st.lists(st.one_of(RECORDS, st.builds(
     lambda of, start, name: chunk(b''.join(of), start, compression=name),
     st.lists(RECORDS, max_size=6), st.integers(0, 9), st.sampled_from(['', '', '', 'lz4'])))))
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 def test_random_records_never_raise(
         tmp_path_factory: pytest.TempPathFactory, of: list[bytes]) -> None:
     file = tmp_path_factory.mktemp('records') / 'bag.mcap'

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 MANY = 20
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 10 ** 6), st.booleans(), st.booleans())
 def test_times_the_parameters_it_is_the_inverse_dynamics(
         seed: int, moving: bool, actuators: bool) -> None:

@@ -508,7 +508,7 @@ def test_the_number_of_waiting_samples_is_bounded(silent: str) -> None:
 
 # Quaternions
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 1e-3),
        st.floats(1 - 0.999e-3, 1 + 0.999e-3))
 @example((1.0, 0.0, 0.0, 0.0), 1.0)
@@ -573,7 +573,7 @@ def _drained(feed: Feed, answers: list[Setpoint]) -> None:
     answers += final
 
 
-@settings(derandomize=True, deadline=None, max_examples=250)
+@settings(max_examples=250)
 @given(samples, st.sampled_from([0.0, 0.005, 0.02]))
 def test_every_message_is_answered_or_counted(
         sequence: list[tuple[str, int, str]], tolerance: float) -> None:
@@ -599,7 +599,7 @@ def test_every_message_is_answered_or_counted(
         assert feed.given[topic] == len(answers) + rejected
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(samples, st.sampled_from([0, 5, 20]))
 def test_only_stamps_within_the_tolerance_are_joined(
         sequence: list[tuple[str, int, str]], tolerance: int) -> None:
@@ -613,7 +613,7 @@ def test_only_stamps_within_the_tolerance_are_joined(
             assert answer.stamp != NOW or marks == [0.0, 0.0, 0.0]
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.sampled_from([POSE, COMBINED]), st.binary(max_size=240)),
                 max_size=20))
 def test_random_bytes_are_rejected_without_an_exception(sequence: list[tuple[str, bytes]]) -> None:

@@ -83,7 +83,7 @@ def test_the_power_of_a_sine_is_under_its_peak() -> None:
     assert found.amplitudes[0, far].max() < 1e-3 * found.amplitudes.max()
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.data(), st.integers(1, 3000), st.booleans(), st.booleans())
 def test_blocks_change_nothing(data: st.DataObject, many: int, uneven: bool, spoiled: bool,
                                ) -> None:

@@ -308,7 +308,7 @@ def base_motions() -> st.SearchStrategy[Any]:
 
 
 @pytest.mark.parametrize('name', CALLS)
-@settings(derandomize=True, max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_any_arguments_give_finite_numbers_or_one_line(name: str, data: st.DataObject) -> None:
     platform = StewartPlatform(symmetric_parameters())

@@ -142,14 +142,9 @@ class Samples:
         return summary
 
 
-def lines_of(found: dict[str, Any]) -> list[str]:
-    """Return the lines for the terminal of a bag that was read as a whole."""
-    return summary_lines({**found, 'missing': [], 'rejected': [], 'measured': None})
-
-
 def table_of(samples: Samples, parameters: Parameters) -> str:
     """Return the summary for the terminal."""
-    return '\n'.join(lines_of(samples.summary(parameters).values()))
+    return '\n'.join(summary_lines(samples.summary(parameters).values()))
 
 
 def values(many: int, **given: Any) -> dict[str, Any]:
@@ -376,7 +371,7 @@ def assert_same(found: Any, truth: Any, at: str = '') -> None:
         assert found == truth, at
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.integers(0, 10 ** 6), st.integers(1, 50))
 def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
     samples, parameters = random_samples(seed, many), hexapod(**LIMITS)
@@ -384,7 +379,7 @@ def test_the_summary_agrees_with_its_definitions(seed: int, many: int) -> None:
     assert_same(found, json.loads(json.dumps(plain(parameters, samples))))
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.data(), st.integers(0, 10 ** 6), st.integers(1, 60))
 def test_any_split_gives_the_same(data: st.DataObject, seed: int, many: int) -> None:
     edges = sorted(data.draw(st.lists(st.integers(0, many), max_size=many)))
@@ -548,7 +543,7 @@ def test_without_a_setpoint_there_is_nothing() -> None:
     assert set(found['base_wrench']['moment'].values()) == {None}
     assert set(found['legs']['front left'].values()) == {None}
     assert (found['limits'], found['force_breakdown'], found['limit_met']) == ([], None, False)
-    assert lines_of(summary.values()) == ['no setpoint could be answered']
+    assert summary_lines(summary.values()) == ['no setpoint could be answered']
     assert_same(Samples(0).summary(hexapod()).values(), Summary(hexapod()).values())
 
 
@@ -658,7 +653,7 @@ def test_a_small_example() -> None:
         'condition number of J_inv: 3 at most, at t = 2.00 s']
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.integers(0, 10 ** 6), st.integers(0, 60), st.floats(1e-3, 1e9), st.booleans())
 def test_the_table_is_no_wider_than_100_columns(
         seed: int, many: int, scale: float, limited: bool) -> None:
@@ -746,7 +741,7 @@ def test_velocities_rates_power_and_energy_of_poses_are_not_known() -> None:
     # a limit that cannot be checked is not held
     assert (found['limits'], found['limits_not_checked']) == ([], ['limits.velocity_max'])
     assert found['limit_met']
-    text = '\n'.join(lines_of(found))
+    text = '\n'.join(summary_lines(found))
     assert 'limits.velocity_max could not be checked' in text
     assert 'all limits held' not in text
     without = Summary(hexapod(**{'limits.force_max': 5.0}), quasi_static=True)
@@ -766,7 +761,7 @@ def test_setpoints_without_a_known_base_are_counted_and_have_no_forces() -> None
         assert found['setpoints']['base_unknown_first_at_s'] == 1.0
         assert (found['singularity']['unsolved'], found['singularity']['suppressed']) == (0, 0)
         assert bool(found['limits_not_checked']) is found['limit_met'] is not checked
-        text = '\n'.join(lines_of(found))
+        text = '\n'.join(summary_lines(found))
         assert ("the base's motion is not known in 2 setpoints, first at t = 1.00 s: they have no "
                 'forces') in text
         assert ("limits.force_max could not be checked in 2 setpoints: the base's motion is not "

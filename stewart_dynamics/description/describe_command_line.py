@@ -27,7 +27,6 @@ from stewart_dynamics.program import DONE, Program
 from stewart_dynamics.whole_file import write_files
 
 if TYPE_CHECKING:
-    from stewart_dynamics.description.recognition import read_hexapod
     from stewart_dynamics.parameters.table import Parameters
 
 LIKELY_MISTAKE = 1
@@ -108,6 +107,7 @@ def _write(given: argparse.Namespace) -> int:
 
 
 def _read(given: argparse.Namespace) -> int:
+    from stewart_dynamics.description.recognition import read_hexapod
 
     if given.ros2_control is not None:
         raise StewartError('--ros2-control: not with --from')

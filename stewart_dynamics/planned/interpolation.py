@@ -338,7 +338,8 @@ class Cubics(NamedTuple):
 
     def _powers(self) -> tuple[Array, Array, Array]:
         """Return the coefficients of the first, second and third power."""
-        difference = self.end - self.start
+        with np.errstate(invalid='ignore'):  # infinite ends: no extremum is inside
+            difference = self.end - self.start
         return (self.start_rate, 3.0 * difference - 2.0 * self.start_rate - self.end_rate,
                 self.start_rate + self.end_rate - 2.0 * difference)
 

@@ -74,10 +74,15 @@ class Statement(NamedTuple):
 
 def statements(summary: Summary) -> list[Statement]:
     """Return all statements about a bag; each topic's most important ones first."""
-    of_motion = [] if not summary['setpoints']['answered'] else [
-        *_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
-        *_singularity(summary['singularity'])]
-    return [*of_motion, *_reading(summary), *_measured(summary['measured'])]
+    return [*motion_statements(summary), *_messages(summary), *_measured(summary['measured'])]
+
+
+def motion_statements(summary: Summary) -> list[Statement]:
+    """Return the statements about the answered setpoints, for which no bag is needed."""
+    points = summary['setpoints']
+    found = [*_limits(summary), *_joints(summary['legs']), *_loads(summary['base_wrench']),
+             *_singularity(summary['singularity'])] if points['answered'] else []
+    return [*found, *_answered(points)]
 
 
 class Card(NamedTuple):
@@ -103,16 +108,18 @@ def plural(number: int, what: str) -> str:
     return f'{number} {what}' if number == 1 else f'{number} {what}s'
 
 
-def _reading(summary: Summary) -> Iterator[Statement]:
-    points = summary['setpoints']
+def _answered(points: Summary) -> Iterator[Statement]:
     yield Statement(READING, 'good', f'{plural(points["answered"], "setpoint")} in '
                                      f'{points["duration_s"]:.2f} s{_interruptions(points)}')
-    for each in summary['missing']:
-        yield Statement(MISSING, 'bad', f'not read: {each}')
     if unknown := points['base_unknown']:
         yield Statement(
             READING, 'warn', f'{BASE_NOT_KNOWN} in {plural(unknown, "setpoint")}, first',
             points['base_unknown_first_at_s'], 'base_force', ': they have no forces')
+
+
+def _messages(summary: Summary) -> Iterator[Statement]:
+    for each in summary['missing']:
+        yield Statement(MISSING, 'bad', f'not read: {each}')
     rejected = sorted(summary['rejected'], key=lambda each: -each['count'])
     for each in rejected[:_LISTED]:
         yield Statement(

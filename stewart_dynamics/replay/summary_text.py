@@ -24,7 +24,7 @@ from typing import Any
 from stewart_dynamics.mechanics.plausibility import likely_mistakes
 from stewart_dynamics.parameters.table import Parameters
 from stewart_dynamics.replay.statements import (
-    JOINTS, LIMITS, LOADS, READING, SINGULARITY, statements)
+    JOINTS, LIMITS, LOADS, motion_statements, READING, SINGULARITY)
 from stewart_dynamics.setpoints.rejections import Rejection
 
 _LISTED = 5
@@ -61,7 +61,7 @@ def summary_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return the lines about the motion, no wider than 100 columns, from summary.json."""
     if not summary['setpoints']['answered']:
         return ['no setpoint could be answered']
-    about = statements(summary)
+    about = motion_statements(summary)
     heading, *reading = [each.line for each in about if each.topic == READING]
     legs = summary['legs'].values()
     clipped = [leg['force_margin_n'] is not None and leg['force_margin_n'] <= 0.0 for leg in legs]
