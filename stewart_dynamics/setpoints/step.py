@@ -45,7 +45,7 @@ from stewart_dynamics.mechanics.singularity_warning import (
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.messages.cdr import STAMPS_END
 from stewart_dynamics.parameters.table import Parameters
-from stewart_dynamics.setpoints.check import (
+from stewart_dynamics.setpoints.result_checks import (
     check, check_many, FORCE_MAX, LIMITS, LIMITS_SUPPRESS, OF_WARNING, SUPPRESS)
 
 
