@@ -327,7 +327,7 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
         if t >= end:
             return end
         # The next interval is cleared from its middle, where it reaches back to the last one.
-        middle = t + max(0.9 * width, narrow)
+        middle = t + max(min(0.9 * width, 0.5 * (end - t)), narrow)
         margin, cleared, sign = _margin(constants, legs, velocity, rate, stop, middle)
         inside = margin > 0.0 and sign * side > 0.0
         if inside and (middle - cleared <= t or width <= narrow):
