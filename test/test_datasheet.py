@@ -34,6 +34,7 @@ from referees import random_direction, rng, rotation_about
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
 from stewart_dynamics.datasheet import main
+from stewart_dynamics.datasheet.datasheet_text import between_setpoints
 from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
 from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
@@ -187,6 +188,30 @@ def test_a_motion_at_its_factor_uses_a_limit_whole(recorded: RecordedMotion) -> 
     assert found['limit'] == 'velocity_max'
     assert max(each.max() for each in used.values()) == pytest.approx(1.0, rel=1e-9)
     assert recorded.seconds[int(used['rate'].argmax())] == found['at_s']
+
+
+def test_the_motion_between_setpoints_is_judged_where_it_is_known(
+        recorded: RecordedMotion) -> None:
+    platform, few = StewartPlatform(PARAMETERS), slice(2, None, 49)
+    coarse = recorded._replace(
+        seconds=recorded.seconds[few] - recorded.seconds[2],
+        motion=Motion.of_rows(recorded.motion.rows[few]), wrench=recorded.wrench[few])
+
+    def between(motion: RecordedMotion) -> dict[str, Any]:
+        found: dict[str, Any] = judged(platform, motion, uses(platform, motion))
+        return found
+
+    found = between(coarse)
+    assert found['between_setpoints']['reason'] is None
+    assert 0.9 * found['factor'] < found['between_setpoints']['factor'] <= found['factor']
+    loaded = coarse.wrench.copy()
+    loaded[1, 2] = 5.0
+    for changed, text in ((coarse._replace(wrench=loaded), 'the wrench or the base changes'),
+                          (coarse._replace(seconds=0.0 * coarse.seconds), 'do not increase')):
+        judgement = between(changed)
+        assert text in judgement['between_setpoints']['reason']
+        assert text in between_setpoints(judgement)
+    assert 'as in a planned trajectory: ' in between_setpoints(found)
 
 
 @pytest.mark.parametrize(('changes', 'limit'), [

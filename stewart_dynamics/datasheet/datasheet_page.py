@@ -25,7 +25,8 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
-from stewart_dynamics.datasheet.datasheet_text import box_verdict, motion_verdict
+from stewart_dynamics.datasheet.datasheet_text import (
+    between_setpoints, box_verdict, motion_verdict)
 from stewart_dynamics.datasheet.figures import (
     both_ways, DEGREE, down, LINEAR, MM, span, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
@@ -119,6 +120,7 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         oblique=drawing.oblique().svg(), front=drawing.front().svg(), top=drawing.top().svg(),
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),
+        between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         clearance=hexapod.limited('leg_clearance_min'), down=down, span=span, MM=MM,
         DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})

@@ -45,6 +45,18 @@ def sheet_text(sheet: dict[str, Any]) -> str:
 
 def motion_verdict(found: dict[str, Any]) -> str:
     """Return how much faster a motion can be, and its limit."""
+    text = _fastest(found)
+    if not found['factor']:
+        return text
+    larger = found['amplitude']
+    if larger and larger['value'] is not None:
+        text += (f'; up to {down(larger["value"])} times as large about its first pose, limited '
+                 f'by {_limit(larger)}')
+    return text
+
+
+def _fastest(found: dict[str, Any]) -> str:
+    """Return the factor of a motion's speed, and its limit."""
     factor = found['factor']
     if factor is None:
         return 'no limit at any speed'
@@ -52,12 +64,20 @@ def motion_verdict(found: dict[str, Any]) -> str:
         _limit(found))
     if factor == 0.0:
         return f'at no speed, by {where}'
-    text = f'up to {down(factor)} times as fast, limited by {where}'
-    larger = found['amplitude']
-    if larger and larger['value'] is not None:
-        text += (f'; up to {down(larger["value"])} times as large about its first pose, limited '
-                 f'by {_limit(larger)}')
-    return text
+    return f'up to {down(factor)} times as fast, limited by {where}'
+
+
+def between_setpoints(found: dict[str, Any]) -> str:
+    """Return a sentence on the limits between the setpoints of a motion."""
+    between = found['between_setpoints']
+    if between is None:
+        return 'Limits are checked at the setpoints.'
+    if between['reason'] is not None:
+        return f'Checked at the setpoints, not between them: {between["reason"]}.'
+    same = all(between[key] == found[key] for key in ('limit', 'leg')) and (
+        down(between['factor']) == down(found['factor']))
+    return ('Speed between the setpoints as in a planned trajectory: '
+            f'{"the same" if same else _fastest(between)}.')
 
 
 def box_verdict(found: dict[str, Any]) -> str:
