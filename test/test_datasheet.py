@@ -34,7 +34,7 @@ from referees import random_direction, rng, rotation_about
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
 from stewart_dynamics.datasheet import main
-from stewart_dynamics.datasheet.datasheet_text import between_setpoints
+from stewart_dynamics.datasheet.datasheet_text import between_setpoints, motion_verdict
 from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
 from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
@@ -227,6 +227,17 @@ def test_a_motion_that_exceeds_a_limit_is_not_possible(
     assert found['amplitude']['value'] < 1.0
 
 
+def test_without_a_limit_of_its_speed_a_motion_is_possible_and_can_be_larger(
+        recorded: RecordedMotion) -> None:
+    platform = StewartPlatform(PARAMETERS.replaced({
+        'limits.velocity_max': None, 'limits.force_max': None}))
+    found = judged(platform, recorded, uses(platform, recorded))
+    assert found['possible']
+    assert found['factor'] is found['limit'] is found['payload'] is None
+    assert found['amplitude']['value'] > 1.0
+    assert motion_verdict(found).startswith('no limit at any speed; up to ')
+
+
 def test_a_bag_through_a_singularity_is_not_possible(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = '--params', PLATFORM, '--motion', ROOT / 'bags' / 'singular', '--output'
@@ -320,6 +331,28 @@ def test_a_box_that_is_none_is_rejected(
     given = '--params', PLATFORM, '--box', tmp_path / 'box.yaml', '--output', tmp_path / 'a'
     assert run(*given) == 2
     assert error in capsys.readouterr().err
+
+
+def test_a_box_that_is_not_reachable_names_its_worst_displacement_or_a_singularity(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'box.yaml').write_text('x: [0.2, 0.8]\nry: 0.1\n')
+    given = '--box', tmp_path / 'box.yaml', '--output'
+    assert run('--params', PLATFORM, *given, tmp_path / 'a', '--strict') == 1
+    box = json.loads((tmp_path / 'a' / 'datasheet.json').read_text())['box']
+    assert box['displacement']['x'] == pytest.approx(0.8)
+    assert abs(box['displacement']['ry']) == pytest.approx(0.1)
+    assert [box['displacement'][axis] for axis in ('y', 'z', 'rx', 'rz')] == [0.0] * 4
+    printed = capsys.readouterr().out
+    assert f'({box["leg"]}) exceeded by {down(1e3 * box["excess"])} mm at x ' in printed
+    assert '−0 ' not in printed
+    values = {name: value for name, value in PARAMETERS.given.items()
+              if not name.startswith('limits.length_')}
+    Parameters(values).to_yaml(tmp_path / 'a.yaml')
+    (tmp_path / 'box.yaml').write_text('rx: 3.0')
+    assert run('--params', tmp_path / 'a.yaml', *given, tmp_path / 'b',
+               '--pose', 0, 0, 1.18, 0, 0, 0) == 0
+    assert 'box not possible: singularity ' in capsys.readouterr().out
+    assert json.loads((tmp_path / 'b' / 'datasheet.json').read_text())['box']['excess'] is None
 
 
 def test_without_limits_there_is_no_datasheet_and_ratings_without_theirs_are_left_out(

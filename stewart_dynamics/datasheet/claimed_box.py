@@ -66,6 +66,7 @@ def _range(where: str, value: Any) -> tuple[float, float]:
     return float(bounds[0]), float(bounds[1])
 
 
-def in_words(ranges: Array) -> Mapping[str, list[float]]:
-    """Return the ranges by axis, for JSON."""
-    return {axis: each.tolist() for axis, each in zip(AXES, ranges, strict=True)}
+def in_words(ranges: Array) -> Mapping[str, list[float | None]]:
+    """Return the ranges by axis, for JSON: null where nothing limits."""
+    return {axis: [value if math.isfinite(value) else None for value in each]
+            for axis, each in zip(AXES, ranges.tolist(), strict=True)}

@@ -161,15 +161,17 @@ def _at_once(hexapod: RatedHexapod, alone: dict[str, Any]) -> dict[str, Any] | N
             return None
         scaled = hexapod.reachable_factor(ranges)
         found[name] = {
-            'ranges': claimed_box.in_words(scaled.value * ranges),
+            'ranges': claimed_box.in_words(
+                np.multiply(scaled.value, ranges, out=np.zeros((6, 2)), where=ranges != 0.0)),
             **answer(scaled.value, scaled.limit, scaled.leg, hexapod.joints)}
         found[name]['factor'] = found[name].pop('value')
     return found
 
 
 def _stated(at_once: dict[str, Any] | None) -> Array | None:
-    return None if at_once is None else np.array(
-        [at_once['all']['ranges'][axis] for axis in AXES])
+    if at_once is None or at_once['all']['factor'] is None:
+        return None
+    return np.array([at_once['all']['ranges'][axis] for axis in AXES])
 
 
 def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
@@ -178,13 +180,20 @@ def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
     worst = found.worst
     factor = None
     if (ranges[:, 0] <= 0.0).all() and (ranges[:, 1] >= 0.0).all():
-        factor = float(hexapod.reachable_factor(ranges).value)
+        factor = _finite(hexapod.reachable_factor(ranges).value)
+    moved = hexapod.displacement(Pose(
+        worst.pose.position + worst.pose.rotation @ hexapod.pivot, worst.pose.rotation))
     return {'possible': bool(found.certain), 'ranges': claimed_box.in_words(ranges),
             'factor': factor, 'limit': worst.limit,
             'leg': hexapod.joints[worst.leg] if worst.leg >= 0 else None,
-            'excess': float(worst.excess),
+            'excess': _finite(worst.excess),
+            'displacement': dict(zip(AXES, moved.tolist(), strict=True)),
             'position': worst.pose.position.tolist(),
             'angles': to_euler(worst.pose.rotation).tolist()}
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def _smallest_tilt(boundary: workspace.Boundary, hexapod: RatedHexapod) -> dict[str, Any]:

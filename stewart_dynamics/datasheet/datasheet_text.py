@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from stewart_dynamics.datasheet.figures import both_ways, down, span, unit_of
+from stewart_dynamics.datasheet.figures import (
+    both_ways, DEGREE, down, limit_name, MM, span, unit_of)
 from stewart_dynamics.datasheet.ratings import AXES
 
 
@@ -46,7 +47,7 @@ def sheet_text(sheet: dict[str, Any]) -> str:
 def motion_verdict(found: dict[str, Any]) -> str:
     """Return how much faster a motion can be, and its limit."""
     text = _fastest(found)
-    if not found['factor']:
+    if found['factor'] == 0.0:
         return text
     larger = found['amplitude']
     if larger and larger['value'] is not None:
@@ -86,11 +87,27 @@ def box_verdict(found: dict[str, Any]) -> str:
         f'up to {down(found["factor"])} times as large')
     if found['possible']:
         return f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
-    position = ', '.join(f'{each:.4g}' for each in found['position'])
-    angles = ', '.join(f'{each:.4g}' for each in found['angles'])
-    return (f'{_limit(found)} is exceeded at {position} m, {angles} rad'.replace('-', '−')
-            + (f'; reachable {factor}' if factor else ''))
+    moved = ', '.join(
+        f'{axis} {down(each * unit.factor)} {unit.name}'
+        for axis, each in found['displacement'].items()
+        if each and (unit := unit_of(axis, 'travel')))
+    text = f'{_exceeded(found)} at {moved or "the rated pose"}'
+    return text + (f'; reachable {factor}' if factor else '')
 
 
 def _limit(found: dict[str, Any]) -> str:
-    return f'{found["limit"]} of {found["leg"]}' if found['leg'] else f'{found["limit"]}'
+    text = limit_name(found['limit'])
+    return f'{text} ({found["leg"]})' if found['leg'] else text
+
+
+def _exceeded(found: dict[str, Any]) -> str:
+    """Return by how much a box exceeds a limit."""
+    excess, limit = found['excess'], _limit(found)
+    if excess is None:
+        return f'{limit} between the rated pose and a pose'
+    if excess <= 0.0:
+        return f'not proven: no pose exceeds a limit as far as searched, {limit} is nearest'
+    if found['limit'] == 'singularity':
+        return f'{limit}: condition number exceeded by {down(excess)}'
+    unit = MM if found['limit'].startswith('length') else DEGREE
+    return f'{limit} exceeded by {down(excess * unit.factor)} {unit.name}'

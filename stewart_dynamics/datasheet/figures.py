@@ -39,6 +39,18 @@ ANGULAR = {'travel': DEGREE, 'velocity': Unit('°/s', DEGREE.factor),
            'stiffness': Unit('N m/mrad', 1e-3)}
 
 
+_NAMES = {
+    'length_max': 'longest leg', 'length_min': 'shortest leg', 'velocity_max': 'speed of a leg',
+    'force_max': 'force of a leg', 'base_joint_angle_max': 'joint angle at the base',
+    'platform_joint_angle_max': 'joint angle at the platform',
+    'leg_clearance_min': 'clearance between legs'}
+
+
+def limit_name(limit: str) -> str:
+    """Return the name of a limit or of a singularity."""
+    return _NAMES.get(limit, limit)
+
+
 def unit_of(axis: str, quantity: str) -> Unit:
     """Return the unit of a quantity along an axis, x or rx."""
     return (ANGULAR if axis.startswith('r') else LINEAR)[quantity]

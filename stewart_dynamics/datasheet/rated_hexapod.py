@@ -26,10 +26,16 @@ from stewart_dynamics.capability.reachable import Reachable
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.errors import ParameterError, PoseError, SingularityError
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+from stewart_dynamics.planned.interpolation import rotation_vector
+
+
+# Displacements below it are rounding errors [m, rad].
+_ROUNDING = 1e-12
 
 
 class Payload(NamedTuple):
@@ -133,6 +139,13 @@ class RatedHexapod:
             rotation = (np.eye(3) + np.sin(angle) * k
                         + (1.0 - np.cos(angle)) * k @ k) @ rotation
         return Pose(self.pose.position + by * direction[:3], rotation)
+
+    def displacement(self, pose: Pose) -> Array:
+        """Return translation and rotation vector (6,), base axes, to a pose of the pivot."""
+        turn = rotation_vector(*(to_quaternion(each.rotation[None]) for each in (self.pose, pose)))
+        moved = np.append(pose.position - self.pose.position, turn)
+        moved[np.abs(moved) < _ROUNDING] = 0.0
+        return moved
 
     def _check(self, whole: StewartPlatform, pose: Pose) -> None:
         """Raise where a limit is exceeded at the pose already."""

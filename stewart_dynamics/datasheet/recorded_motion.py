@@ -165,9 +165,13 @@ def judged(platform: StewartPlatform, recorded: RecordedMotion,
         return found | {'factor': 0.0, 'limit': 'singularity', 'leg': None,
                         'at_s': float(recorded.seconds[at]), 'between_setpoints': None,
                         'amplitude': None, 'payload': None}
-    speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
-    found |= _named('factor', speed, recorded, joints)
-    found['between_setpoints'] = _between(c, recorded, joints)
+    if found['possible'] and p[limits.VELOCITY_MAX] is None and p[limits.FORCE_MAX] is None:
+        found |= {'factor': None, 'limit': None, 'leg': None, 'at_s': None,
+                  'between_setpoints': None}
+    else:
+        speed = c.speed_factor(recorded.motion, recorded.wrench, recorded.base)
+        found |= _named('factor', speed, recorded, joints)
+        found['between_setpoints'] = _between(c, recorded, joints)
     amplitude = payload = None
     if len(recorded.seconds) <= _MOST:
         larger = c.amplitude_factor(recorded.motion, None, recorded.wrench, recorded.base)
