@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Capability: answers against what they claim, and the time they take.
+Capability: answers compared with independent computations, and the time they take.
 
 Run by hand, ``make bench-capability``; see README.md beside this file.
 """

@@ -228,8 +228,9 @@ def pose(constants: Array, lengths: Array, motion: Array) -> tuple[int, int, flo
     wanted = lengths[0], lengths[1], lengths[2], lengths[3], lengths[4], lengths[5]
     code, steps, residual, position, rotation = _newton(constants, wanted, guess, orientation)
     if code == NO_POSE:
-        code, more, _, position, rotation = _homotopy(constants, wanted, guess, orientation)
+        code, more, last, position, rotation = _homotopy(constants, wanted, guess, orientation)
         steps += more
+        residual = last if code == FOUND else residual
     if code == FOUND:
         for n in range(3):
             motion[POSITION.start + n] = position[n]
