@@ -34,12 +34,14 @@ from referees import random_direction, rng, rotation_about
 from stewart_dynamics import (
     BaseMotion, Capability, Motion, Parameters, Pose, PoseError, StewartPlatform)
 from stewart_dynamics.datasheet import main
-from stewart_dynamics.datasheet.datasheet_text import between_setpoints, motion_verdict
+from stewart_dynamics.datasheet.datasheet_text import (
+    between_setpoints, motion_verdict, rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.figures import both_ways, down, LINEAR
 from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import Payload, RatedHexapod
 from stewart_dynamics.datasheet.ratings import at_pose, AXES, KEYS
-from stewart_dynamics.datasheet.recorded_motion import judged, RecordedMotion, uses
+from stewart_dynamics.datasheet.recorded_motion import judged, read_motion, RecordedMotion, uses
+from stewart_dynamics.replay.replay_options import Options
 from stewart_dynamics.reporting.vector_picture import hull, ticks
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -384,8 +386,25 @@ def test_legs_that_are_too_near_reject_a_pose_and_make_a_motion_impossible(
             'limits.leg_clearance_min': factor * float(np.min(nearest))}))
         used = uses(platform, recorded)
         assert judged(platform, recorded, used)['possible'] is possible
+    rated = RatedHexapod(p)
+    assert rated.clearance() == pytest.approx(rated.loads.clearance(rated.pose))
+    assert RatedHexapod(PARAMETERS).clearance() is None
     with pytest.raises(PoseError, match='clearance .* below limits.leg_clearance_min'):
         RatedHexapod(p.replaced({'limits.leg_clearance_min': 1.0}))
+
+
+def test_rejected_messages_of_a_motion_are_counted() -> None:
+    motion = read_motion(ROOT / 'bags' / 'flawed', PARAMETERS, Options(), lambda size: None)
+    said = setpoints_used({'samples': len(motion.seconds), 'rejected': motion.rejected})
+    assert said == '932 setpoints used, 207 messages rejected'
+
+
+@pytest.mark.parametrize(('source', 'payload'), [
+    ('fixed', ('', 3.0)), ('pose', (', base in any orientation', 2.0))])
+def test_the_payload_of_a_base_that_turns_is_that_of_any_orientation(
+        source: str, payload: tuple[str, float]) -> None:
+    assert rated_payload({'payload': {'value': 3.0, 'any_orientation': 2.0},
+                          'parameters': {'base.source': source}}) == payload
 
 
 def test_results_are_replaced_only_by_option(

@@ -99,6 +99,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         order.bag, hexapod.given, order.recording, progress.read)
     progress.stage('travel')
     sheet = _head(hexapod, order)
+    sheet['leg_clearance'] = hexapod.clearance()
     sheet['travel'] = ratings.travel(hexapod)
     progress.stage('ranges at once')
     sheet['at_once'] = _at_once(hexapod, sheet['travel'])
@@ -121,7 +122,7 @@ def write_datasheet(parameters: Parameters, order: Order, folder: Path, options:
         platform = StewartPlatform(hexapod.given)
         used = uses(platform, recorded)
         sheet['motion'] = {'bag': str(order.bag)} | judged(platform, recorded, used) | {
-            'missing': recorded.missing}
+            'rejected': recorded.rejected, 'missing': recorded.missing}
     progress.stage('page')
     sheet['parameters'] = plain_parameters(hexapod.given)
     pictures = Pictures(hexapod, sheet, sections, tilts, ranges,
@@ -186,6 +187,7 @@ def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
     return {'possible': bool(found.certain), 'ranges': claimed_box.in_words(ranges),
             'factor': factor, 'limit': worst.limit,
             'leg': hexapod.joints[worst.leg] if worst.leg >= 0 else None,
+            'not_considered': ['leg_clearance_min'] * hexapod.limited('leg_clearance_min'),
             'excess': _finite(worst.excess),
             'displacement': dict(zip(AXES, moved.tolist(), strict=True)),
             'position': worst.pose.position.tolist(),

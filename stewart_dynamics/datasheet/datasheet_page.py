@@ -26,7 +26,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability.workspace import Section
 from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
-    between_setpoints, box_verdict, motion_verdict)
+    between_setpoints, box_verdict, motion_verdict, rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.figures import (
     both_ways, DEGREE, down, LINEAR, MM, span, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
@@ -121,8 +121,8 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
-        clearance=hexapod.limited('leg_clearance_min'), down=down, span=span, MM=MM,
-        DEGREE=DEGREE, names=_NAMES)
+        setpoints_used=setpoints_used, clearance=hexapod.limited('leg_clearance_min'), down=down,
+        span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 
@@ -148,7 +148,8 @@ def _key_figures(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[
                   if sheet['tilt']['value'] is not None else '–', '°'))
     found.append(('Rotation θZ', both_ways(travel, 'rz', DEGREE), '°'))
     if sheet['payload'] is not None:
-        found.append(('Payload', down(sheet['payload']['value']), 'kg'))
+        any_orientation, value = rated_payload(sheet)
+        found.append((f'Payload{any_orientation}', down(value), 'kg'))
         found.append(('Force, every direction', down(sheet['force']['every_direction']), 'N'))
     if sheet['velocity'] is not None:
         found.append(('Velocity Z', both_ways(sheet['velocity'], 'z', LINEAR['velocity']), 'mm/s'))
@@ -293,5 +294,8 @@ def _properties(sheet: Mapping[str, Any], hexapod: RatedHexapod) -> list[tuple[s
             unit = ('°' if angle else ' m/s' if 'velocity' in name else ' N' if 'force' in name
                     else ' m')
             rows.append((name, numbers(value, DEGREE.factor if angle else 1.0, unit)))
+    if sheet['leg_clearance'] is not None:
+        rows.append(('Clearance between legs at the pose',
+                     numbers(sheet['leg_clearance'], 1e3, ' mm')))
     rows.append(('singularity.stop_condition', f'{p["singularity.stop_condition"]:g}'))
     return rows

@@ -16,18 +16,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from stewart_dynamics.datasheet.figures import (
     both_ways, DEGREE, down, limit_name, MM, span, unit_of)
 from stewart_dynamics.datasheet.ratings import AXES
+from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
+
+_NO_CLEARANCE = '; clearance between the legs not considered'
 
 
 def sheet_text(sheet: dict[str, Any]) -> str:
     """Return travel, payload, and whether box and motion are possible."""
     at_once = sheet['at_once']
     lines = [f'{sheet["name"]}: travel of each axis alone' + (
-        ', all at once' if at_once else '')]
+        ', all at once' if at_once else '') + (
+        _NO_CLEARANCE if sheet['parameters'][CLEARANCE_MIN] is not None else '')]
     for axis in AXES:
         unit = unit_of(axis, 'travel')
         line = f'  {axis:<3} {both_ways(sheet["travel"], axis, unit):>20} {unit.name:<3}'
@@ -36,12 +41,33 @@ def sheet_text(sheet: dict[str, Any]) -> str:
             line += f' {ranges:>20} {unit.name}'
         lines.append(line.rstrip())
     if sheet['payload'] is not None:
-        lines.append(f'payload {down(sheet["payload"]["value"])} kg')
+        any_orientation, value = rated_payload(sheet)
+        lines.append(f'payload at the pivot, at rest{any_orientation}: {down(value)} kg')
     for name, words in (('box', box_verdict), ('motion', motion_verdict)):
         if sheet[name]:
             possible = 'possible' if sheet[name]['possible'] else 'not possible'
             lines.append(f'{name} {possible}: {words(sheet[name])}')
+    motion = sheet['motion']
+    if motion:
+        lines.append(f'  {setpoints_used(motion)}')
+        if motion['payload'] and motion['payload']['value'] is not None:
+            lines.append('  payload at the pivot that can be added in the motion: '
+                         f'{down(motion["payload"]["value"])} kg')
     return '\n'.join(lines)
+
+
+def rated_payload(sheet: Mapping[str, Any]) -> tuple[str, float | None]:
+    """Return the payload at rest; of any orientation of the base, and so named, if that moves."""
+    found = sheet['payload']
+    if sheet['parameters']['base.source'] != 'fixed' and found['any_orientation'] is not None:
+        return ', base in any orientation', found['any_orientation']
+    return '', found['value']
+
+
+def setpoints_used(motion: Mapping[str, Any]) -> str:
+    """Return how many setpoints a motion has, and how many messages were rejected."""
+    text = f'{motion["samples"]} setpoints'
+    return f'{text} used, {motion["rejected"]} messages rejected' if motion['rejected'] else text
 
 
 def motion_verdict(found: dict[str, Any]) -> str:
@@ -86,7 +112,8 @@ def box_verdict(found: dict[str, Any]) -> str:
     factor = '' if found['factor'] is None else (
         f'up to {down(found["factor"])} times as large')
     if found['possible']:
-        return f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
+        text = f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
+        return text + (_NO_CLEARANCE if found['not_considered'] else '')
     moved = ', '.join(
         f'{axis} {down(each * unit.factor)} {unit.name}'
         for axis, each in found['displacement'].items()

@@ -30,7 +30,7 @@ from stewart_dynamics.mechanics.frames.rotation import to_quaternion
 from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import LIMITS, Limits
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import inertia_matrix, Parameters
+from stewart_dynamics.parameters.table import inertia_matrix, LEG_SHAPE, Parameters
 from stewart_dynamics.planned.interpolation import rotation_vector
 
 
@@ -139,6 +139,12 @@ class RatedHexapod:
             rotation = (np.eye(3) + np.sin(angle) * k
                         + (1.0 - np.cos(angle)) * k @ k) @ rotation
         return Pose(self.pose.position + by * direction[:3], rotation)
+
+    def clearance(self) -> float | None:
+        """Return the clearance between the legs at the pose [m]; None without their radii."""
+        if any(self.given[name] is None for name in LEG_SHAPE):
+            return None
+        return float(self._limits.clearance(self.origin))
 
     def displacement(self, pose: Pose) -> Array:
         """Return translation and rotation vector (6,), base axes, to a pose of the pivot."""

@@ -58,6 +58,8 @@ class RecordedMotion(NamedTuple):
     base: BaseMotion | None
     missing: list[str]
     """Parts of the bag that could not be read."""
+    rejected: int = 0
+    """Number of rejected messages."""
 
 
 def read_motion(bag: Path, parameters: Parameters, options: Options,
@@ -105,7 +107,8 @@ def read_motion(bag: Path, parameters: Parameters, options: Options,
         stamps, rows, wrenches, bases = (each[known] for each in (stamps, rows, wrenches, bases))
     steps = np.maximum(np.diff(stamps, prepend=stamps[0]), 0)  # a bag that loops
     return RecordedMotion(np.cumsum(steps) * 1e-9, Motion.of_rows(rows), wrenches,
-                          None if bases is None else BaseMotion.of_rows(bases), missing)
+                          None if bases is None else BaseMotion.of_rows(bases), missing,
+                          sum(setpoints.counts.values()))
 
 
 def uses(platform: StewartPlatform, recorded: RecordedMotion) -> dict[str, Array]:
