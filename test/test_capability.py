@@ -254,6 +254,47 @@ def test_a_travel_ends_at_the_stop_condition_and_before_a_singularity() -> None:
             assert np.all(np.sign(solved.determinant[:-1]) == np.sign(solved.determinant[0]))
 
 
+def test_a_travel_that_begins_on_a_limit_and_along_it_is_zero_where_it_is_exceeded() -> None:
+    base = np.array([[1.0, 0.0, 0.0], [-0.5, 0.75, 0.0], [-0.5, -0.75, 0.0],
+                     [2.0, 0.0, 1.0], [0.0, 3.0, 1.0], [-2.0, -1.0, 1.0]])
+    joints = np.concatenate([base[:3], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]])
+    p = PLATFORM.parameters.replaced({
+        'geometry.base_joints': base.ravel(), 'geometry.platform_joints': joints.ravel(),
+        'limits.length_min': 0.5, 'limits.length_max': (1.0, 1.0, 1.0, 1.2, 2.2, 2.2),
+        'singularity.stop_condition': 1000.0})
+    start = Pose([0.0, 0.0, 1.0], np.eye(3))  # three vertical legs at their longest
+    for sides in ([1.0, 0.0], [0.0, -1.0], [0.6, 0.8]):
+        for turn in ([0.0, 0.0], [0.0, 0.5]):
+            direction = [*sides, 0.0, 0.0, *turn]
+            assert Capability(StewartPlatform(p)).travel(start, direction)[:2] == (
+                pytest.approx(0.0, abs=1e-7), 'length_max')
+    shortest = p.replaced({'limits.length_min': (1.0, 1.0, 1.0, 0.5, 0.5, 0.5),
+                           'limits.length_max': 9.0})
+    found = Capability(StewartPlatform(shortest)).travel(start, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert found[:3] == (pytest.approx(0.5), 'length_min', 3)
+
+
+@pytest.mark.parametrize('gap', [0.0, 1e-9, 1e-6])
+def test_a_leg_that_stays_close_to_its_limits_does_not_end_the_travel(gap: float) -> None:
+    p = PLATFORM.parameters
+    home = PLATFORM.home_pose()
+    pivot = p['geometry.base_joints'][0] - home.position  # length and base angle of leg 0 stay
+    line = home.position + p['geometry.platform_joints'][0] - p['geometry.base_joints'][0]
+    length = float(np.linalg.norm(line))
+    tilt = math.acos(line[2] / length)
+    for turn in np.eye(3):
+        free = Capability(StewartPlatform(p.replaced({
+            'limits.length_max': 9.0, 'limits.length_min': 0.01}))).travel(
+                home, [0.0, 0.0, 0.0, *turn], pivot)
+        close = p.replaced({
+            'limits.length_max': (length * (1.0 + gap), *[9.0] * 5),
+            'limits.length_min': (length * (1.0 - (gap or 1e-9)), *[0.01] * 5)}
+            | ({'geometry.base_joint_axes': np.tile([0.0, 0.0, 1.0], 6),
+                'limits.base_joint_angle_max': (tilt + gap, *[3.0] * 5)} if turn[2] else {}))
+        assert Capability(StewartPlatform(close)).travel(
+            home, [0.0, 0.0, 0.0, *turn], pivot) == free
+
+
 def test_a_travel_from_outside_the_limits_is_zero() -> None:
     home = PLATFORM.home_pose()
     outside = Pose(home.position + [0.0, 0.0, 5.0], home.rotation)

@@ -60,7 +60,9 @@ _ROW_RATE, _INVERSE, LEG = 32, 38, 44
 _ROUNDING = 1e-12
 # Steps end below this part of the way so far, or of the hexapod's size.
 _EXACT = 1e-16
-_MOST_STEPS = 500
+# Steps along a limit may pass a part where it is exceeded by no more than this, relative.
+_SHALLOW = 1e-10
+_MOST_STEPS, _MOST_STEPS_OF_LEG = 20_000, 1_000_000
 # Bounds of the second derivative of J_inv hold while a leg is longer than this part of its length.
 _SHORTER = 0.8
 # The condition number is certified by intervals down to this part of the hexapod's size.
@@ -137,6 +139,8 @@ def _safe_step(value: float, slope: float, curvature: float) -> float:
     """Return the largest h with value + slope h - curvature h^2 / 2 >= 0 on all of [0, h]."""
     if curvature <= 0.0:
         return -value / slope if slope < 0.0 else math.inf
+    if value <= 0.0 and slope <= 0.0:
+        return 0.0
     root = math.sqrt(slope * slope + 2.0 * curvature * value)
     return (slope + root) / curvature if slope > 0.0 else 2.0 * value / (root - slope)
 
@@ -150,74 +154,137 @@ def _line(leg: Array, velocity: Vector3, rate: float, t: float) -> tuple[Vector3
 
 
 @compiled
-def _end_of_length(leg: Array, velocity: Vector3, rate: float, bound: float, longest: bool,
-                   end: float) -> float:
-    """Return the first t in [0, end] at which a leg leaves a bound of its length, or end."""
-    curving = rate * rate * leg[_REACH]
-    speed = leg[_SPEED]
-    if speed <= rate * leg[_REACH] and leg[_REACH] < 0.5 * _ROUNDING * bound:
-        return end  # the platform turns about an axis through the joint
-    scale_of_t = bound / max(speed, rate * bound)
-    t = 0.0
-    for _ in range(_MOST_STEPS):
-        line, change = _line(leg, velocity, rate, t)
-        length = _length(line)
-        slope = 2.0 * dot(line, change)
-        if longest:
-            value = (bound - length) * (bound + length)
-            slope = -slope
-            step = _safe_step(max(value, 0.0), slope,
-                              2.0 * (speed * speed + curving * bound))
-        else:
-            value = (length - bound) * (length + bound)
-            # while it moves by no more than its length, it is shorter than twice of it
-            step = min(_safe_step(max(value, 0.0), slope, 4.0 * curving * length),
-                       length / speed)
-        if value < -_ROUNDING * bound * bound:
-            return t
-        if step <= _EXACT * (t + scale_of_t):
-            return t
-        t += step
-        if t >= end:
-            return end
-    return t
+def _quadratic_exit(c0: float, b: float, c2: float) -> tuple[float, float]:
+    """Return u as a fraction where c0 - 2 b u + c2 u^2, c0 >= 0, falls below zero; both >= 0."""
+    root = math.sqrt(max(b * b - c0 * c2, 0.0))
+    return (c0, b + root) if b >= 0.0 else (root - b, -c2)
 
 
 @compiled
-def _end_of_angle(leg: Array, velocity: Vector3, rate: float, bound: float, at_platform: bool,
-                  end: float) -> float:
-    """Return the first t in [0, end] at which a joint's angle exceeds its bound, or end."""
-    least = math.cos(bound)
-    speed = leg[_SPEED]
-    t = 0.0
-    for _ in range(_MOST_STEPS):
-        line, change = _line(leg, velocity, rate, t)
-        length = _length(line)
-        inverse = 1.0 / length
-        s = scale(inverse, line)
-        s_change = scale(inverse, subtract(change, scale(dot(s, change), s)))
-        # over a step of half the leg's length it stays longer than half of it
-        swing = 2.0 * speed * inverse
-        curvature = 2.0 * rate * rate * leg[_REACH] * inverse + 3.0 * swing * swing
-        if at_platform:
-            cosine, sine = math.cos(rate * t), math.sin(rate * t)
-            axis = _turned(leg, _PLATFORM_AXIS, cosine, sine)
-            slope = dot(axis, s_change) + rate * dot(_change(leg, _PLATFORM_AXIS, cosine, sine), s)
-            curvature += 2.0 * rate * swing + rate * rate
-        else:
-            axis = read3(leg, _BASE_AXIS)
-            slope = dot(axis, s_change)
-        value = dot(axis, s) - least
-        if value < -_ROUNDING:
-            return t
-        step = min(_safe_step(max(value, 0.0), slope, curvature),
-                   0.5 * length / max(speed, _ROUNDING * rate * length))
-        if step <= _EXACT * (t + length / max(speed, rate * length)):
-            return t
-        t += step
-        if t >= end:
+def _end_of_length(leg: Array, velocity: Vector3, rate: float, bound: float, longest: bool,
+                   end: float) -> float:
+    """
+    Return the first t in [0, end] at which a leg leaves a bound of its length, or end.
+
+    Closed: the square of the length is a parabola along a line, and a harmonic about an axis,
+    which is a parabola of tan(rate t / 2).
+    """
+    sign = 1.0 if longest else -1.0
+    line, _ = _line(leg, velocity, rate, 0.0)
+    length = _length(line)
+    value = sign * (bound - length) * (bound + length)
+    exact = _ROUNDING * bound * bound
+    if value < -exact:
+        return 0.0
+    value = max(value, 0.0)
+    if rate == 0.0:
+        b, c2 = sign * dot(line, velocity), -sign * dot(velocity, velocity)
+        if not longest and (b <= 0.0 or value - b * b / c2 >= -exact):
             return end
-    return t
+        above, below = _quadratic_exit(value, b, c2)
+        return min(above / below, end) if above > 0.0 else 0.0
+    a = 2.0 * sign * dot(read3(leg, _A), read3(leg, _B))
+    b = 2.0 * sign * dot(line, read3(leg, _C))
+    amplitude = math.hypot(a, b)
+    deepest = amplitude - a if a <= 0.0 else b * b / (amplitude + a)
+    if value - deepest >= -exact:
+        return end
+    above, below = _quadratic_exit(value, b, value + 2.0 * a)
+    return min(2.0 * math.atan2(above, below) / rate, end)
+
+
+@compiled
+def _of_length(leg: Array, velocity: Vector3, rate: float, bound: float, longest: bool, t: float,
+               ) -> tuple[float, float, float, float]:
+    """Return the margin of a length, its slope, its curvature, and the step for which it holds."""
+    curving = rate * rate * leg[_REACH]
+    speed = leg[_SPEED]
+    line, change = _line(leg, velocity, rate, t)
+    length = _length(line)
+    sign = 1.0 if longest else -1.0
+    scaling = 1.0 / (bound * bound)
+    value = sign * scaling * (bound - length) * (bound + length)
+    slope = -2.0 * sign * scaling * dot(line, change)
+    if longest:
+        return value, slope, 2.0 * scaling * (speed * speed + curving * bound), math.inf
+    # while it moves by no more than its length, it is shorter than twice of it
+    return value, slope, 4.0 * scaling * curving * length, length / speed
+
+
+@compiled
+def _of_angle(leg: Array, velocity: Vector3, rate: float, bound: float, at_platform: bool,
+              t: float) -> tuple[float, float, float, float]:
+    """Return the margin of an angle, its slope, its curvature, and the step for which it holds."""
+    speed = leg[_SPEED]
+    line, change = _line(leg, velocity, rate, t)
+    length = _length(line)
+    inverse = 1.0 / length
+    s = scale(inverse, line)
+    s_change = scale(inverse, subtract(change, scale(dot(s, change), s)))
+    # over a step of half the leg's length it stays longer than half of it
+    swing = 2.0 * speed * inverse
+    curvature = 2.0 * rate * rate * leg[_REACH] * inverse + 3.0 * swing * swing
+    if at_platform:
+        cosine, sine = math.cos(rate * t), math.sin(rate * t)
+        axis = _turned(leg, _PLATFORM_AXIS, cosine, sine)
+        slope = dot(axis, s_change) + rate * dot(_change(leg, _PLATFORM_AXIS, cosine, sine), s)
+        curvature += 2.0 * rate * swing + rate * rate
+    else:
+        axis = read3(leg, _BASE_AXIS)
+        slope = dot(axis, s_change)
+    return (dot(axis, s) - math.cos(bound), slope, curvature,
+            0.5 * length / max(speed, _ROUNDING * rate * length))
+
+
+@compiled
+def _of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: int, t: float,
+            ) -> tuple[float, float, float, float]:
+    if code <= LENGTH_MAX:
+        return _of_length(leg, velocity, rate, bound, code == LENGTH_MAX, t)
+    return _of_angle(leg, velocity, rate, bound, code == PLATFORM_ANGLE_MAX, t)
+
+
+@compiled
+def _end_of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: int, end: float,
+                ) -> float:
+    """Return the first t in [0, end] at which a leg exceeds a limit, or end."""
+    if code <= LENGTH_MAX and (rate == 0.0 or dot(velocity, velocity) == 0.0):
+        return _end_of_length(leg, velocity, rate, bound, code == LENGTH_MAX, end)
+    t = before = 0.0
+    for _ in range(_MOST_STEPS_OF_LEG):
+        value, slope, curvature, most = _of_leg(leg, velocity, rate, bound, code, t)
+        if not value >= -_ROUNDING:
+            break
+        step = _safe_step(max(value, 0.0), slope, curvature)
+        if curvature > 0.0:
+            # along a limit, or close to it, the safe steps are too small to get ahead
+            shallow = math.sqrt(8.0 * _SHALLOW / curvature)
+            if slope > -curvature * shallow:
+                step = max(step, shallow)
+            # the time in which the margin can change by its whole size
+            if not step > _EXACT * (t + 1.0 / math.sqrt(curvature)):
+                return t
+        elif not step > 0.0:
+            return t
+        before, t = t, t + min(step, most)
+        if t >= end:
+            if end < math.inf:
+                value, _, _, _ = _of_leg(leg, velocity, rate, bound, code, end)
+            if value >= -_ROUNDING:
+                return end
+            t = end
+            break
+    low, high = before, t
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        value, _, _, _ = _of_leg(leg, velocity, rate, bound, code, middle)
+        if value >= 0.0:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @compiled
@@ -323,7 +390,7 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
         fastest = max(fastest, legs[n, _SPEED])
     narrow = _NARROW * characteristic_length_of(constants) / fastest
     t = width  # the margin is positive before it
-    for _ in range(40 * _MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         if t >= end:
             return end
         # The next interval is cleared from its middle, where it reaches back to the last one.
@@ -358,21 +425,13 @@ def _travel(constants: Array, bounds: Array, stop: float, legs: Array, direction
     # a platform that only turns is back at its pose after one turn
     whole = 2.0 * math.pi / rate if _length(velocity) == 0.0 else math.inf
     end, limit, leg = whole, NOTHING, -1
-    for n in range(6):
-        if bounds[LENGTH_MAX, n] < math.inf:
-            t = _end_of_length(legs[n], velocity, rate, bounds[LENGTH_MAX, n], True, end)
-            if t < end:
-                end, limit, leg = t, LENGTH_MAX, n
-    for n in range(6):
-        if bounds[LENGTH_MIN, n] > 0.0:
-            t = _end_of_length(legs[n], velocity, rate, bounds[LENGTH_MIN, n], False, end)
-            if t < end:
-                end, limit, leg = t, LENGTH_MIN, n
-    for code in range(BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX + 1):
+    for code in (LENGTH_MAX, LENGTH_MIN, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX):
         for n in range(6):
-            if bounds[code, n] < math.pi:
-                t = _end_of_angle(legs[n], velocity, rate, bounds[code, n],
-                                  code == PLATFORM_ANGLE_MAX, end)
+            bound = bounds[code, n]
+            limited = (bound > 0.0 if code == LENGTH_MIN else
+                       bound < (math.inf if code == LENGTH_MAX else math.pi))
+            if limited:
+                t = _end_of_leg(legs[n], velocity, rate, bound, code, end)
                 if t < end:
                     end, limit, leg = t, code, n
     t = _end_of_condition(constants, legs, velocity, rate, stop, end)
