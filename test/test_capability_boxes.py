@@ -133,6 +133,17 @@ def test_a_box_is_reachable_along_an_axis_as_far_as_the_travel() -> None:
         assert found.limit == travel.limit  # legs of a pair reach it at once
 
 
+@pytest.mark.parametrize('unit', [1e-200, 1e-7, 1e-3, 1.0])
+def test_the_factor_of_a_box_follows_its_unit(unit: float) -> None:
+    capability = Capability(PLATFORM)
+    for direction in (np.eye(6)[3], np.array([1.0, 0.5, 0.2, 1.0, 0.0, 0.3])):
+        box = np.stack([-direction, direction], axis=1)
+        whole, found = (capability.reachable_factor(each) for each in (box, unit * box))
+        assert found.value * unit == pytest.approx(whole.value, rel=1e-8)
+        assert found.limit == whole.limit
+        assert capability.reachable(found.value * unit * box).certain
+
+
 @pytest.mark.parametrize('box, pose, text', [
     (np.zeros((6, 2)), None, 'all six ranges are of zero size'),
     (np.ones((6, 2)) * [1, -1], None, 'x: 1 to -1: must not decrease'),

@@ -203,13 +203,14 @@ class Capability:
 
         Arguments are those of ``reachable``; each range includes zero. The box of the answer is
         proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
-        near a singularity the factor may be too small.
+        near a singularity the factor may be too small. Rotations grow up to a turn.
         """
         ranges = checked_ranges(box)
         if (ranges[:, 0] > 0.0).any() or (ranges[:, 1] < 0.0).any():
             raise MotionError('box: a range without zero cannot be scaled')
         factor, worst = self._boxes(pose, pivot).factor(ranges)
-        return Extent(factor, worst.limit, worst.leg)
+        return Extent(factor, '', -1) if worst is None else Extent(
+            factor, worst.limit, worst.leg)
 
     def smallest(self, quantity: Callable[[Pose], ArrayLike], box: ArrayLike,
                  pose: Pose | Motion | None = None, pivot: ArrayLike | None = None) -> InBox:

@@ -27,6 +27,7 @@ from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import box as boxes
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.frames.motion import Pose
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE
@@ -40,7 +41,7 @@ _CODES = ('length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_an
 _EXACT = 1e-9
 # For a box that reaches a singularity the factor is found to this part: each proof takes longer.
 _EXACT_OF_CONDITION = 0.05
-# A larger factor is infinite.
+# Boxes of translations are proven up to this multiple of the hexapod's size.
 _LARGEST = 1e6
 
 
@@ -64,13 +65,18 @@ class Reachable(NamedTuple):
     """Whether all poses of a box are within the limits."""
 
     certain: bool
-    """All poses of the box are proven to be within the limits."""
+    """
+    All poses of the box are proven to be within the limits.
+
+    Where it is false and the excess of ``worst`` is above zero, the box is proven not to be
+    reachable, and ``worst`` is a pose that exceeds a limit; otherwise nothing is proven.
+    """
     worst: Worst
     """
     The worst pose by excess relative to the limit.
 
-    Where ``certain`` is false and the excess is not above zero, no pose was found that exceeds a
-    limit, but the proof did not end within a bounded number of steps.
+    Where ``certain`` is false and the excess is not above zero, the proof did not end within a
+    bounded number of steps.
     """
 
 
@@ -115,18 +121,26 @@ class Boxes:
         return Reachable(
             certain, singular if not certain or part_of_condition > part else worst)
 
-    def factor(self, ranges: Array) -> tuple[float, Worst]:
-        """Return the largest factor by which a box can be scaled, and the limit that ends it."""
+    def factor(self, ranges: Array) -> tuple[float, Worst | None]:
+        """
+        Return the largest factor by which a box can be scaled, and what exceeds a limit above it.
+
+        None where nothing limits up to a turn.
+        """
+        size = characteristic_length_of(self._platform.constants)
+        sizes = np.abs(ranges).max(axis=1) / np.array([size, size, size, 1.0, 1.0, 1.0])
+        unit = float(sizes.max())
+        ranges = ranges / unit
         # rotation vectors of more than a turn add nothing
-        turned = float(np.abs(ranges[3:]).max())
-        most = 2.0 * math.pi / turned if turned > 0.0 else math.inf
+        turned = float(sizes[3:].max()) / unit
+        most = 2.0 * math.pi / turned if turned > 2.0 * math.pi / _LARGEST else math.inf
         factor, worst = _largest(
             lambda factor: self._worst_of_legs(_box(factor * ranges)), most, _EXACT)
-        if factor == 0.0:
-            return factor, worst
-        return _largest(
-            lambda factor: self._worst_condition(_box(factor * ranges)), factor,
-            _EXACT_OF_CONDITION, worst)
+        if factor > 0.0:
+            factor, worst = _largest(
+                lambda factor: self._worst_condition(_box(factor * ranges)), factor,
+                _EXACT_OF_CONDITION, worst)
+        return factor / unit, worst
 
     def _worst_of_legs(self, box: Array) -> _Proof:
         """Return the worst pose of lengths and joint angles, and whether limits are kept."""
@@ -185,19 +199,20 @@ def _box(ranges: Array) -> Array:
 
 
 def _largest(prove: Callable[[float], _Proof], most: float, exact: float,
-             worst: Worst | None = None) -> tuple[float, Worst]:
+             worst: Worst | None = None) -> tuple[float, Worst | None]:
     """Return the largest factor, up to ``most``, that is proven, and the worst pose above it."""
     begin = prove(0.0)
     if not begin.certain:
         return 0.0, begin.worst
-    low, high, trial = 0.0, math.inf, min(most, 1.0 if worst is None else most, _LARGEST)
+    bound = min(most, _LARGEST)
+    low, high, trial = 0.0, math.inf, min(bound, 1.0) if worst is None else bound
     while high - low > exact * high or high == math.inf:
         proof = prove(trial)
         if proof.certain:
             low = trial
-            if trial >= min(most, _LARGEST):
-                return most, worst or proof.worst
+            if trial >= bound:
+                return most, worst
         else:
             high, worst = trial, proof.worst
-        trial = min(2.0 * trial, most, _LARGEST) if high == math.inf else 0.5 * (low + high)
-    return low, worst or begin.worst
+        trial = min(2.0 * trial, bound) if high == math.inf else 0.5 * (low + high)
+    return low, worst
