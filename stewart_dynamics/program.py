@@ -130,6 +130,14 @@ def node_name(text: str) -> str:
     return name
 
 
+def frequency(text: str) -> float:
+    """Return a cut-off frequency as an option gives it [Hz]."""
+    value = float(text)
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f'{text}: must be at least 1e-6, at most 1e6')
+    return value
+
+
 def _printable(text: str) -> str:
     """Return text in which control characters, as names in bags may hold, are escaped."""
     return re.sub(r'[\x00-\x09\x0b-\x1f\x7f-\x9f]', lambda found: repr(found[0])[1:-1], text)

@@ -323,10 +323,22 @@ def test_bad_input_is_exit_code_2_and_one_line(
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.parametrize('arguments', [
+    ('--pose', 'a', 0, 0, 0, 0, 0), ('--differentiate', 1e300), ('--differentiate', 1e-300)])
+def test_arguments_that_are_no_usable_numbers_are_rejected(
+        arguments: tuple[Any, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        run('--params', PLATFORM, *arguments)
+    assert f'argument {arguments[0]}: {arguments[1]}: must be ' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(('text', 'error'), [
     ('x: 0.0', 'all ranges are of size zero'), ('q: 1.0', 'q: must be one of x, y, z'),
     ('x: [0.1, -0.1]', 'the lower bound must come first'), ('x: [1, 2, 3]', 'must be one number'),
-    ('x: .nan', 'must be one number'), ('x: far', 'must be one number')])
+    ('x: .nan', 'must be one number'), ('x: far', 'must be one number'),
+    ('', "must have a range, such as 'x: 0.1'"), ('[]', "must have a range, such as 'x: 0.1'"),
+    ('x: [-1.7e308, 1.7e308]', '100 times the size of the hexapod: lengths are in m'),
+    ('rx: 20', 'rx: 20: must be within 6.283, a turn: angles are in radians')])
 def test_a_box_that_is_none_is_rejected(
         text: str, error: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'box.yaml').write_text(text)

@@ -26,10 +26,12 @@ import numpy as np
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.datasheet.ratings import AXES
 from stewart_dynamics.errors import ParameterError, shown, shown_name
-from stewart_dynamics.parameters.yaml_file import read_document
+from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.yaml_file import LARGEST, read_value
+from stewart_dynamics.whole_file import read_text
 
 
-def read_box(path: Path) -> Array:
+def read_box(path: Path, parameters: Parameters) -> Array:
     """
     Return the ranges (6, 2) of a file: translation [m] and rotation vector [rad] from the pose.
 
@@ -39,15 +41,26 @@ def read_box(path: Path) -> Array:
     Raises
     ------
     ParameterError
-        In one line: the file cannot be read, names another axis, or all ranges are zero.
+        In one line: the file cannot be read, names another axis, all ranges are zero, or one is
+        beyond a turn or 100 times the size of the hexapod: then its unit is another one.
 
     """
-    document = read_document(path)
+    document = read_value(read_text(path, LARGEST, ParameterError), str(path))
+    if not isinstance(document, dict) or not document:
+        raise ParameterError(f"{path}: must have a range, such as 'x: 0.1'")
+    size = float(np.max([np.ptp(parameters[name], axis=0) for name in (
+        'geometry.base_joints', 'geometry.platform_joints')]))
     ranges = np.zeros((6, 2))
     for name, value in document.items():
         if name not in AXES:
             raise ParameterError(f'{path}: {shown_name(name)}: must be one of {", ".join(AXES)}')
-        ranges[AXES.index(name)] = _range(f'{path}: {name}', value)
+        most, rule = ((2.0 * math.pi, 'a turn: angles are in radians') if name.startswith('r')
+                      else (100.0 * size, '100 times the size of the hexapod: lengths are in m'))
+        bounds = _range(f'{path}: {name}', value)
+        if max(map(abs, bounds)) > most:
+            raise ParameterError(
+                f'{path}: {name}: {shown(value)}: must be within {most:.4g}, {rule}')
+        ranges[AXES.index(name)] = bounds
     if not np.ptp(ranges, axis=1).any():
         raise ParameterError(f'{path}: all ranges are of size zero: there is nothing to check')
     return ranges

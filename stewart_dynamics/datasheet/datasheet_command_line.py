@@ -24,7 +24,7 @@ import sys
 from typing import Any
 
 from stewart_dynamics.program import (
-    DONE, interrupt_on_signals, node_name, PARTLY_READ, Program)
+    DONE, frequency, interrupt_on_signals, node_name, PARTLY_READ, Program)
 from stewart_dynamics.replay.replay_options import NODE, Options
 
 NOT_POSSIBLE = 1
@@ -77,14 +77,17 @@ def _arguments() -> argparse.ArgumentParser:
                         help='bag with setpoints: is it possible, and how much faster?')
     motion.add_argument('--combined', metavar='TOPIC',
                         help='topic of setpoints in one message')
-    motion.add_argument('--differentiate', type=_number, metavar='HZ',
+    motion.add_argument('--differentiate', type=frequency, metavar='HZ',
                         help='compute twist and acceleration from the poses by smoothing splines '
                              'of this cut-off frequency')
     return parser
 
 
 def _number(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f'{text}: must be a number')
     return value
@@ -120,7 +123,7 @@ def _run(given: argparse.Namespace) -> int:
         None if given.pivot is None else np.array(given.pivot),
         None if given.payload is None else Payload(
             given.payload[0], np.array(given.payload[1:])),
-        None if given.box is None else read_box(given.box), given.motion, options,
+        None if given.box is None else read_box(given.box, parameters), given.motion, options,
         given.leg_stiffness)
     check_order(order)
     check_free(given.output, options, DATASHEET)

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stewart_dynamics.program import DONE, interrupt_on_signals, node_name, Program
+from stewart_dynamics.program import DONE, frequency, interrupt_on_signals, node_name, Program
 from stewart_dynamics.replay.replay_options import LIMIT_MET, NODE, Options
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _arguments() -> argparse.ArgumentParser:
     poses = parser.add_argument_group('bags that have only poses')
     poses.add_argument('--differentiate', action='store_true',
                        help='compute twist and acceleration from the poses by smoothing splines')
-    poses.add_argument('--cutoff', type=_frequency, metavar='HZ',
+    poses.add_argument('--cutoff', type=frequency, metavar='HZ',
                        help=f'cut-off frequency of the splines (default: {_CUTOFF:g}); as low as '
                             'the motion allows: noise grows with its power of 2.5')
     output = parser.add_argument_group('what is written')
@@ -170,13 +170,6 @@ def _one(bag: Path, folder: Path, parameters: Parameters, options: Options, stri
         missing = '; '.join(replayed.summary['missing'])
         _PROGRAM.complain(f'{bag}: part of it could not be read: {missing}')
     return DONE if replayed.code == LIMIT_MET and not strict else replayed.code
-
-
-def _frequency(text: str) -> float:
-    value = float(text)
-    if not 1e-6 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f'{text}: must be at least 1e-6, at most 1e6')
-    return value
 
 
 def _number(text: str) -> int:
