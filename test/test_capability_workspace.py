@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from referees import rng, size_of
+from referees import rng, rotation_about, size_of
 from stewart_dynamics import (
     Capability, Motion, MotionError, ParameterError, Parameters, Pose, StewartPlatform)
 from stewart_dynamics.arrays import Array, Flags
@@ -73,6 +73,25 @@ def test_a_section_encloses_the_positions_within_the_limits(seed: int | None, no
             assert excess.max() < (1e-3 * stop_of(platform) if singular else 1e-8 * size)
         if part.limit != 'singularity':
             assert np.abs(on[part.limit][:, part.leg]).max() < 1e-9 * size
+
+
+@pytest.mark.parametrize('offset', [0.0, 1e-6, -0.05, 0.01, 0.1])
+def test_parts_of_a_section_meet_where_a_joint_angle_cuts_a_corner(offset: float) -> None:
+    base, joints = (np.array([[x, y, z], [x, -y, z]]) for x, y, z in (
+        (0.72, 0.10, 0.05), (0.25, 0.30, -0.08)))
+    turns = [rotation_about(np.array([0.0, 0.0, 1.0]), n * 2.0 * np.pi / 3.0) for n in range(3)]
+    base, joints = (np.concatenate([each @ turn.T for turn in turns]) for each in (base, joints))
+    platform = StewartPlatform(PLATFORM.parameters.replaced({
+        'geometry.base_joints': base.ravel(), 'geometry.platform_joints': joints.ravel(),
+        'geometry.base_joint_axes': np.tile([0.0, 0.0, 1.0], 6),
+        'geometry.platform_joint_axes': np.tile([0.0, 0.0, 1.0], 6),
+        'limits.length_min': 0.65, 'limits.length_max': 1.0,
+        'limits.base_joint_angle_max': 0.9, 'limits.platform_joint_angle_max': 0.95}))
+    found = Capability(platform).section(Pose([offset, 0.0, 0.777876], np.eye(3)), 'x').boundary
+    assert any(part.limit == 'base_joint_angle_max' for part in found)
+    ends = np.concatenate([part.points[[0, -1]] for part in found])
+    apart = np.linalg.norm(ends[:, None] - ends, axis=2) + np.diag(np.full(len(ends), np.inf))
+    assert apart.min(axis=1).max() < 1e-5  # an arc of a tie may be shorter
 
 
 def test_the_total_tilt_is_the_smallest_about_all_axes() -> None:

@@ -20,7 +20,8 @@ from its base joint with a constant ``e_i``: a limit of its length is a sphere a
 limit of an angle at one of its joints a cone with the tip ``e_i``. A plane cuts them in circles
 and conics. The boundary of the section are the parts of these curves where all other limits are
 kept: holes stay holes. Where circles cross is known in closed form, so no arc is missed; where an
-arc crosses another limit is found by bisection.
+arc crosses another limit is found by bisection. An arc of a conic, however short, begins and ends
+where an arc found before ends on it.
 """
 
 from __future__ import annotations
@@ -44,6 +45,9 @@ _POINTS, _STEPS = 360, 50
 _TRIALS, _STARTS, _FINEST = 1000, 8, 1e-6
 # Circles that differ by less, relative to their radius, are one.
 _SAME = 1e-9
+# Points whose angle at a joint differs by less from its bound are on the cone; above the
+# tolerance of limits.
+_ON = 1e-7
 # Lines of the grid on which boundaries at singularities are found.
 _GRID = 129
 
@@ -92,8 +96,16 @@ def section(platform: StewartPlatform, axes: Array, start: Motion, normal: int) 
 
     """
     plane = _Plane(platform, start, normal)
-    found = [each for name, leg, curve, crossings in _curves(platform, axes, start, normal)
-             for each in plane.parts(name, leg, curve, crossings)]
+    curves = list(_curves(platform, axes, start, normal))
+    circles = [each for name, leg, curve, crossings in curves if not callable(crossings)
+               for each in plane.parts(name, leg, curve, crossings)]
+    found, count = circles, -1
+    while len(found) != count:
+        count = len(found)
+        ends = np.array([each.points[n] for each in found for n in (0, -1)]).reshape(-1, 3)
+        found = circles + [
+            each for name, leg, curve, crossings in curves if callable(crossings)
+            for each in plane.parts(name, leg, curve, crossings(ends))]
     found += plane.singular(found)
     return Section(tuple(found), tuple(_joined([each.points for each in found])))
 
@@ -209,8 +221,13 @@ class _Plane:
 
 
 def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
-            ) -> Iterator[tuple[str, int, _Curve, Array]]:
-    """Yield the curve of each limit of each leg in a plane, and where circles cross it."""
+            ) -> Iterator[tuple[str, int, _Curve, Array | _Curve]]:
+    """
+    Yield the curve of each limit of each leg in a plane, and where others cross it.
+
+    For a circle the angles at which circles cross it; for a conic a function that returns the
+    angles of those of some points that are on it.
+    """
     p = platform.parameters
     bounds = Limits(p).bounds
     rotation, height = start.rotation, start.position[normal]
@@ -265,7 +282,14 @@ def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
                 points[:, normal] = np.where(by > 0.0, height, math.nan)
                 return points
 
-            yield name.removeprefix('limits.'), leg, conic, np.empty(0)
+            def angles_on(points: Array, tip: Array = tip, frame: Array = frame,
+                          bound: float = bound) -> Array:
+                lines = (points - tip) @ frame.T
+                off = np.arctan2(np.hypot(lines[:, 0], lines[:, 1]), lines[:, 2]) - bound
+                at: Array = np.arctan2(lines[:, 1], lines[:, 0])[np.abs(off) < _ON]
+                return at
+
+            yield name.removeprefix('limits.'), leg, conic, angles_on
 
 
 def _joined(pieces: list[Array]) -> Iterator[Array]:
