@@ -372,6 +372,23 @@ def test_a_question_without_a_limit_is_rejected(ask: Any, text: str) -> None:
         ask(Capability(unlimited), PLATFORM.home_pose())
 
 
+@pytest.mark.parametrize('size', [1e-300, 1e-170, 3.0, 1e160, 1e300])
+def test_answers_are_multiples_of_directions_of_any_size(size: float) -> None:
+    capability = Capability(PLATFORM)
+    home = PLATFORM.home_pose()
+    direction = np.array([0.3, -0.2, 0.5, 0.1, 0.7, -0.4])
+    for ask in (capability.travel, capability.wrench, capability.velocity,
+                capability.acceleration):
+        one, many = ask(home, direction), ask(home, size * direction)
+        assert many.value * size == pytest.approx(one.value, rel=1e-12)
+        assert many[1:3] == one[1:3]
+
+
+def test_a_payload_out_of_range_is_rejected() -> None:
+    with pytest.raises(MotionError, match='center_of_mass: out of range'):
+        Capability(PLATFORM).payload(PLATFORM.home_pose(), [1e300, 0.0, 0.0])
+
+
 def test_a_direction_of_zeros_is_rejected() -> None:
     with pytest.raises(MotionError, match='all six numbers are zero'):
         Capability(PLATFORM).travel(PLATFORM.home_pose(), np.zeros(6))

@@ -33,7 +33,8 @@ from stewart_dynamics.capability.reachable import Boxes, checked_ranges, Reachab
 from stewart_dynamics.capability.workspace import InBox, Section, section, smallest
 from stewart_dynamics.errors import MotionError, ParameterError
 from stewart_dynamics.mechanics import limits
-from stewart_dynamics.mechanics.arguments import as_array, common_shape, wrong_type
+from stewart_dynamics.mechanics.arguments import (
+    as_array, check_finite, common_shape, wrong_type)
 from stewart_dynamics.mechanics.batch import in_parts
 from stewart_dynamics.mechanics.dynamics import lagrange
 from stewart_dynamics.mechanics.dynamics.linear_parameters import about_origin, PLATFORM
@@ -155,7 +156,7 @@ class Capability:
             Point that the platform turns about, platform frame [m]; by default its origin.
 
         """
-        directions = _directions(direction)
+        directions, sizes = _directions(direction)
         pivots = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
         shape = common_shape(pose=pose.shape, direction=directions.shape[:-1],
                              pivot=pivots.shape[:-1])
@@ -170,7 +171,8 @@ class Capability:
 
         in_parts(solve, self.platform.constants, rows, copies(directions, shape),
                  copies(pivots, shape), values, codes, legs, scratch=(6, travel.LEG))
-        return _extent(values.reshape(shape), _ENDS[codes].reshape(shape), legs.reshape(shape))
+        return _extent(values.reshape(shape) / sizes, _ENDS[codes].reshape(shape),
+                       legs.reshape(shape))
 
     def reachable(self, box: ArrayLike, pose: Pose | Motion | None = None,
                   pivot: ArrayLike | None = None) -> Reachable:
@@ -320,8 +322,9 @@ class Capability:
             Motion or tilt of the base, as in ``inverse_dynamics``.
 
         """
-        directions = _directions(direction)
-        return self._multiple(self._at_rest(pose, base), self._per_wrench(pose, directions))
+        directions, sizes = _directions(direction)
+        return _divided(self._multiple(
+            self._at_rest(pose, base), self._per_wrench(pose, directions)), sizes)
 
     def clearance(self, pose: Pose | Motion) -> Array | float:
         """Return the smallest distance between the surfaces of two legs [m]; negative: overlap."""
@@ -377,9 +380,10 @@ class Capability:
     def velocity(self, pose: Pose | Motion, direction: ArrayLike) -> Extent:
         """Return the largest twist along a direction (..., 6) that ``velocity_max`` permits."""
         fastest = self._required(limits.VELOCITY_MAX)
-        rates = np.einsum('...ij,...j->...i', self.platform.inverse_jacobian(pose),
-                          _directions(direction))
-        return _smallest(largest_multiple(np.zeros(6), rates, fastest), 'velocity_max')
+        directions, sizes = _directions(direction)
+        rates = np.einsum('...ij,...j->...i', self.platform.inverse_jacobian(pose), directions)
+        return _divided(_smallest(
+            largest_multiple(np.zeros(6), rates, fastest), 'velocity_max'), sizes)
 
     def acceleration(self, pose: Pose | Motion, direction: ArrayLike,
                      motion: Motion | None = None) -> Extent:
@@ -397,9 +401,10 @@ class Capability:
             Its twist is that of the platform; by default it is at rest.
 
         """
-        directions = _directions(direction)
+        directions, sizes = _directions(direction)
         inertial = np.einsum('...ij,...j->...i', self.platform.mass_matrix(pose), directions)
-        return self._multiple(self._at_rest(pose, None, motion), self._per_wrench(pose, inertial))
+        return _divided(self._multiple(
+            self._at_rest(pose, None, motion), self._per_wrench(pose, inertial)), sizes)
 
     def payload(self, motion: Pose | Motion, center_of_mass: ArrayLike,
                 times: ArrayLike | None = None) -> Extent:
@@ -423,8 +428,9 @@ class Capability:
         moving = motion if isinstance(motion, Motion) else Motion.from_pose(motion)
         forces = self.platform.inverse_dynamics(moving).forces
         matrix = self.platform.regressor(moving).matrix[..., PLATFORM]
-        mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
-        per_mass = matrix @ mass
+        with np.errstate(over='ignore', invalid='ignore'):
+            mass = np.array([1.0, *center, *about_origin(1.0, center, np.zeros(6))])
+            per_mass = check_finite('center_of_mass', matrix @ mass, 0)
         return self._multiple(forces, per_mass, whole=isinstance(motion, Motion))
 
     def speed_factor(self, motion: Motion, wrench: ArrayLike | None = None,
@@ -630,11 +636,18 @@ class Capability:
                               'no answer')
 
 
-def _directions(value: ArrayLike) -> Array:
+def _directions(value: ArrayLike) -> tuple[Array, Array]:
+    """Return directions whose largest number is about 1, and the powers of two to divide by."""
     directions = as_array('direction', value, (6,))
-    if not np.abs(directions).max(axis=-1).all():
+    largest = np.abs(directions).max(axis=-1)
+    if not largest.all():
         raise MotionError('direction: all six numbers are zero')
-    return directions
+    sizes: Array = np.ldexp(1.0, np.frexp(largest)[1] - 1)  # no rounding
+    return directions / sizes[..., None], sizes
+
+
+def _divided(extent: Extent, sizes: Array) -> Extent:
+    return _extent(np.asarray(extent.value / sizes), extent.limit, extent.leg)
 
 
 def _some(rows: Array, shape: tuple[int, ...], which: Any) -> Array:
