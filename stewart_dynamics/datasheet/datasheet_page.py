@@ -28,7 +28,7 @@ from stewart_dynamics.datasheet import charts
 from stewart_dynamics.datasheet.datasheet_text import (
     between_setpoints, box_verdict, motion_verdict, rated_payload, setpoints_used)
 from stewart_dynamics.datasheet.figures import (
-    both_ways, DEGREE, down, LINEAR, MM, span, unit_of)
+    both_ways, DEGREE, down, limit_name, LINEAR, MM, span, unit_of)
 from stewart_dynamics.datasheet.hexapod_drawing import circle_of, Drawing
 from stewart_dynamics.datasheet.payloads import Payloads
 from stewart_dynamics.datasheet.rated_hexapod import RatedHexapod
@@ -82,6 +82,12 @@ class Pictures(NamedTuple):
             found.append(self._payload())
         return found
 
+    def limits(self) -> list[str]:
+        """Return the limits that are boundaries in the pictures."""
+        found = {part.limit for each in self.sections.values() for part in each.boundary}
+        found.update(next(iter(self.tilts.values())).limits)
+        return [name for name in charts.DASHES if name in found]
+
     def _payload(self) -> Picture:
         """Return the largest payload over the distance of its center of mass from the pivot."""
         platform = self.hexapod.platform
@@ -121,8 +127,9 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         workspace=[each.svg() for each in pictures.workspace()],
         motion=(chart.svg() if (chart := pictures.motion()) else None),
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
-        setpoints_used=setpoints_used, clearance=hexapod.limited('leg_clearance_min'), down=down,
-        span=span, MM=MM, DEGREE=DEGREE, names=_NAMES)
+        dashes={name: charts.DASHES[name] for name in pictures.limits()},
+        limit_name=limit_name, setpoints_used=setpoints_used, down=down, span=span, MM=MM,
+        clearance=hexapod.limited('leg_clearance_min'), DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 
