@@ -123,6 +123,10 @@ def test_no_random_pose_of_a_box_has_less_than_the_smallest_value() -> None:
 @pytest.mark.parametrize('ask, error, text', [
     (lambda c: c.section(normal='w'), MotionError, "must be 'x', 'y' or 'z'"),
     (lambda c: c.section(Pose(np.zeros((2, 3)), np.eye(3))), MotionError, 'must be a single one'),
+    *((lambda c, name=name, more=more: getattr(c, name)('x', *more), MotionError,
+       "pose: 'x': must be a Pose or a Motion") for name, more in (
+           ('travel', (np.ones(6),)), ('wrench', (np.ones(6),)), ('force', ()),
+           ('stiffness', (1e6,)))),
     (lambda c: c.tilt(azimuths=2), MotionError, 'azimuths: 2: must be at least 3'),
     (lambda c: Capability(StewartPlatform(Parameters({
         name: value for name, value in PLATFORM.parameters.given.items()

@@ -71,7 +71,7 @@ class Extent(NamedTuple):
     limit : str or (...)
         Name of the limit without ``limits.``, or ``singularity``; empty where nothing limits.
     leg : int or (...)
-        Index of the leg that reaches it; -1 for a singularity or nothing.
+        Index from 0 of the leg that reaches it; -1 for a singularity or nothing.
     sample : int or None
         Index of the sample of a motion at which it is reached, or of the last one before.
     time : float or None
@@ -156,6 +156,7 @@ class Capability:
             Point that the platform turns about, platform frame [m]; by default its origin.
 
         """
+        check_kind(pose, Pose, Motion)
         directions, sizes = _directions(direction)
         pivots = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
         shape = common_shape(pose=pose.shape, direction=directions.shape[:-1],
@@ -338,6 +339,7 @@ class Capability:
         It includes the forces of the legs, which turn with them: minus the derivative of the
         wrench of six springs that carry these forces at the lengths of the pose.
         """
+        check_kind(pose, Pose, Motion)
         legs = lagrange.legs(self.platform.parameters, pose.position, pose.rotation)
         return self.platform.stiffness(pose, leg_stiffness) + geometric_stiffness(
             legs, self._at_rest(pose, None))
@@ -596,6 +598,7 @@ class Capability:
     def _at_rest(self, pose: Pose | Motion, base: BaseMotion | None,
                  motion: Motion | None = None) -> Array:
         """Return the leg forces (..., 6) at a pose without acceleration."""
+        check_kind(pose, Pose, Motion)
         if motion is not None and not isinstance(motion, Motion):
             raise wrong_type('motion', motion, 'a Motion')
         shape = pose.shape if motion is None else common_shape(

@@ -123,7 +123,7 @@ class Boxes:
 
     def factor(self, ranges: Array) -> tuple[float, Worst | None]:
         """
-        Return the largest factor by which a box can be scaled, and what exceeds a limit above it.
+        Return the largest factor by which a box can be scaled, and the worst pose above it.
 
         None where nothing limits up to a turn.
         """

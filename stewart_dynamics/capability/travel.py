@@ -25,7 +25,9 @@ with constant vectors A, B, C of the leg, so that its speed and acceleration are
 derivative is bounded from below by such numbers: ``g(t + h) >= g + g' h - k h^2 / 2``. The largest
 ``h`` that keeps this bound positive is a safe step: steps never pass a root, and converge to the
 first one quadratically, like Newton's method. So a limit that is left and entered again is not
-jumped over.
+jumped over. Only along a limit, where safe steps would be too small to get ahead, a part in which
+it is exceeded by no more than 1e-10 may be passed. Lengths of a travel that only moves or only
+turns have a closed form.
 
 The condition number of J_inv ends the travel as well. Singular values of a matrix change by no
 more than the norm of its change (Golub and Van Loan, Matrix Computations, 4th ed., 8.6.2), which
