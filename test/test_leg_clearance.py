@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 import pytest
 from referees import (
-    Array, random_motion, random_parameters, rng, rotation_about, symmetric_parameters)
+    Array, random_motion, random_parameters, rng, rotation_about, size_of, symmetric_parameters)
 from scipy.optimize import lsq_linear
 
-from stewart_dynamics import Motion, Parameters, Pose, StewartPlatform
+from stewart_dynamics import Capability, Motion, Parameters, Pose, StewartPlatform
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
 from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
@@ -34,6 +34,9 @@ from stewart_dynamics.parameters.table import LEG_SHAPE
 from stewart_dynamics.planned.checks import LIMIT
 from stewart_dynamics.planned.trajectory import check_planned_trajectory
 from stewart_dynamics.setpoints.step import Batch, Setpoint, Step
+from test_capability import limited, moved, random_travel
+from test_capability_boxes import poses_in
+from test_capability_workspace import inside
 
 SHAPE = dict(zip(LEG_SHAPE, (0.04, 0.7, 0.02), strict=True))
 SYMMETRIC = symmetric_parameters().replaced({'geometry.zero_length': 1.1, **SHAPE})
@@ -191,3 +194,88 @@ def test_a_small_loss_of_clearance_between_close_points_is_found() -> None:
         result = check_planned_trajectory(
             StewartPlatform(LOWERING.replaced({CLEARANCE_MIN: bound})), [0.0, 0.1], motion)
         assert result.accepted is accepted, result.message
+
+
+def near(seed: int) -> tuple[StewartPlatform, Pose, np.random.Generator]:
+    """Return a random hexapod that a clearance limits, often to one that keeps its value."""
+    random = rng(seed)
+    platform, pose = limited(random, **{'limits.length_min': None})
+    shaped = platform.parameters.replaced({
+        'legs.cylinder.radius': random.uniform(0.01, 0.03, 6),
+        'legs.cylinder.length': random.uniform(0.2, 1.0, 6),
+        'legs.piston.radius': random.uniform(0.0, 0.01, 6),
+        'limits.length_max': 5.0 * size_of(platform.parameters)})
+    here = Capability(StewartPlatform(shaped)).clearance(pose)
+    part = random.choice([0.0, 0.5, 0.9, 0.999, 1.0])
+    return StewartPlatform(shaped.replaced({CLEARANCE_MIN: max(part * here, 0.0)})), pose, random
+
+
+def test_a_travel_ends_where_two_legs_are_too_near() -> None:
+    ended = 0
+    for seed in range(60):
+        platform, pose, random = near(seed)
+        p = platform.parameters
+        size, bound, clearances = size_of(p), p[CLEARANCE_MIN], LegClearance(p)
+        direction, pivot = random_travel(random, size)
+        found = Capability(platform).travel(pose, direction, pivot)
+
+        if found.limit == CLEARANCE_MIN.removeprefix('limits.') and found.value == 0.0:
+            assert clearances(Motion.from_pose(pose).rows[None]).min() - bound < 1e-12 * size
+            continue
+        by = np.append(np.linspace(0.0, found.value, 2001), found.value + 1e-7 * size)
+        margins = clearances(Motion.from_pose(moved(pose, direction, pivot, by)).rows) - bound
+        assert margins[:-1].min() >= -1e-12 * size
+        if found.limit == CLEARANCE_MIN.removeprefix('limits.'):
+            assert abs(margins[-2, found.leg]) < 1e-12 * size
+            assert margins[-1].min() < 0.0
+            ended += 1
+    assert ended > 25
+
+
+def test_no_pose_of_a_box_that_is_reachable_has_legs_too_near() -> None:
+    limiting = 0
+    for seed in range(8):
+        platform, pose, random = near(seed)
+        p, capability = platform.parameters, Capability(platform)
+        box = np.stack([-random.uniform(0.1, 1.0, 6), random.uniform(0.1, 1.0, 6)], axis=1)
+        found = capability.reachable_factor(box, pose)
+        limiting += found.limit == 'leg_clearance_min' and found.value > 0.0
+        for factor in (1.0, 2.0):
+            scaled = factor * found.value * box
+            if found.value > 0.0 and capability.reachable(scaled, pose).certain:
+                poses = poses_in(scaled, pose, np.zeros(3), random)
+                nearest = LegClearance(p)(Motion.from_pose(poses).rows).min()
+                assert nearest >= p[CLEARANCE_MIN] * (1.0 - 1e-9)
+    assert limiting > 2
+
+
+@pytest.mark.parametrize('normal', ['z', 'y'])
+def test_a_section_ends_where_two_legs_are_too_near(normal: str) -> None:
+    parts = 0
+    for seed in range(4):
+        platform, pose, random = near(seed)
+        # without the thin parts between singularities, which the grid misses
+        platform = StewartPlatform(platform.parameters.replaced({
+            'limits.length_max': 1.3 * platform.inverse_kinematics(pose)}))
+        p, n = platform.parameters, 'xyz'.index(normal)
+        size = size_of(p)
+        found = Capability(platform).section(pose, normal)
+        points = pose.position + random.uniform(-1.0, 1.0, (2000, 3)) * size
+        points[:, n] = pose.position[n]
+        poses = Motion.from_pose(Pose(points, pose.rotation))
+        solved = platform.inverse_dynamics(poses, singular='nan')
+        side = platform.inverse_dynamics(Motion.from_pose(pose)).determinant
+        good = ((LegClearance(p)(poses.rows) >= p[CLEARANCE_MIN]).all(axis=1)
+                & (solved.lengths <= p['limits.length_max']).all(axis=1)
+                & (solved.determinant * side > 0.0))
+        enclosed, distance = inside(found.loops, points, *(k for k in range(3) if k != n))
+        # a corner where two boundaries of the grid meet is cut off
+        clear = distance > 2.0 * np.ptp(np.concatenate(found.loops), axis=0).max() / 128.0
+        np.testing.assert_array_equal(enclosed[clear], good[clear])
+        for part in found.boundary:
+            if part.limit == 'leg_clearance_min':
+                parts += 1
+                on = LegClearance(p)(Motion.from_pose(Pose(part.points, pose.rotation)).rows)
+                np.testing.assert_allclose(on.min(axis=1), p[CLEARANCE_MIN], atol=1e-8 * size)
+                assert np.abs(on[:, part.leg] - p[CLEARANCE_MIN]).min() < 1e-8 * size
+    assert parts

@@ -34,6 +34,10 @@ limits are searched over three dimensions. The condition number is over six: wit
 ``J = J_c (1 + sum_k h_k M_k) + R`` over a cell, its smallest singular value is at least
 ``smallest_c (1 - |sum_k h_k |M_k||) - |R|`` (Golub and Van Loan, Matrix Computations, 4th ed.,
 8.6.2).
+
+The clearance of two legs over a cell is bounded by how far their joints at one end move in the
+frame of the joints at the other end (``leg_clearance.pair_room``). This bound is of first order:
+boxes that are nearer to the limit than cells can be small are not proven.
 """
 
 from __future__ import annotations
@@ -46,6 +50,7 @@ from stewart_dynamics.capability.travel import (
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, joints_of)
+from stewart_dynamics.mechanics.kinematics.leg_clearance import pair_room, put_axis
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.matrix6 import gram, inverse_and_determinant
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
@@ -74,6 +79,8 @@ _BEND = 1.2
 # The largest excess is found to this part of a limit (of a radian); whether it is above zero to
 # the tolerance of limits.
 _EXACT = 1e-7
+# The largest excess of a clearance below its limit is found to this part.
+_COARSE = 0.1
 
 Bounded = tuple[float, float, Vector6, Vector6]
 """A value, its bound in a cell, the gradient, and the bound of the gradient's change."""
@@ -304,8 +311,8 @@ def legs_in_box(constants: Array, axes: Array, bounds: Array, row: Array, pivot:
 
     Parameters
     ----------
-    constants, axes, bounds : (CONSTANTS,), (12, 3), (4, 6)
-        As in ``travel.travels``.
+    constants, axes, bounds : (CONSTANTS,), (12, 3), (5, 6)
+        As in ``travel.travels``; the clearance is that of ``clearance_in_box``.
     row : (MOTION,)
         Pose from which the box is measured.
     pivot : (3,)
@@ -349,6 +356,110 @@ def legs_in_box(constants: Array, axes: Array, bounds: Array, row: Array, pivot:
                     waiting += 1
             # the last row of the cells is the point
             _search(legs[n], code, limit, cells, waiting, most, cells[DEPTH], answer)
+
+
+@compiled
+def _clearance(constants: Array, shapes: Array, legs: Array, i: int, j: int, cell: Array,
+               axes: Array) -> tuple[float, float, float]:
+    """Return the clearance of two legs in the middle of a cell, its bound, and the longer arm."""
+    r = read3(cell, 3)
+    k = _coefficients(r)
+    half_d, half_r = _length(read3(cell, _HALF)), _length(read3(cell, _HALF + 3))
+    arm, other_arm = _length(read3(legs[i], _A)), _length(read3(legs[j], _A))
+    from_base = other_from_base = 0.0
+    base_joint, platform_joint = joints_of(constants, i)
+    other_base_joint, other_platform_joint = joints_of(constants, j)
+    for n in (i, j):
+        center = add(read3(legs[n], _C), read3(cell, 0))
+        line = add(center, _turned(k, r, read3(legs[n], _A)))
+        length = _length(line)
+        put_axis(shapes, axes, n, base_joint if n == i else other_base_joint,
+                 scale(1.0 / length if length > 0.0 else 0.0, line), length)
+        if n == i:
+            from_base = _length(center)
+        else:
+            other_from_base = _length(center)
+    clearance, lowest, _ = pair_room(
+        shapes, axes, i, j, half_d + arm * half_r, half_d + other_arm * half_r,
+        half_r * _length(subtract(platform_joint, other_platform_joint)), False, 0.0)
+    _, other_lowest, _ = pair_room(
+        shapes, axes, i, j, half_d + from_base * half_r, half_d + other_from_base * half_r,
+        half_r * _length(subtract(base_joint, other_base_joint)), True, 0.0)
+    return clearance, max(lowest, other_lowest), max(arm, other_arm)
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[::1]', 'f8[::1]', 'f8[::1]', 'i8',
+             'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]')
+def clearance_in_box(constants: Array, axes: Array, shapes: Array, limit: float, row: Array,
+                     pivot: Array, box: Array, most: int, legs: Array, cells: Array,
+                     leg_axes: Array, found: Array) -> None:
+    """
+    Prove that no two legs are nearer than a limit over a box.
+
+    Parameters
+    ----------
+    constants, axes, row, pivot, box, legs, cells
+        As in ``legs_in_box``.
+    shapes : (6, 3)
+        As in ``leg_clearance``.
+    limit : float
+        Smallest clearance [m].
+    most : int
+        Largest number of cells for each pair of legs.
+    leg_axes : (6, AXIS)
+        Scratch memory, see ``leg_clearance``.
+    found : (15, FOUND)
+        Written: for each pair of legs, in order, the largest excess found, a bound of the excess
+        [m], and the point [d; r]. A pair that keeps the limit everywhere is not searched further.
+
+    """
+    _prepare(constants, axes, row, pivot, legs)
+    pair = 0
+    for i in range(6):
+        for j in range(i + 1, 6):
+            for k in range(12):
+                cells[0, k] = box[k]
+            cells[0, _BOUND] = math.inf
+            _search_pair(constants, shapes, legs, i, j, limit, cells, most, leg_axes, found[pair])
+            pair += 1
+
+
+@compiled
+def _search_pair(constants: Array, shapes: Array, legs: Array, i: int, j: int, limit: float,
+                 cells: Array, most: int, axes: Array, found: Array) -> None:
+    """Write the largest excess of the clearance of two legs over the cell that waits."""
+    kept = 0.5 * TOLERANCE * limit
+    best, upper, count, top = -math.inf, -math.inf, 0, 1
+    while top > 0:
+        top -= 1
+        cell = cells[top]
+        enough = kept if best <= kept else best + _COARSE * abs(best)
+        if cell[_BOUND] <= enough or count >= most or top + 2 >= DEPTH:
+            upper = max(upper, cell[_BOUND])
+            continue
+        count += 1
+        clearance, lowest, arm = _clearance(constants, shapes, legs, i, j, cell, axes)
+        if limit - clearance > best:
+            best = limit - clearance
+            for n in range(6):
+                found[POINT.start + n] = cell[n]
+        cell[_BOUND] = min(cell[_BOUND], limit - lowest)
+        widest, at = -1.0, 0
+        for n in range(6):
+            wide = cell[_HALF + n] * (1.0 if n < 3 else arm)
+            if wide > widest:
+                widest, at = wide, n
+        if cell[_BOUND] <= enough or widest <= 0.0:
+            upper = max(upper, cell[_BOUND])
+            continue
+        half = 0.5 * cell[_HALF + at]
+        cell[_HALF + at] = half
+        for n in range(CELL):
+            cells[top + 1, n] = cell[n]
+        cell[at] -= half
+        cells[top + 1, at] += half
+        top += 2
+    found[EXCESS], found[UPPER] = best, max(best, upper)
 
 
 @compiled

@@ -43,7 +43,8 @@ from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
 from stewart_dynamics.mechanics.frames.rotation import from_euler
 from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
-from stewart_dynamics.mechanics.kinematics.leg_clearance import LegClearance
+from stewart_dynamics.mechanics.kinematics.leg_clearance import (
+    clearance_to_check, LegClearance)
 from stewart_dynamics.mechanics.platform_arguments import check_kind, copies, motion_rows
 from stewart_dynamics.mechanics.rows import MOTION, POSE, TWIST
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
@@ -51,7 +52,7 @@ from stewart_dynamics.mechanics.stiffness import geometric_stiffness, modes_of, 
 
 # Names of the codes of ``travel``.
 _ENDS = np.array(['length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max',
-                  'singularity', ''])
+                  'leg_clearance_min', 'singularity', ''])
 # Rounds in which the least tilt between two azimuths is found.
 _ZOOMS = 6
 # Step of a numerical derivative by the pose [m, rad].
@@ -71,7 +72,8 @@ class Extent(NamedTuple):
     limit : str or (...)
         Name of the limit without ``limits.``, or ``singularity``; empty where nothing limits.
     leg : int or (...)
-        Index from 0 of the leg that reaches it; -1 for a singularity or nothing.
+        Index from 0 of the leg that reaches it, of two legs that are too near the first; -1 for a
+        singularity or nothing.
     sample : int or None
         Index of the sample of a motion at which it is reached, or of the last one before.
     time : float or None
@@ -130,8 +132,12 @@ class Capability:
         self._limits = limits.Limits(platform.parameters)
         bounds = self._limits.bounds
         self._bounds = np.array([
-            bounds.get(name, np.full(6, 0.0 if name == limits.LENGTH_MIN else math.inf))
-            for name in (limits.LENGTH_MIN, limits.LENGTH_MAX, *limits.OF_JOINTS)])
+            bounds.get(name, np.full(6, unlimited)) for name, unlimited in (
+                (limits.LENGTH_MIN, 0.0), (limits.LENGTH_MAX, math.inf),
+                *((name, math.inf) for name in limits.OF_JOINTS),
+                (limits.CLEARANCE_MIN, -math.inf))])
+        clearance = clearance_to_check(platform.parameters)
+        self._shapes = np.full((6, 3), math.nan) if clearance is None else clearance.shapes
         angles = angles_to_check(platform.parameters, self._limits.of_joints)
         self._axes = np.full((12, 3), math.nan) if angles is None else angles.axes
         self._frictionless = StewartPlatform(platform.parameters.replaced({
@@ -142,7 +148,7 @@ class Capability:
         """
         Return how far the platform can move from a pose until the first limit.
 
-        Lengths, joint angles, and the condition number of J_inv up to
+        Lengths, joint angles, clearance of the legs, and the condition number of J_inv up to
         ``singularity.stop_condition``, which comes before det(J) = 0. No limit is exceeded before
         the answer: one that is left and entered again is not passed.
 
@@ -168,10 +174,12 @@ class Capability:
         stop = self.platform.parameters['singularity.stop_condition']
 
         def solve(constants: Array, *arrays: Any) -> None:
-            travel.travels(constants, self._axes, self._bounds, stop, *arrays)
+            travel.travels(constants, self._axes, self._bounds, self._shapes, stop,
+                           *arrays)
 
         in_parts(solve, self.platform.constants, rows, copies(directions, shape),
-                 copies(pivots, shape), values, codes, legs, scratch=(6, travel.LEG))
+                 copies(pivots, shape), values, codes, legs,
+                 scratch=(travel.SCRATCH, travel.LEG))
         return _extent(values.reshape(shape) / sizes, _ENDS[codes].reshape(shape),
                        legs.reshape(shape))
 
@@ -180,10 +188,11 @@ class Capability:
         """
         Return whether all poses of a box of ranges are within the limits: proven, not sampled.
 
-        Lengths, joint angles, the condition number up to ``singularity.stop_condition``, and the
-        sign of det(J), by branch and bound (``capability.box``). The work is bounded: a box that
-        is within the limits but too near to a singularity may be answered with ``certain`` False
-        and a worst pose whose excess is negative.
+        Lengths, joint angles, clearance of the legs, the condition number up to
+        ``singularity.stop_condition``, and the sign of det(J), by branch and bound
+        (``capability.box``). The work is bounded: a box that is within the limits, but too near to
+        a singularity or to the smallest clearance, may be answered with ``certain`` False and a
+        worst pose whose excess is negative.
 
         Parameters
         ----------
@@ -206,7 +215,8 @@ class Capability:
 
         Arguments are those of ``reachable``; each range includes zero. The box of the answer is
         proven to be reachable. Where lengths or joint angles limit, a box larger by 1e-8 is not;
-        near a singularity the factor may be too small. Rotations grow up to a turn.
+        where the clearance of the legs or a singularity limits the factor may be too small.
+        Rotations grow up to a turn.
         """
         ranges = checked_ranges(box)
         if (ranges[:, 0] > 0.0).any() or (ranges[:, 1] < 0.0).any():
@@ -240,7 +250,8 @@ class Capability:
         Return the reachable positions in a plane through a pose, at its rotation.
 
         The curves on which lengths and joint angles end are exact; holes are holes. Boundaries at
-        singularities, if there are any, are exact at points of a grid of 128 x 128.
+        singularities and at the clearance of the legs, if there are any, are exact at points of a
+        grid of 128 x 128; parts that are thinner than one of its steps are missed.
 
         Parameters
         ----------
@@ -303,7 +314,8 @@ class Capability:
         center = np.zeros(3) if pivot is None else as_array('pivot', pivot, (3,))
         if center.ndim > 1:
             raise MotionError(f'pivot: shape {center.shape}: must be (3,)')
-        return Boxes(self.platform, self._axes, self._bounds, self._single(pose).rows, center)
+        return Boxes(self.platform, self._axes, self._bounds, self._shapes,
+                     self._single(pose).rows, center)
 
     def wrench(self, pose: Pose | Motion, direction: ArrayLike, base: BaseMotion | None = None,
                ) -> Extent:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 import math
 from typing import NamedTuple
 
@@ -25,21 +26,28 @@ from numpy.typing import ArrayLike
 
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.capability import box as boxes
+from stewart_dynamics.capability.travel import CLEARANCE_MIN
 from stewart_dynamics.errors import MotionError
 from stewart_dynamics.mechanics.arguments import as_array
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import characteristic_length_of
 from stewart_dynamics.mechanics.frames.motion import Pose
+from stewart_dynamics.mechanics.kinematics.leg_clearance import AXIS
 from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.rows import POSE
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
-# Largest numbers of cells: for each limit of each leg, and for the condition number.
-_MOST_OF_LEGS, _MOST_OF_CONDITION = 20_000, 100_000
+# Largest numbers of cells: for each limit of each leg, for the clearance of each pair of legs, and
+# for the condition number.
+_MOST_OF_LEGS, _MOST_OF_CLEARANCE, _MOST_OF_CONDITION = 20_000, 100_000, 100_000
 _CODES = ('length_min', 'length_max', 'base_joint_angle_max', 'platform_joint_angle_max')
+# The first leg of each pair.
+_FIRST = [i for i, _ in combinations(range(6), 2)]
 # Factors of a box are found to this part.
 _EXACT = 1e-9
-# For a box that reaches a singularity the factor is found to this part: each proof takes longer.
+# For a box that ends at a clearance or a singularity the factor is found to these parts: each
+# proof takes longer.
+_EXACT_OF_CLEARANCE = 0.01
 _EXACT_OF_CONDITION = 0.05
 # Boxes of translations are proven up to this multiple of the hexapod's size.
 _LARGEST = 1e6
@@ -50,7 +58,7 @@ class Worst(NamedTuple):
 
     pose: Pose
     leg: int
-    """Index of the leg; -1 at a singularity."""
+    """Index of the leg, of two legs that are too near the first; -1 at a singularity."""
     limit: str
     """Name of the limit without ``limits.``, or ``singularity``."""
     excess: float
@@ -95,16 +103,18 @@ class Boxes:
     ----------
     platform : StewartPlatform
         The hexapod.
-    axes, bounds : (12, 3), (4, 6)
+    axes, bounds, shapes : (12, 3), (5, 6), (6, 3)
         As in ``travel.travels``.
     row, pivot : (MOTION,), (3,)
         Pose from which boxes are measured, and center of rotation in the platform frame [m].
 
     """
 
-    def __init__(self, platform: StewartPlatform, axes: Array, bounds: Array, row: Array,
-                 pivot: Array) -> None:
-        self._platform, self._axes, self._bounds = platform, axes, bounds
+    def __init__(self, platform: StewartPlatform, axes: Array, bounds: Array, shapes: Array,
+                 row: Array, pivot: Array) -> None:
+        self._platform, self._axes = platform, axes
+        self._bounds, self._shapes = bounds[:CLEARANCE_MIN], shapes
+        self._nearest = float(bounds[CLEARANCE_MIN, 0])
         self._row, self._pivot = row, pivot
         self._stop = min(platform.parameters['singularity.stop_condition'], UNSOLVABLE_CONDITION)
         self._legs = np.empty((6, boxes.LEG))
@@ -117,6 +127,12 @@ class Boxes:
         worst, certain, part = self._worst_of_legs(box)
         if not certain:
             return Reachable(False, worst)
+        if self._nearest > -math.inf:
+            near, certain, part_of_clearance = self._worst_clearance(box)
+            if not certain:
+                return Reachable(False, near)
+            if part_of_clearance > part:
+                worst, part = near, part_of_clearance
         singular, certain, part_of_condition = self._worst_condition(box)
         return Reachable(
             certain, singular if not certain or part_of_condition > part else worst)
@@ -136,6 +152,10 @@ class Boxes:
         most = 2.0 * math.pi / turned if turned > 2.0 * math.pi / _LARGEST else math.inf
         factor, worst = _largest(
             lambda factor: self._worst_of_legs(_box(factor * ranges)), most, _EXACT)
+        if factor > 0.0 and self._nearest > -math.inf:
+            factor, worst = _largest(
+                lambda factor: self._worst_clearance(_box(factor * ranges)), factor,
+                _EXACT_OF_CLEARANCE, worst)
         if factor > 0.0:
             factor, worst = _largest(
                 lambda factor: self._worst_condition(_box(factor * ranges)), factor,
@@ -155,6 +175,20 @@ class Boxes:
         certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * sizes))
         return _Proof(Worst(self.poses(found[at, boxes.POINT]), at % 6, _CODES[at // 6],
                             float(found[at, boxes.EXCESS])), certain, float(parts[at]))
+
+    def _worst_clearance(self, box: Array) -> _Proof:
+        """Return the worst pose by clearance of the legs, and whether the limit is kept."""
+        found = np.empty((15, boxes.FOUND))
+        boxes.clearance_in_box(
+            self._platform.constants, self._axes, self._shapes, self._nearest, self._row,
+            self._pivot, box, _MOST_OF_CLEARANCE, self._legs, self._cells, np.empty((6, AXIS)),
+            found)
+        at = int(found[:, boxes.EXCESS].argmax())
+        excess = float(found[at, boxes.EXCESS])
+        certain = bool(np.all(found[:, boxes.UPPER] <= TOLERANCE * self._nearest))
+        size = self._platform.parameters['singularity.characteristic_length']
+        return _Proof(Worst(self.poses(found[at, boxes.POINT]), _FIRST[at], 'leg_clearance_min',
+                            excess), certain, excess / size)
 
     def _worst_condition(self, box: Array) -> _Proof:
         """Return the worst pose by condition number, and whether it stays below its limit."""

@@ -34,6 +34,11 @@ more than the norm of its change (Golub and Van Loan, Matrix Computations, 4th e
 is bounded as above: each evaluation clears an interval around it. Where such an interval is
 shorter than 1e-7 of the hexapod's size over its speed, the root is bracketed by the margin and the
 sign of det(J) instead.
+
+The clearance of two legs falls no faster than their ends can approach each other, at V of both
+legs at most: steps of ``leg_clearance.pair_room`` never pass a root, and where they are as short
+the root is bracketed in the same way. Platform joints keep their distance: where they are nearest,
+longer steps follow from the speed of the base joints in the frame of the platform.
 """
 
 from __future__ import annotations
@@ -44,20 +49,25 @@ from stewart_dynamics.arrays import Array, Integers
 from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.mechanics.dynamics.hexapod_constants import (
     characteristic_length_of, joints_of)
+from stewart_dynamics.mechanics.kinematics.leg_clearance import pair_room, put_axis
 from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Symmetric, tridiagonal)
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
     add, cross, dot, read3, read9, rotate, scale, subtract, Vector3, Vector6)
 
-LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, SINGULARITY, NOTHING = range(6)
+(LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, CLEARANCE_MIN, SINGULARITY,
+ NOTHING) = range(7)
 """Codes of the limit that ends a travel."""
+SCRATCH = 12
+"""Rows of scratch memory: six legs, and their axes for the clearance."""
 
 # The constants of a leg: A, B, C, speed V and reach |B| of its platform joint; the axis of the
 # base joint; three parts each (kept, by cos, by sin) of the platform joint's axis and of its arm
-# R p; and, as scratch, a row of dJ/dt and a row of J^-1, J the scaled J_inv.
+# R p; as scratch, a row of dJ/dt and a row of J^-1, J the scaled J_inv; and the center of rotation
+# from the base joint.
 _A, _B, _C, _SPEED, _REACH, _BASE_AXIS, _PLATFORM_AXIS, _ARM = 0, 3, 6, 9, 10, 11, 14, 23
-_ROW_RATE, _INVERSE, LEG = 32, 38, 44
+_ROW_RATE, _INVERSE, _CENTER, LEG = 32, 38, 44, 47
 # A value within this of its limit, relative to the limit's own size, is on it.
 _ROUNDING = 1e-12
 # Steps end below this part of the way so far, or of the hexapod's size.
@@ -67,8 +77,12 @@ _SHALLOW = 1e-10
 _MOST_STEPS, _MOST_STEPS_OF_LEG = 20_000, 1_000_000
 # Bounds of the second derivative of J_inv hold while a leg is longer than this part of its length.
 _SHORTER = 0.8
-# The condition number is certified by intervals down to this part of the hexapod's size.
+# Condition number and clearance are certified by intervals down to this part of the size.
 _NARROW = 1e-7
+# Some clearances stay the same along a travel: rounding errors are below this part of the size.
+_EXACT_CLEARANCE = 1e-14
+# The frame of the platform is used for steps below this part of it.
+_NEAR = 0.01
 
 
 @inlined
@@ -130,7 +144,8 @@ def _prepare(constants: Array, axes: Array, pose: Array, direction: Array, pivot
         _put_turning(leg, _A, turns, axis, arm)
         leg[_REACH] = _length(read3(leg, _B))
         leg[_SPEED] = _length(velocity) + rate * leg[_REACH]
-        _put3(leg, _A, add(subtract(center, base_joint), read3(leg, _A)))
+        _put3(leg, _CENTER, subtract(center, base_joint))
+        _put3(leg, _A, add(read3(leg, _CENTER), read3(leg, _A)))
         _put3(leg, _BASE_AXIS, read3(axes[n], 0))
         _put_turning(leg, _PLATFORM_AXIS, turns, axis, rotate(rotation, read3(axes[6 + n], 0)))
         _put_turning(leg, _ARM, turns, axis, rotate(rotation, platform_joint))
@@ -289,6 +304,77 @@ def _end_of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: 
     return low
 
 
+@inlined
+def _reach_of_base(leg: Array, t: float, velocity: Vector3) -> float:
+    """Return the distance of a base joint from the center of rotation."""
+    return _length(add(read3(leg, _CENTER), scale(t, velocity)))
+
+
+@compiled
+def _room(constants: Array, shapes: Array, legs: Array, velocity: Vector3, rate: float,
+          bound: float, i: int, j: int, t: float) -> tuple[float, float]:
+    """Return the margin of the clearance of two legs, and the step after t that it clears."""
+    axes = legs[6:]
+    base_joint, platform_joint = joints_of(constants, i)
+    other_base_joint, other_platform_joint = joints_of(constants, j)
+    for n in (i, j):
+        line, _ = _line(legs[n], velocity, rate, t)
+        length = _length(line)
+        direction = scale(1.0 / length if length > 0.0 else 0.0, line)
+        put_axis(shapes, axes, n, base_joint if n == i else other_base_joint, direction, length)
+    clearance, _, step = pair_room(
+        shapes, axes, i, j, legs[i, _SPEED], legs[j, _SPEED],
+        rate * _length(subtract(platform_joint, other_platform_joint)), False, bound)
+    if step * (legs[i, _SPEED] + legs[j, _SPEED]) < _NEAR * characteristic_length_of(constants):
+        # while the center moves by no more than its distance from a base joint
+        arm, other_arm = _reach_of_base(legs[i], t, velocity), _reach_of_base(legs[j], t, velocity)
+        linear = _length(velocity)
+        _, _, longer = pair_room(
+            shapes, axes, i, j, linear + 2.0 * rate * arm, linear + 2.0 * rate * other_arm,
+            rate * _length(subtract(base_joint, other_base_joint)), True, bound)
+        if linear > 0.0 and rate > 0.0:
+            longer = min(longer, min(arm, other_arm) / linear)
+        step = max(step, longer)
+    return clearance - bound, step
+
+
+@compiled
+def _end_of_clearance(constants: Array, shapes: Array, legs: Array, velocity: Vector3,
+                      rate: float, bound: float, i: int, j: int, end: float) -> float:
+    """Return the first t in [0, end] at which two legs are nearer than a bound, or end."""
+    size = characteristic_length_of(constants)
+    bound -= _EXACT_CLEARANCE * size
+    margin, step = _room(constants, shapes, legs, velocity, rate, bound, i, j, 0.0)
+    if margin < -_ROUNDING * size:
+        return 0.0
+    narrow = _NARROW * size / max(legs[i, _SPEED] + legs[j, _SPEED], _ROUNDING * rate * size)
+    t = 0.0
+    for _ in range(2000 * _MOST_STEPS):
+        if step > narrow:
+            t += step
+            if t >= end:
+                return end
+            margin, step = _room(constants, shapes, legs, velocity, rate, bound, i, j, t)
+            continue
+        if t >= end:
+            return end
+        margin, step = _room(constants, shapes, legs, velocity, rate, bound, i, j, t + narrow)
+        if margin < 0.0:
+            break  # the root is between the two
+        t += narrow
+    low, high = t, t + narrow
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        margin, _ = _room(constants, shapes, legs, velocity, rate, bound, i, j, middle)
+        if margin >= 0.0:
+            low = middle
+        else:
+            high = middle
+    return min(low, end)
+
+
 @compiled
 def largest_eigenvalue(g: Symmetric) -> float:
     """Return the largest eigenvalue of a Gram matrix."""
@@ -419,8 +505,8 @@ def _end_of_condition(constants: Array, legs: Array, velocity: Vector3, rate: fl
 
 
 @compiled
-def _travel(constants: Array, bounds: Array, stop: float, legs: Array, direction: Array,
-            ) -> tuple[float, int, int]:
+def _travel(constants: Array, bounds: Array, shapes: Array, stop: float, legs: Array,
+            direction: Array) -> tuple[float, int, int]:
     """Return t at the first limit, its code, and the leg (-1: none)."""
     velocity = read3(direction, 0)
     rate = _length(read3(direction, 3))
@@ -439,16 +525,23 @@ def _travel(constants: Array, bounds: Array, stop: float, legs: Array, direction
     t = _end_of_condition(constants, legs, velocity, rate, stop, end)
     if t < end:
         end, limit, leg = t, SINGULARITY, -1
+    if bounds[CLEARANCE_MIN, 0] > -math.inf:
+        for i in range(6):
+            for j in range(i + 1, 6):
+                t = _end_of_clearance(constants, shapes, legs, velocity, rate,
+                                      bounds[CLEARANCE_MIN, 0], i, j, end)
+                if t < end:
+                    end, limit, leg = t, CLEARANCE_MIN, i
     if limit == NOTHING:
         end = math.inf
     return end, limit, leg
 
 
-@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
-             'f8[::1]', 'i8[::1]', 'i8[::1]', 'f8[:,::1]')
-def travels(constants: Array, axes: Array, bounds: Array, stop: float, poses: Array,
-            directions: Array, pivots: Array, values: Array, limits: Integers, legs: Integers,
-            work: Array) -> None:
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8', 'f8[:,::1]', 'f8[:,::1]',
+             'f8[:,::1]', 'f8[::1]', 'i8[::1]', 'i8[::1]', 'f8[:,::1]')
+def travels(constants: Array, axes: Array, bounds: Array, shapes: Array, stop: float,
+            poses: Array, directions: Array, pivots: Array, values: Array, limits: Integers,
+            legs: Integers, work: Array) -> None:
     """
     Write the largest travel from each pose in its direction.
 
@@ -458,9 +551,12 @@ def travels(constants: Array, axes: Array, bounds: Array, stop: float, poses: Ar
         Constants of the hexapod, see ``hexapod_constants``.
     axes : (12, 3)
         Axes of the joints, see ``joint_angles``; not read where an angle has no bound.
-    bounds : (4, 6)
+    bounds : (5, 6)
         Bounds of each leg by code: shortest and longest length [m], largest angles of base and
-        platform joint [rad]; 0 and infinity where there is no bound.
+        platform joint [rad], smallest clearance [m], the same for all; 0, infinity and minus
+        infinity where there is no bound.
+    shapes : (6, 3)
+        As in ``leg_clearance``; not read where the clearance has no bound.
     stop : float
         Condition number that ends a travel.
     poses : (N, MOTION)
@@ -470,12 +566,14 @@ def travels(constants: Array, axes: Array, bounds: Array, stop: float, poses: Ar
     pivots : (N, 3)
         Centers of rotation, platform frame [m].
     values, limits, legs : (N,)
-        Written: multiple of the direction until the first limit, its code, and the leg; infinity,
-        NOTHING and -1 if nothing limits, leg -1 at a singularity.
-    work : (6, LEG)
+        Written: multiple of the direction until the first limit, its code, and the leg, of two
+        legs that are too near the first; infinity, NOTHING and -1 if nothing limits, leg -1 at a
+        singularity.
+    work : (SCRATCH, LEG)
         Scratch memory.
 
     """
     for n in range(len(poses)):
         _prepare(constants, axes, poses[n], directions[n], pivots[n], work)
-        values[n], limits[n], legs[n] = _travel(constants, bounds, stop, work, directions[n])
+        values[n], limits[n], legs[n] = _travel(
+            constants, bounds, shapes, stop, work, directions[n])

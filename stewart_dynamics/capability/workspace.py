@@ -21,21 +21,24 @@ limit of an angle at one of its joints a cone with the tip ``e_i``. A plane cuts
 and conics. The boundary of the section are the parts of these curves where all other limits are
 kept: holes stay holes. Where circles cross is known in closed form, so no arc is missed; where an
 arc crosses another limit is found by bisection. An arc of a conic, however short, begins and ends
-where an arc found before ends on it.
+where an arc found before ends on it. Boundaries at singularities and at the clearance of the legs
+are found on a grid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stewart_dynamics.arrays import Array, Flags
 from stewart_dynamics.mechanics.frames.motion import Motion, Pose
+from stewart_dynamics.mechanics.kinematics.leg_clearance import clearance_to_check
 from stewart_dynamics.mechanics.limits import (
-    BASE_ANGLE_MAX, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS)
+    BASE_ANGLE_MAX, CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, Limits, OF_JOINTS)
 from stewart_dynamics.mechanics.rows import CONDITION, DETERMINANT, LENGTHS, MOTION, POSITION
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 
@@ -106,7 +109,7 @@ def section(platform: StewartPlatform, axes: Array, start: Motion, normal: int) 
         found = circles + [
             each for name, leg, curve, crossings in curves if callable(crossings)
             for each in plane.parts(name, leg, curve, crossings(ends))]
-    found += plane.singular(found)
+    found += [*_chained(plane.singular()), *_chained(plane.too_near())]
     return Section(tuple(found), tuple(_joined([each.points for each in found])))
 
 
@@ -116,8 +119,14 @@ class _Plane:
     def __init__(self, platform: StewartPlatform, start: Motion, normal: int) -> None:
         self._platform, self._row, self._normal = platform, start.rows, normal
         self._limits = Limits(platform.parameters)
+        # all lengths are within this range
+        p = platform.parameters
+        tips = p['geometry.base_joints'] - p['geometry.platform_joints'] @ start.rotation.T
+        longest = self._limits.bounds[LENGTH_MAX][:, None]
+        self._low, self._high = (tips - longest).max(axis=0), (tips + longest).min(axis=0)
         self._side = float(platform.solve(start.rows[None])[0, DETERMINANT])
         self._stop = platform.parameters['singularity.stop_condition']
+        self._clearance = clearance_to_check(platform.parameters)
 
     def regular(self, points: Array) -> Flags:
         """Return at which positions (N, 3) the condition number and the sign of det(J) hold."""
@@ -126,6 +135,14 @@ class _Plane:
             regular: Flags = (solved[:, CONDITION] < self._stop) & (
                 solved[:, DETERMINANT] * self._side > 0.0)
         return regular
+
+    def clear(self, points: Array) -> Flags:
+        """Return at which positions (N, 3) no two legs are too near."""
+        if self._clearance is None:
+            return np.ones(len(points), dtype=bool)
+        near = self._limits.exceeds(CLEARANCE_MIN, self._clearance(self._rows(points)))
+        kept: Flags = np.asarray(~near.any(axis=1))
+        return kept
 
     def within(self, points: Array) -> Flags:
         """Return at which positions (N, 3) lengths and angles of the joints keep their limits."""
@@ -155,6 +172,7 @@ class _Plane:
         def good(angles: Array) -> Flags:
             points = curve(angles)
             kept = self.within(points)
+            kept[kept] = self.clear(points[kept])
             kept[kept] = self.regular(points[kept])
             return kept
 
@@ -178,17 +196,32 @@ class _Plane:
             yield Boundary(name, leg, curve(np.concatenate([
                 ends[n:n + 1], between, ends[n + 1:n + 2]])))
 
-    def singular(self, others: list[Boundary]) -> Iterator[Boundary]:
+    def singular(self) -> Iterator[Boundary]:
         """Yield the boundary at singularities, in the range that the other limits leave."""
-        # the curves of the other limits end there as well, or enclose it
-        rows = np.array([self._row[POSITION]])
-        points = np.concatenate([rows, *(each.points for each in others)])
+        for piece in self._edges(self.regular):
+            if self.within(piece).all() and self.clear(piece).all():
+                yield Boundary('singularity', -1, piece)
+
+    def too_near(self) -> Iterator[Boundary]:
+        """Yield the boundary at which legs are too near, in the range that other limits leave."""
+        if self._clearance is None:
+            return
+        for piece in self._edges(self.clear):
+            if self.within(piece).all() and self.regular(piece).all():
+                leg = int(self._clearance(self._rows(piece[:1]))[0].argmin())
+                yield Boundary('leg_clearance_min', leg, piece)
+
+    def _edges(self, kept: Callable[[Array], Flags]) -> Iterator[Array]:
+        """Yield pieces (2, 3) of the boundary of a condition, between lines of a grid."""
         i, j = (n for n in range(3) if n != self._normal)
-        low, high = points.min(axis=0), points.max(axis=0)
+        low, high = self._low, self._high
+        if (low >= high)[[i, j]].any():
+            return
+        rows = np.array([self._row[POSITION]])
         x, y = (np.linspace(low[n], high[n], _GRID) for n in (i, j))
         grid = np.tile(rows, (_GRID * _GRID, 1))
         grid[:, i], grid[:, j] = (each.ravel() for each in np.meshgrid(x, y, indexing='ij'))
-        regular = self.regular(grid)
+        regular = kept(grid)
         if regular.all():
             return
         index = np.arange(_GRID * _GRID).reshape(_GRID, _GRID)
@@ -202,16 +235,14 @@ class _Plane:
         begins = regular.ravel()[edges[:, 0]]
         for _ in range(_STEPS):
             middle = 0.5 * (start + end)
-            same = (self.regular(middle) == begins)[:, None]
+            same = (kept(middle) == begins)[:, None]
             start, end = np.where(same, middle, start), np.where(same, end, middle)
         on = dict(zip(map(tuple, edges.tolist()), start, strict=True))
         corners = index[:-1, :-1].ravel()[:, None] + np.array([0, _GRID, _GRID + 1, 1])
         for a, b, c, d in corners.tolist():
             crossed = [on[edge] for edge in ((a, b), (b, c), (d, c), (a, d)) if edge in on]
             for n in range(0, len(crossed) - 1, 2):
-                piece = np.array(crossed[n:n + 2])
-                if self.within(piece).all():
-                    yield Boundary('singularity', -1, piece)
+                yield np.array(crossed[n:n + 2])
 
     def _rows(self, points: Array) -> Array:
         rows = np.zeros((len(points), MOTION))
@@ -290,6 +321,23 @@ def _curves(platform: StewartPlatform, axes: Array, start: Motion, normal: int,
                 return at
 
             yield name.removeprefix('limits.'), leg, conic, angles_on
+
+
+def _chained(pieces: Iterable[Boundary]) -> Iterator[Boundary]:
+    """Yield boundaries of pieces (2, 3) of one leg that share their ends."""
+    waiting = dict(enumerate(pieces))
+    at: dict[tuple[Any, ...], list[int]] = {}
+    for n, (_, leg, points) in waiting.items():
+        for end in points.tolist():
+            at.setdefault((leg, *end), []).append(n)
+    while waiting:
+        name, leg, points = waiting.pop(next(iter(waiting)))
+        line = deque(points.tolist())
+        for end, add in ((-1, line.append), (0, line.appendleft)):
+            while following := [n for n in at[(leg, *line[end])] if n in waiting]:
+                first, second = waiting.pop(following[0]).points.tolist()
+                add(second if first == line[end] else first)
+        yield Boundary(name, leg, np.array(line))
 
 
 def _joined(pieces: list[Array]) -> Iterator[Array]:

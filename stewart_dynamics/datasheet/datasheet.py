@@ -187,7 +187,6 @@ def _checked(hexapod: RatedHexapod, ranges: Array) -> dict[str, Any]:
     return {'possible': bool(found.certain), 'ranges': claimed_box.in_words(ranges),
             'factor': factor, 'limit': worst.limit,
             'leg': hexapod.joints[worst.leg] if worst.leg >= 0 else None,
-            'not_considered': ['leg_clearance_min'] * hexapod.limited('leg_clearance_min'),
             'excess': _finite(worst.excess),
             'displacement': dict(zip(AXES, moved.tolist(), strict=True)),
             'position': worst.pose.position.tolist(),

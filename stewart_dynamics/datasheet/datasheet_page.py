@@ -129,7 +129,7 @@ def write_page(path: Path, sheet: Mapping[str, Any], hexapod: RatedHexapod, pict
         between_setpoints=between_setpoints(sheet['motion']) if sheet['motion'] else '',
         dashes={name: charts.DASHES[name] for name in pictures.limits()},
         limit_name=limit_name, setpoints_used=setpoints_used, down=down, span=span, MM=MM,
-        clearance=hexapod.limited('leg_clearance_min'), DEGREE=DEGREE, names=_NAMES)
+        DEGREE=DEGREE, names=_NAMES)
     write_files({path: text})
 
 

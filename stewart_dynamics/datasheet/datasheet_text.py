@@ -22,17 +22,13 @@ from typing import Any
 from stewart_dynamics.datasheet.figures import (
     both_ways, DEGREE, down, limit_name, MM, span, unit_of)
 from stewart_dynamics.datasheet.ratings import AXES
-from stewart_dynamics.mechanics.limits import CLEARANCE_MIN
-
-_NO_CLEARANCE = '; clearance between the legs not considered'
 
 
 def sheet_text(sheet: dict[str, Any]) -> str:
     """Return travel, payload, and whether box and motion are possible."""
     at_once = sheet['at_once']
     lines = [f'{sheet["name"]}: travel of each axis alone' + (
-        ', all at once' if at_once else '') + (
-        _NO_CLEARANCE if sheet['parameters'][CLEARANCE_MIN] is not None else '')]
+        ', all at once' if at_once else '')]
     for axis in AXES:
         unit = unit_of(axis, 'travel')
         line = f'  {axis:<3} {both_ways(sheet["travel"], axis, unit):>20} {unit.name:<3}'
@@ -112,8 +108,7 @@ def box_verdict(found: dict[str, Any]) -> str:
     factor = '' if found['factor'] is None else (
         f'up to {down(found["factor"])} times as large')
     if found['possible']:
-        text = f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
-        return text + (_NO_CLEARANCE if found['not_considered'] else '')
+        return f'all of it is reachable, {factor}' if factor else 'all of it is reachable'
     moved = ', '.join(
         f'{axis} {down(each * unit.factor)} {unit.name}'
         for axis, each in found['displacement'].items()

@@ -27,7 +27,8 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayou
 from stewart_dynamics.capability.capability import Capability
 from stewart_dynamics.compilation.functions import Preparation
 from stewart_dynamics.mechanics.frames.motion import Motion
-from stewart_dynamics.mechanics.limits import LENGTH_MAX, LENGTH_MIN, OF_JOINTS
+from stewart_dynamics.mechanics.limits import (
+    CLEARANCE_MIN, LENGTH_MAX, LENGTH_MIN, OF_JOINTS)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.node.visualization import PublisherAtRate
 from stewart_dynamics.parameters.table import Parameters
@@ -41,7 +42,8 @@ _UNLIMITED = np.repeat([sys.float_info.max, 2.0 * math.pi], 6)
 _LAYOUT = MultiArrayLayout(dim=[
     MultiArrayDimension(label='x y z rx ry rz', size=6, stride=12),
     MultiArrayDimension(label='minus plus', size=2, stride=2)])
-NO_LIMIT = (f'~/travel: none of {", ".join((LENGTH_MIN, LENGTH_MAX, *OF_JOINTS))} is set: it ends '
+_ENDING = LENGTH_MIN, LENGTH_MAX, *OF_JOINTS, CLEARANCE_MIN
+NO_LIMIT = (f'~/travel: none of {", ".join(_ENDING)} is set: it ends '
             'at singularity.stop_condition alone')
 
 
@@ -80,7 +82,7 @@ class TravelPublisher(PublisherAtRate):
             self._code.begin()
             self._read = False
         unlimited = all(
-            self._parameters[name] is None for name in (LENGTH_MIN, LENGTH_MAX, *OF_JOINTS))
+            self._parameters[name] is None for name in _ENDING)
         said, self._said = self._said, True
         return NO_LIMIT if unlimited and not said else ''
 

@@ -27,7 +27,10 @@ capsules of two legs differ only in the ends of their rectangles.
 
 The axis of a cylinder ends at the point of a ball around the base joint that is nearest to the
 platform joint, so it moves no farther than the platform joint does: the clearance of two legs
-changes by no more than the sum of the distances that their platform joints move.
+changes by no more than the sum of the distances that their platform joints move. With the unit
+vector n from one axis to the other at their nearest points the distance is, whatever they do, at
+least that of their ends along n. In the frame of the base the base joints do not move, in that of
+the platform the platform joints do not: ``pair_room`` is for both.
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ import math
 import numpy as np
 
 from stewart_dynamics.arrays import Array
-from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.compilation.functions import compiled, entry_point, inlined
 from stewart_dynamics.errors import ParameterError
 from stewart_dynamics.mechanics import batch
 from stewart_dynamics.mechanics.dynamics.bodies import leg_line
@@ -54,15 +57,23 @@ _BASE, _DIRECTION, _LENGTH, _CYLINDER, AXIS = 0, 3, 6, 7, 8
 
 
 @inlined
-def _distance(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: float,
-              along_t: float, u: float, u_end: float, v_end: float) -> float:
-    """Return the least ``|gap + u s - v t|`` for 0 <= u <= u_end and 0 <= v <= v_end."""
+def _shortest(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: float,
+              along_t: float, u: float, u_end: float, v_end: float) -> Vector3:
+    """Return the shortest ``gap + u s - v t`` for 0 <= u <= u_end and 0 <= v <= v_end."""
     u = min(max(u, 0.0), u_end)
     v = min(max(cosine * u + along_t, 0.0), v_end)
     u = min(max(cosine * v - along_s, 0.0), u_end)
     x = gap[0] + u * s[0] - v * t[0]
     y = gap[1] + u * s[1] - v * t[1]
     z = gap[2] + u * s[2] - v * t[2]
+    return x, y, z
+
+
+@inlined
+def _distance(gap: Vector3, s: Vector3, t: Vector3, cosine: float, along_s: float,
+              along_t: float, u: float, u_end: float, v_end: float) -> float:
+    """Return the least ``|gap + u s - v t|`` for 0 <= u <= u_end and 0 <= v <= v_end."""
+    x, y, z = _shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end)
     return math.sqrt(x * x + y * y + z * z)
 
 
@@ -89,6 +100,72 @@ def pair_clearance(shapes: Array, axes: Array, i: int, j: int) -> float:
             _distance(gap, s, t, cosine, along_s, along_t, u, cylinder, other_cylinder)
             - thick - other_thick))
     return clearance
+
+
+@compiled
+def pair_room(shapes: Array, axes: Array, i: int, j: int, moved: float, other_moved: float,
+              turned: float, at_base: bool, bound: float) -> tuple[float, float, float]:
+    """
+    Return the clearance of two legs, and what is left of it when the joints at one end move.
+
+    Parameters
+    ----------
+    shapes, axes : (6, 3), (6, AXIS)
+        As in ``pair_clearance``.
+    i, j : int
+        The two legs.
+    moved, other_moved : float
+        Largest distances that their joints at one end move, in the frame of the others [m].
+    turned : float
+        Largest change of the vector between these two joints, likewise [m].
+    at_base : bool
+        The base joints move; else the platform joints.
+    bound : float
+        Smallest clearance [m].
+
+    Returns
+    -------
+    clearance, lowest, room : float
+        Clearance, a lower bound of it after these moves [m], and the multiple of the moves up to
+        which it cannot be below ``bound``; 0 where it is.
+
+    """
+    s, t = read3(axes[i], _DIRECTION), read3(axes[j], _DIRECTION)
+    gap = subtract(read3(axes[i], _BASE), read3(axes[j], _BASE))
+    cosine, along_s, along_t = dot(s, t), dot(gap, s), dot(gap, t)
+    normal = cross(s, t)
+    square = dot(normal, normal)
+    u = dot(gap, subtract(scale(cosine, t), s)) / square if square > 0.0 else 0.0
+    clearance = lowest = room = math.inf
+    for capsules in range(4):
+        cylinder, other_cylinder = capsules & 1 == 1, capsules & 2 == 2
+        u_end = axes[i, _CYLINDER] if cylinder else axes[i, _LENGTH]
+        v_end = axes[j, _CYLINDER] if other_cylinder else axes[j, _LENGTH]
+        inside = cylinder and u_end < axes[i, _LENGTH]
+        other_inside = other_cylinder and v_end < axes[j, _LENGTH]
+        radii = (shapes[i, 0] if cylinder else shapes[i, 2]) + (
+            shapes[j, 0] if other_cylinder else shapes[j, 2])
+        x = _shortest(gap, s, t, cosine, along_s, along_t, u, u_end, v_end)
+        distance = math.sqrt(dot(x, x))
+        n = scale(1.0 / distance if distance > 0.0 else 0.0, x)
+        at_bases = dot(n, gap) - radii
+        clearance = min(clearance, distance - radii)
+        for ends in range(4):
+            far, other_far = ends & 1 == 1, ends & 2 == 2
+            apart = at_bases + (u_end * dot(n, s) if far else 0.0) - (
+                v_end * dot(n, t) if other_far else 0.0)
+            # the end of a cylinder moves with the joints at either end, and no farther
+            by = 0.0
+            if far != at_base or (far and inside):
+                by += moved
+            if other_far != at_base or (other_far and other_inside):
+                by += other_moved
+            if far == other_far != at_base and not (far and (inside or other_inside)):
+                by = min(by, turned)
+            lowest = min(lowest, max(apart - by, -radii))
+            if by > 0.0:
+                room = min(room, (apart - bound) / by)
+    return clearance, lowest, max(room, 0.0) if clearance >= bound else 0.0
 
 
 @inlined
