@@ -106,7 +106,7 @@ def pair_clearance(shapes: Array, axes: Array, i: int, j: int) -> float:
 def pair_room(shapes: Array, axes: Array, i: int, j: int, moved: float, other_moved: float,
               turned: float, at_base: bool, bound: float) -> tuple[float, float, float]:
     """
-    Return the clearance of two legs, and what is left of it when the joints at one end move.
+    Return the clearance of two legs, and its least value when the joints at one end move.
 
     Parameters
     ----------
