@@ -55,7 +55,7 @@ from stewart_dynamics.mechanics.limits import TOLERANCE
 from stewart_dynamics.mechanics.matrix6 import gram, inverse_and_determinant
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, read3, read9, rotate, scale, subtract, Vector3, Vector6)
+    add, cross, dot, norm, put3, read3, read9, rotate, scale, subtract, Vector3, Vector6)
 
 # A cell: middle and half widths of d and r, and a bound that holds in it.
 _HALF, _BOUND, CELL = 6, 12, 13
@@ -84,16 +84,6 @@ _COARSE = 0.1
 
 Bounded = tuple[float, float, Vector6, Vector6]
 """A value, its bound in a cell, the gradient, and the bound of the gradient's change."""
-
-
-@inlined
-def _length(a: Vector3) -> float:
-    return math.sqrt(dot(a, a))
-
-
-@inlined
-def _put3(array: Array, at: int, a: Vector3) -> None:
-    array[at], array[at + 1], array[at + 2] = a
 
 
 @inlined
@@ -147,11 +137,11 @@ def _prepare(constants: Array, axes: Array, row: Array, pivot: Array, legs: Arra
     center = add(position, rotate(rotation, read3(pivot, 0)))
     for n in range(6):
         base_joint, platform_joint = joints_of(constants, n)
-        _put3(legs[n], _C, subtract(center, base_joint))
-        _put3(legs[n], _A, rotate(rotation, subtract(platform_joint, read3(pivot, 0))))
-        _put3(legs[n], _BASE_AXIS, read3(axes[n], 0))
-        _put3(legs[n], _PLATFORM_AXIS, rotate(rotation, read3(axes[6 + n], 0)))
-        _put3(legs[n], _ARM, rotate(rotation, platform_joint))
+        put3(legs[n], _C, subtract(center, base_joint))
+        put3(legs[n], _A, rotate(rotation, subtract(platform_joint, read3(pivot, 0))))
+        put3(legs[n], _BASE_AXIS, read3(axes[n], 0))
+        put3(legs[n], _PLATFORM_AXIS, rotate(rotation, read3(axes[6 + n], 0)))
+        put3(legs[n], _ARM, rotate(rotation, platform_joint))
 
 
 @compiled
@@ -160,10 +150,10 @@ def _longest(leg: Array, limit: float, cell: Array) -> Bounded:
     p, a, r = add(read3(leg, _C), read3(cell, 0)), read3(leg, _A), read3(cell, 3)
     k = _coefficients(r)
     turned = _turned(k, r, a)
-    length = _length(add(p, turned))
+    length = norm(add(p, turned))
     g = _gradient(k, r, turned, p)
-    half = _length(read3(cell, _HALF + 3))
-    change = _length(p) * _length(a) * half
+    half = norm(read3(cell, _HALF + 3))
+    change = norm(p) * norm(a) * half
     gradient = (0.0, 0.0, 0.0, g[0], g[1], g[2])
     square = length * length + 2.0 * _reach(gradient, cell) + change * half
     return (length - limit, math.sqrt(square) - limit, gradient,
@@ -185,9 +175,9 @@ def _shortest(leg: Array, limit: float, cell: Array, point: Array) -> Bounded:
     v = add(add(read3(leg, _C), read3(cell, 0)), turned)
     out = (_beyond(v[0], cell[_HALF]), _beyond(v[1], cell[_HALF + 1]),
            _beyond(v[2], cell[_HALF + 2]))
-    _put3(point, 0, add(read3(cell, 0), subtract(out, v)))
-    distance = _length(out)
-    half, arm = _length(read3(cell, _HALF + 3)), _length(a)
+    put3(point, 0, add(read3(cell, 0), subtract(out, v)))
+    distance = norm(out)
+    half, arm = norm(read3(cell, _HALF + 3)), norm(a)
     nearest = distance - arm * half
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if nearest <= 0.0:
@@ -209,7 +199,7 @@ def _angle(leg: Array, at_platform: bool, limit: float, cell: Array) -> Bounded:
     turned = _turned(k, r, a)
     line = add(add(read3(leg, _C), read3(cell, 0)), turned)
     axis = _turned(k, r, read3(leg, _PLATFORM_AXIS)) if at_platform else read3(leg, _BASE_AXIS)
-    length = _length(line)
+    length = norm(line)
     s = scale(1.0 / length, line)
     cosine = dot(s, axis)
     normal = scale(1.0 / length, subtract(scale(cosine, s), axis))
@@ -218,8 +208,8 @@ def _angle(leg: Array, at_platform: bool, limit: float, cell: Array) -> Bounded:
         g = subtract(g, _gradient(k, r, axis, s))
     gradient = (normal[0], normal[1], normal[2], g[0], g[1], g[2])
     excess = math.acos(min(max(cosine, -1.0), 1.0)) - limit
-    half, arm = _length(read3(cell, _HALF + 3)), _length(a)
-    moved = _length(read3(cell, _HALF)) + arm * half
+    half, arm = norm(read3(cell, _HALF + 3)), norm(a)
+    moved = norm(read3(cell, _HALF)) + arm * half
     shortest = length - moved
     if shortest <= 0.0:
         return excess, math.pi - limit, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (
@@ -231,7 +221,7 @@ def _angle(leg: Array, at_platform: bool, limit: float, cell: Array) -> Bounded:
     if at_platform:
         by_d += half * inverse
         by_r += swing + arm * half * inverse + half
-    bend = by_d * _length(read3(cell, _HALF)) + by_r * half
+    bend = by_d * norm(read3(cell, _HALF)) + by_r * half
     lowest = cosine - _reach(gradient, cell) - 0.5 * bend
     return (excess, math.acos(min(max(lowest, -1.0), 1.0)) - limit, gradient,
             (by_d, by_d, by_d, by_r, by_r, by_r))
@@ -258,7 +248,7 @@ def _search(leg: Array, code: int, limit: float, cells: Array, waiting: int, mos
             upper = max(upper, cell[_BOUND])
             continue
         count += 1
-        _put3(point, 0, read3(cell, 0))
+        put3(point, 0, read3(cell, 0))
         if code == LENGTH_MAX:
             excess, bound, g, change = _longest(leg, limit, cell)
         elif code == LENGTH_MIN:
@@ -364,27 +354,27 @@ def _clearance(constants: Array, shapes: Array, legs: Array, i: int, j: int, cel
     """Return the clearance of two legs in the middle of a cell, its bound, and the longer arm."""
     r = read3(cell, 3)
     k = _coefficients(r)
-    half_d, half_r = _length(read3(cell, _HALF)), _length(read3(cell, _HALF + 3))
-    arm, other_arm = _length(read3(legs[i], _A)), _length(read3(legs[j], _A))
+    half_d, half_r = norm(read3(cell, _HALF)), norm(read3(cell, _HALF + 3))
+    arm, other_arm = norm(read3(legs[i], _A)), norm(read3(legs[j], _A))
     from_base = other_from_base = 0.0
     base_joint, platform_joint = joints_of(constants, i)
     other_base_joint, other_platform_joint = joints_of(constants, j)
     for n in (i, j):
         center = add(read3(legs[n], _C), read3(cell, 0))
         line = add(center, _turned(k, r, read3(legs[n], _A)))
-        length = _length(line)
+        length = norm(line)
         put_axis(shapes, axes, n, base_joint if n == i else other_base_joint,
                  scale(1.0 / length if length > 0.0 else 0.0, line), length)
         if n == i:
-            from_base = _length(center)
+            from_base = norm(center)
         else:
-            other_from_base = _length(center)
+            other_from_base = norm(center)
     clearance, lowest, _ = pair_room(
         shapes, axes, i, j, half_d + arm * half_r, half_d + other_arm * half_r,
-        half_r * _length(subtract(platform_joint, other_platform_joint)), False, 0.0)
+        half_r * norm(subtract(platform_joint, other_platform_joint)), False, 0.0)
     _, other_lowest, _ = pair_room(
         shapes, axes, i, j, half_d + from_base * half_r, half_d + other_from_base * half_r,
-        half_r * _length(subtract(base_joint, other_base_joint)), True, 0.0)
+        half_r * norm(subtract(base_joint, other_base_joint)), True, 0.0)
     return clearance, max(lowest, other_lowest), max(arm, other_arm)
 
 
@@ -474,7 +464,7 @@ def _condition(constants: Array, legs: Array, cell: Array, stop: float, rows: Ar
     inverse_size = 1.0 / characteristic_length_of(constants)
     r = read3(cell, 3)
     k = _coefficients(r)
-    half_d, half_r = _length(read3(cell, _HALF)), _length(read3(cell, _HALF + 3))
+    half_d, half_r = norm(read3(cell, _HALF)), norm(read3(cell, _HALF + 3))
     bending = moving = 0.0
     near = True
     for n in range(6):
@@ -482,32 +472,32 @@ def _condition(constants: Array, legs: Array, cell: Array, stop: float, rows: Ar
         a = read3(leg, _A)
         turned = _turned(k, r, a)
         line = add(add(read3(leg, _C), read3(cell, 0)), turned)
-        length = _length(line)
+        length = norm(line)
         inverse = 1.0 / length
         s = scale(inverse, line)
         arm = scale(inverse_size, _turned(k, r, read3(leg, _ARM)))
-        _put3(work, 36, s)
-        _put3(work, 39, cross(arm, s))
+        put3(work, 36, s)
+        put3(work, 39, cross(arm, s))
         for axis in range(3):
             unit = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0,
                     1.0 if axis == 2 else 0.0)
             change = scale(inverse, subtract(unit, scale(dot(s, unit), s)))
-            _put3(work, 6 * axis, change)
-            _put3(work, 6 * axis + 3, cross(arm, change))
+            put3(work, 6 * axis, change)
+            put3(work, 6 * axis + 3, cross(arm, change))
             once = cross(r, unit)
             spin = add(unit, add(scale(k[1], once), scale(k[2], cross(r, once))))
             swept = cross(spin, turned)
             change = scale(inverse, subtract(swept, scale(dot(s, swept), s)))
-            _put3(work, 18 + 6 * axis, change)
-            _put3(work, 21 + 6 * axis,
-                  add(cross(cross(spin, arm), s), cross(arm, change)))
-        reach = _length(a)
+            put3(work, 18 + 6 * axis, change)
+            put3(work, 21 + 6 * axis,
+                 add(cross(cross(spin, arm), s), cross(arm, change)))
+        reach = norm(a)
         moved = half_d + reach * half_r
         shortest = length - moved
         near = near and shortest > 0.0
         swing = moved / shortest
         curve = reach * half_r * half_r / shortest + _BEND * swing * swing
-        lever = _length(arm)
+        lever = norm(arm)
         moment = lever * (half_r * half_r + 2.0 * half_r * swing + curve)
         bending += curve * curve + moment * moment
         moment = lever * (half_r + swing)

@@ -54,7 +54,7 @@ from stewart_dynamics.mechanics.matrix6 import (
     gram, inverse_and_determinant, laguerre_step, Symmetric, tridiagonal)
 from stewart_dynamics.mechanics.rows import POSITION, ROTATION
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, read3, read9, rotate, scale, subtract, Vector3, Vector6)
+    add, cross, dot, norm, put3, read3, read9, rotate, scale, subtract, Vector3, Vector6)
 
 (LENGTH_MIN, LENGTH_MAX, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX, CLEARANCE_MIN, SINGULARITY,
  NOTHING) = range(7)
@@ -86,16 +86,6 @@ _NEAR = 0.01
 
 
 @inlined
-def _length(a: Vector3) -> float:
-    return math.sqrt(dot(a, a))
-
-
-@inlined
-def _put3(array: Array, at: int, a: Vector3) -> None:
-    array[at], array[at + 1], array[at + 2] = a
-
-
-@inlined
 def put6(array: Array, at: int, a: Vector6) -> None:
     """Write six numbers; at an index that varies an exception would remain possible."""
     array[at], array[at + 1], array[at + 2] = a[0], a[1], a[2]
@@ -122,9 +112,9 @@ def _change(array: Array, at: int, cosine: float, sine: float) -> Vector3:
 def _put_turning(leg: Array, at: int, turns: bool, axis: Vector3, a: Vector3) -> None:
     """Write the parts of a vector that a rotation about an axis keeps, and turns by cos, sin."""
     along = scale(dot(axis, a), axis) if turns else a
-    _put3(leg, at, along)
-    _put3(leg, at + 3, subtract(a, along))
-    _put3(leg, at + 6, cross(axis, a))
+    put3(leg, at, along)
+    put3(leg, at + 3, subtract(a, along))
+    put3(leg, at + 6, cross(axis, a))
 
 
 @compiled
@@ -133,7 +123,7 @@ def _prepare(constants: Array, axes: Array, pose: Array, direction: Array, pivot
     """Write the constants of the six legs (6, LEG)."""
     position, rotation = read3(pose, POSITION.start), read9(pose, ROTATION.start)
     velocity, turn = read3(direction, 0), read3(direction, 3)
-    rate = _length(turn)
+    rate = norm(turn)
     turns = rate > 0.0
     axis = scale(1.0 / rate if turns else 0.0, turn)
     center = add(position, rotate(rotation, read3(pivot, 0)))
@@ -142,11 +132,11 @@ def _prepare(constants: Array, axes: Array, pose: Array, direction: Array, pivot
         base_joint, platform_joint = joints_of(constants, n)
         arm = rotate(rotation, subtract(platform_joint, read3(pivot, 0)))
         _put_turning(leg, _A, turns, axis, arm)
-        leg[_REACH] = _length(read3(leg, _B))
-        leg[_SPEED] = _length(velocity) + rate * leg[_REACH]
-        _put3(leg, _CENTER, subtract(center, base_joint))
-        _put3(leg, _A, add(read3(leg, _CENTER), read3(leg, _A)))
-        _put3(leg, _BASE_AXIS, read3(axes[n], 0))
+        leg[_REACH] = norm(read3(leg, _B))
+        leg[_SPEED] = norm(velocity) + rate * leg[_REACH]
+        put3(leg, _CENTER, subtract(center, base_joint))
+        put3(leg, _A, add(read3(leg, _CENTER), read3(leg, _A)))
+        put3(leg, _BASE_AXIS, read3(axes[n], 0))
         _put_turning(leg, _PLATFORM_AXIS, turns, axis, rotate(rotation, read3(axes[6 + n], 0)))
         _put_turning(leg, _ARM, turns, axis, rotate(rotation, platform_joint))
 
@@ -188,7 +178,7 @@ def _end_of_length(leg: Array, velocity: Vector3, rate: float, bound: float, lon
     """
     sign = 1.0 if longest else -1.0
     line, _ = _line(leg, velocity, rate, 0.0)
-    length = _length(line)
+    length = norm(line)
     value = sign * (bound - length) * (bound + length)
     exact = _ROUNDING * bound * bound
     if value < -exact:
@@ -217,7 +207,7 @@ def _of_length(leg: Array, velocity: Vector3, rate: float, bound: float, longest
     curving = rate * rate * leg[_REACH]
     speed = leg[_SPEED]
     line, change = _line(leg, velocity, rate, t)
-    length = _length(line)
+    length = norm(line)
     sign = 1.0 if longest else -1.0
     scaling = 1.0 / (bound * bound)
     value = sign * scaling * (bound - length) * (bound + length)
@@ -234,7 +224,7 @@ def _of_angle(leg: Array, velocity: Vector3, rate: float, bound: float, at_platf
     """Return the margin of an angle, its slope, its curvature, and the step for which it holds."""
     speed = leg[_SPEED]
     line, change = _line(leg, velocity, rate, t)
-    length = _length(line)
+    length = norm(line)
     inverse = 1.0 / length
     s = scale(inverse, line)
     s_change = scale(inverse, subtract(change, scale(dot(s, change), s)))
@@ -307,7 +297,7 @@ def _end_of_leg(leg: Array, velocity: Vector3, rate: float, bound: float, code: 
 @inlined
 def _reach_of_base(leg: Array, t: float, velocity: Vector3) -> float:
     """Return the distance of a base joint from the center of rotation."""
-    return _length(add(read3(leg, _CENTER), scale(t, velocity)))
+    return norm(add(read3(leg, _CENTER), scale(t, velocity)))
 
 
 @compiled
@@ -319,19 +309,19 @@ def _room(constants: Array, shapes: Array, legs: Array, velocity: Vector3, rate:
     other_base_joint, other_platform_joint = joints_of(constants, j)
     for n in (i, j):
         line, _ = _line(legs[n], velocity, rate, t)
-        length = _length(line)
+        length = norm(line)
         direction = scale(1.0 / length if length > 0.0 else 0.0, line)
         put_axis(shapes, axes, n, base_joint if n == i else other_base_joint, direction, length)
     clearance, _, step = pair_room(
         shapes, axes, i, j, legs[i, _SPEED], legs[j, _SPEED],
-        rate * _length(subtract(platform_joint, other_platform_joint)), False, bound)
+        rate * norm(subtract(platform_joint, other_platform_joint)), False, bound)
     if step * (legs[i, _SPEED] + legs[j, _SPEED]) < _NEAR * characteristic_length_of(constants):
         # while the center moves by no more than its distance from a base joint
         arm, other_arm = _reach_of_base(legs[i], t, velocity), _reach_of_base(legs[j], t, velocity)
-        linear = _length(velocity)
+        linear = norm(velocity)
         _, _, longer = pair_room(
             shapes, axes, i, j, linear + 2.0 * rate * arm, linear + 2.0 * rate * other_arm,
-            rate * _length(subtract(base_joint, other_base_joint)), True, bound)
+            rate * norm(subtract(base_joint, other_base_joint)), True, bound)
         if linear > 0.0 and rate > 0.0:
             longer = min(longer, min(arm, other_arm) / linear)
         step = max(step, longer)
@@ -412,7 +402,7 @@ def _margin(constants: Array, legs: Array, velocity: Vector3, rate: float, stop:
     for n in range(6):
         leg = legs[n]
         line, change = _line(leg, velocity, rate, t)
-        inverse_length = 1.0 / _length(line)
+        inverse_length = 1.0 / norm(line)
         s = scale(inverse_length, line)
         s_rate = scale(inverse_length, subtract(change, scale(dot(s, change), s)))
         arm = scale(inverse_size, _turned(leg, _ARM, cosine, sine))
@@ -420,13 +410,13 @@ def _margin(constants: Array, legs: Array, velocity: Vector3, rate: float, stop:
         moment = cross(arm, s)
         moment_rate = add(cross(arm_rate, s), cross(arm, s_rate))
         squares += dot(s_rate, s_rate) + dot(moment_rate, moment_rate)
-        _put3(leg, _ROW_RATE, s_rate)
-        _put3(leg, _ROW_RATE + 3, moment_rate)
+        put3(leg, _ROW_RATE, s_rate)
+        put3(leg, _ROW_RATE + 3, moment_rate)
         swing = leg[_SPEED] * inverse_length
         quickest = max(quickest, swing)
         swing /= _SHORTER
         curve = rate * rate * leg[_REACH] * inverse_length / _SHORTER + 3.0 * swing * swing
-        reach = _length(arm)
+        reach = norm(arm)
         moment_curve = reach * (rate * rate + 2.0 * rate * swing + curve)
         bending += curve * curve + moment_curve * moment_curve
         row = s[0], s[1], s[2], moment[0], moment[1], moment[2]
@@ -509,9 +499,9 @@ def _travel(constants: Array, bounds: Array, shapes: Array, stop: float, legs: A
             direction: Array) -> tuple[float, int, int]:
     """Return t at the first limit, its code, and the leg (-1: none)."""
     velocity = read3(direction, 0)
-    rate = _length(read3(direction, 3))
+    rate = norm(read3(direction, 3))
     # a platform that only turns is back at its pose after one turn
-    whole = 2.0 * math.pi / rate if _length(velocity) == 0.0 else math.inf
+    whole = 2.0 * math.pi / rate if norm(velocity) == 0.0 else math.inf
     end, limit, leg = whole, NOTHING, -1
     for code in (LENGTH_MAX, LENGTH_MIN, BASE_ANGLE_MAX, PLATFORM_ANGLE_MAX):
         for n in range(6):

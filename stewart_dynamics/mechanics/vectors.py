@@ -20,6 +20,8 @@ Tuples become registers when compiled. Every function is inlined into the loop o
 
 from __future__ import annotations
 
+import math
+
 from stewart_dynamics.arrays import Array
 from stewart_dynamics.compilation.functions import inlined
 
@@ -33,6 +35,12 @@ Symmetric3 = Vector6  # xx xy xz yy yz zz
 def read3(array: Array, at: int) -> Vector3:
     """Return three numbers of an array from a place on."""
     return array[at], array[at + 1], array[at + 2]
+
+
+@inlined
+def put3(array: Array, at: int, a: Vector3) -> None:
+    """Write a vector into an array, beginning at an index."""
+    array[at], array[at + 1], array[at + 2] = a
 
 
 @inlined
@@ -64,6 +72,12 @@ def scale(k: float, a: Vector3) -> Vector3:
 def dot(a: Vector3, b: Vector3) -> float:
     """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def norm(a: Vector3) -> float:
+    """Return the length of a vector."""
+    return math.sqrt(dot(a, a))
 
 
 @inlined

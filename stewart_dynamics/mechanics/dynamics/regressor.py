@@ -51,7 +51,7 @@ from stewart_dynamics.mechanics.rows import (
     BASE_ANGULAR_VELOCITY, consecutive, GRAVITY, LINEAR_ACCELERATION, LINEAR_VELOCITY, POSITION,
     ROTATION)
 from stewart_dynamics.mechanics.vectors import (
-    add, cross, dot, Matrix3, read3, read9, rotate_back, scale, subtract, Vector3)
+    add, cross, dot, Matrix3, put3, read3, read9, rotate_back, scale, subtract, Vector3)
 
 
 class Regressor(NamedTuple):
@@ -115,11 +115,6 @@ def _moving(constants: Array, motion: Array, base: Array) -> _Moving:
         add(omega, spin), acceleration, alpha, felt, spin, spin_rate)
 
 
-@inlined
-def _put3(work: Array, at: int, a: Vector3) -> None:
-    work[at], work[at + 1], work[at + 2] = a
-
-
 @compiled
 def _put_leg(constants: Array, leg: int, of: _Moving, work: Array) -> None:
     """Store a leg's row of J_inv, right half by the characteristic length, and its vectors."""
@@ -141,16 +136,16 @@ def _put_leg(constants: Array, leg: int, of: _Moving, work: Array) -> None:
     of_first, of_second = scale(inverse_length, hanging), scale(inverse_length, s_acceleration)
 
     at = leg * _LEG
-    _put3(work, at + _ROW, s)
-    _put3(work, at + _ROW + 3, scale(1.0 / characteristic_length_of(constants), cross(a, s)))
-    _put3(work, at + _ARM, a)
-    _put3(work, at + _OF_FIRST, of_first)
-    _put3(work, at + _OF_SECOND, of_second)
+    put3(work, at + _ROW, s)
+    put3(work, at + _ROW + 3, scale(1.0 / characteristic_length_of(constants), cross(a, s)))
+    put3(work, at + _ARM, a)
+    put3(work, at + _OF_FIRST, of_first)
+    put3(work, at + _OF_SECOND, of_second)
     # with c = L - S: m c^2 + I = m L^2 - 2 L m S + J
-    _put3(work, at + _OF_PISTON, add(
+    put3(work, at + _OF_PISTON, add(
         add(hanging, add(scale(length, s_acceleration), sliding)),
         scale(dot(s, joint) + length_acceleration - length * turning, s)))
-    _put3(work, at + _OF_PISTON_FIRST, subtract(scale(turning, s), add(
+    put3(work, at + _OF_PISTON_FIRST, subtract(scale(turning, s), add(
         of_first, add(scale(2.0, s_acceleration), scale(inverse_length, sliding)))))
     work[at + _RATE], work[at + _ACCELERATION] = rate, length_acceleration
 
@@ -184,7 +179,7 @@ def _put_platform(of: _Moving, u: Vector3, h: Vector3, row: Array) -> None:
     carrying = carrying_matrix(of.omega, of.alpha)
     row[MASS] = dot(u, of.acceleration)
     first = rotate_back(r, add(rotate_back(carrying, u), cross(of.acceleration, h)))
-    _put3(row, FIRST_MOMENT.start, first)
+    put3(row, FIRST_MOMENT.start, first)
     w, dw, p = rotate_back(r, of.omega), rotate_back(r, of.alpha), rotate_back(r, h)
     q = cross(p, w)
     at = INERTIA.start
