@@ -106,6 +106,7 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
     package_data={package_name: ['py.typed'], f'{package_name}.datasheet': ['templates/*'],
+                  f'{package_name}.export': ['c/*'],
                   f'{package_name}.identification': ['templates/*'],
                   f'{package_name}.replay': ['templates/*'],
                   f'{package_name}.reporting': ['templates/*']},

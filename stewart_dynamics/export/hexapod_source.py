@@ -1,0 +1,122 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A hexapod as the constant structure ``stewart_platform`` of the C source."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import hashlib
+import math
+from typing import Any
+
+import numpy as np
+
+from stewart_dynamics.mechanics.kinematics.joint_angles import angles_to_check
+from stewart_dynamics.mechanics.limits import Limits
+from stewart_dynamics.parameters.table import LEG_SHAPE, PARAMETERS, Parameters
+
+# Fields of stewart_leg and stewart_platform in their order, with the parameters that they hold.
+LEG_FIELDS = (
+    'geometry.base_joints', 'geometry.platform_joints', 'geometry.zero_length',
+    'legs.cylinder.mass', 'legs.cylinder.center_of_mass', 'legs.cylinder.inertia',
+    'legs.piston.mass', 'legs.piston.center_of_mass', 'legs.piston.inertia',
+    'actuator.reflected_mass', 'actuator.viscous_friction', 'actuator.coulomb_friction',
+    'actuator.coulomb_velocity', 'limits.length_min', 'limits.length_max', 'limits.velocity_max',
+    'limits.force_max', 'geometry.base_joint_axes', 'limits.base_joint_angle_max',
+    'geometry.platform_joint_axes', 'limits.platform_joint_angle_max', *LEG_SHAPE)
+FIELDS_BEFORE_LEGS = (
+    'gravity', 'platform.mass', 'platform.center_of_mass', 'platform.inertia')
+FIELDS_AFTER_LEGS = (
+    'limits.leg_clearance_min', 'singularity.characteristic_length',
+    'singularity.warn_condition', 'singularity.stop_condition', 'singularity.warn_time',
+    'setpoint.sync_tolerance', 'singularity.action', 'limits.action')
+_IF_NOT_SET = {'limits.length_min': 0.0, 'limits.leg_clearance_min': -math.inf}
+
+
+def field_values(parameters: Parameters) -> dict[str, Any]:
+    """
+    Return the value of each field under the name of its parameter.
+
+    An array for the fields of the legs, (6,) or (6, 3); a limit that is not set is infinite, a
+    length or radius that is not set zero. Joint axes are unit vectors, zero if not needed.
+
+    Raises
+    ------
+    ParameterError
+        A limit of joint angles is set, its axes are not, and there is no home pose.
+
+    """
+    values: dict[str, Any] = {}
+    for name in (*FIELDS_BEFORE_LEGS, *LEG_FIELDS, *FIELDS_AFTER_LEGS):
+        value = parameters[name]
+        if value is None:
+            value = _IF_NOT_SET.get(name, math.inf if name.startswith('limits.') else 0.0)
+        values[name] = int(value == 'suppress_forces') if isinstance(value, str) else value
+    angles = angles_to_check(parameters, Limits(parameters).of_joints)
+    axes = np.zeros((12, 3)) if angles is None else np.nan_to_num(angles.axes)
+    values['geometry.base_joint_axes'] = axes[:6]
+    values['geometry.platform_joint_axes'] = axes[6:]
+    for name in LEG_FIELDS:
+        if np.ndim(values[name]) < 1:
+            values[name] = np.full(6, values[name])
+    return values
+
+
+def digest(parameters: Parameters) -> str:
+    """Return the SHA-256 of the values of all fields, in hexadecimal digits."""
+    text = '\n'.join(f'{name} {" ".join(_numbers(value))}'
+                     for name, value in field_values(parameters).items())
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def platform_source(parameters: Parameters, name: str) -> str:
+    """Return the C definition of a hexapod, ``const stewart_platform NAME``."""
+    values = field_values(parameters)
+    lines = [f'const stewart_platform {name} = {{']
+    lines += (_field(each, values[each], '  ') for each in FIELDS_BEFORE_LEGS)
+    lines.append('  {')
+    for leg, joint in enumerate(parameters['joints']):
+        lines.append(f'    {{  /* leg {leg + 1}: {in_comment(joint)} */')
+        lines += (_field(each, values[each][leg], '      ') for each in LEG_FIELDS)
+        lines.append('    },')
+    lines.append('  },')
+    lines += (_field(each, values[each], '  ') for each in FIELDS_AFTER_LEGS)
+    return '\n'.join([*lines, '};', ''])
+
+
+def in_comment(text: str) -> str:
+    """Return any text as it may stand in a comment of C: ASCII, no begin or end of a comment."""
+    plain = text.encode('ascii', 'backslashreplace').decode()
+    return ''.join(each if each.isprintable() else ' ' for each in plain).replace(
+        '*/', '* /').replace('/*', '/ *')
+
+
+def _field(name: str, value: Any, indent: str) -> str:
+    numbers = ', '.join(_numbers(value))
+    text = f'{{{numbers}}}' if np.ndim(value) else numbers
+    unit = PARAMETERS[name].unit
+    decimal = ', '.join(f'{each:.9g}' for each in np.ravel(value))
+    return f'{indent}{text},  /* {name}: {decimal}{unit and f" {unit}"} */'
+
+
+def _numbers(value: Any) -> Iterator[str]:
+    """Yield the numbers of a value as C constants with all their bits."""
+    for number in np.ravel(value).tolist():
+        if isinstance(number, int):
+            yield str(number)
+        elif math.isinf(number):
+            yield 'HUGE_VAL' if number > 0.0 else '-HUGE_VAL'
+        else:
+            yield number.hex()
