@@ -48,7 +48,7 @@ def {name}(matrix, factor, shift, doubled, sums):
 
 @entry_point('f8[::1]', 'i8')
 def chosen(numbers, n):
-    numbers[0] = (1.0, 2.0)[n]
+    numbers[0] = 2.0 * n
 """
 SIGNS = {'scaled_sums': 1.0, 'negative_sums': -1.0}
 
@@ -136,7 +136,8 @@ def test_a_damaged_file_is_not_used(kept: Path, damage: Callable[[bytes], bytes]
     file = file_of(kept)
     file.write_bytes(damage(file.read_bytes()))
     assert not is_kept('scaled_sums')
-    assert not imported('scaled_sums').load()
+    imported('scaled_sums')
+    assert not machine_code.load('scaled_sums')
 
 
 def test_a_flipped_bit_anywhere_is_found(kept: Path) -> None:
@@ -201,7 +202,8 @@ def test_a_read_only_installation_is_used_and_the_users_cache_for_what_it_lacks(
     monkeypatch.setattr(machine_code, 'PACKAGE', installed)
     monkeypatch.setattr(os, 'access', lambda path, mode: installed not in path.parents)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
-    assert imported('scaled_sums').load()
+    imported('scaled_sums')
+    assert machine_code.load('scaled_sums')
     check(imported('negative_sums'), -1.0)
     assert file_of(tmp_path / 'cache' / 'installed', 'negative_sums').exists()
 
@@ -231,46 +233,29 @@ def test_two_processes_that_start_on_an_empty_cache_both_work(kept: Path, folder
     assert len(list(kept.iterdir())) == 2
 
 
-def test_an_exception_in_compiled_code_is_an_error(kept: Path) -> None:
-    imported('scaled_sums')
-    chosen, numbers = vars(sys.modules['scaled_sums'])['chosen'], np.zeros(1)
-    chosen(numbers, 1)
-    assert numbers[0] == 2.0
-    with pytest.raises(RuntimeError, match=r'^scaled_sums.chosen: an exception in compiled code'):
-        chosen(numbers, 2)
-
-
-def test_code_that_would_call_python_or_numba_is_not_kept(kept: Path, folder: Path) -> None:
+@pytest.mark.parametrize(('statement', 'result'), [
+    pytest.param('numbers[:] = np.sort(np.zeros(len(numbers)) + 1.0)', 1.0, id='calls numba'),
+    pytest.param('numbers[:] = (1.0, 2.0)[len(numbers) - 2]', 2.0, id='may raise'),
+    pytest.param("numbers[:] = {0: 'a', 'b': 3.0}['b']", 3.0, id='does not compile')])
+def test_a_function_that_cannot_be_machine_code_alone_runs_uncompiled_with_a_warning(
+        kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str,
+        result: float) -> None:
     """The loader of another process does not find such functions, and would end the program."""
-    (folder / 'allocating.py').write_text("""\
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / 'unsuitable.py').write_text(f"""\
 import numpy as np
 from stewart_dynamics.compilation.functions import entry_point
 
 @entry_point('f8[::1]')
-def allocating(numbers):
-    numbers[:] = np.sort(np.zeros(len(numbers)) + 1.0)
+def unsuitable(numbers):
+    {statement}
 """)
     numbers = np.zeros(3)
-    with pytest.warns(RuntimeWarning, match='^allocating cannot be compiled: '):
-        imported('allocating')(numbers)
-    assert numbers.tolist() == [1.0, 1.0, 1.0]
-    assert not list(kept.glob('allocating*'))
-
-
-def test_a_function_that_does_not_compile_runs_uncompiled_with_a_warning(
-        kept: Path, folder: Path) -> None:
-    (folder / 'dictionary.py').write_text("""\
-from stewart_dynamics.compilation.functions import entry_point
-
-@entry_point('f8[::1]')
-def dictionary(numbers):
-    numbers[0] = {0: 'a', 'b': 3.0}['b']
-""")
-    numbers = np.zeros(1)
     with pytest.warns(RuntimeWarning, match=(
-            r'^dictionary cannot be compiled: .*: the dynamics run uncompiled')):
-        imported('dictionary')(numbers)
-    assert numbers[0] == 3.0
+            r'^unsuitable cannot be compiled: .*: the dynamics run uncompiled')):
+        imported('unsuitable')(numbers)
+    assert numbers.tolist() == [result] * 3
+    assert not list(kept.glob('unsuitable*'))
 
 
 def test_where_no_temporary_file_can_be_written_it_runs_uncompiled_with_a_warning(
@@ -415,7 +400,7 @@ def test_what_is_no_file_of_ours_neither_blocks_nor_fails(kept: Path, kind: str)
 
 def test_a_module_that_two_threads_load_stays_where_it_is(kept: Path) -> None:
     function = imported('scaled_sums')
-    assert function.load()
+    assert machine_code.load('scaled_sums')
     check(function)
     engine = machine_code._engines['scaled_sums']
     machine_code._load('scaled_sums', machine_code._kept(kept, 'scaled_sums'))

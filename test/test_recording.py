@@ -155,11 +155,10 @@ def chunk(content: bytes, start: int = 0, size: int | None = None, checksum: int
         uncompressed_size=len(content) if size is None else size))
 
 
-def file_of(*records: bytes, checksum: int | None = 0) -> bytes:
-    """Return a file of these records without a summary; checksum: None for the right one."""
+def file_of(*records: bytes) -> bytes:
+    """Return a file of these records without a summary."""
     begin = MAGIC + record(Header(profile='ros2', library='')) + b''.join(records)
-    return begin + record(DataEnd(data_section_crc=zlib.crc32(begin) if checksum is None else
-                                  checksum)) + record(
+    return begin + record(DataEnd(data_section_crc=0)) + record(
         Footer(summary_start=0, summary_offset_start=0, summary_crc=0)) + MAGIC
 
 
@@ -279,8 +278,8 @@ def test_a_damaged_chunk_is_lost_and_without_an_index_all_after_it(
         assert is_part(found.messages, given_)
         lost = [n for n, each in enumerate(given_) if each not in found.messages]
         assert lost == list(range(lost[0], lost[-1] + 1))
-        in_its_head = at <= chunks[2] + 45
-        if 'without' in kind and in_its_head:
+        in_its_length = at < chunks[2] + 9
+        if 'without' in kind and in_its_length:
             assert lost[-1] == len(given_) - 1
             assert len(given_) / len(chunks) < lost[0] < 3 * len(given_) / len(chunks)
         else:
@@ -306,28 +305,26 @@ AMONG = (DECLARED, chunk(message(2, 5), 5), message(2, 3), chunk(message(2, 1), 
 LAST = (1 << 63) - 1
 
 
-@pytest.mark.parametrize(('records', 'checksum', 'times', 'missing'), [
-    ((DECLARED, chunk(message(2, 4), 4), channel(2, '/b'), chunk(message(3, 6), 6)), 0, [4],
-     'to the end: a damaged or contradictory record of a topic or type'),
+@pytest.mark.parametrize(('records', 'times', 'missing'), [
+    ((DECLARED, chunk(message(2, 4), 4), channel(2, '/b'), chunk(message(3, 6), 6)), [4, 6],
+     'bag.mcap: a damaged or contradictory record of a topic or type'),
     ((DECLARED, chunk(message(2, 4), 4), chunk(channel(2, '/b') + message(3, 5), 5),
-      chunk(message(3, 6), 6)), 0, [4, 6], 'a damaged or contradictory record'),
-    ((DECLARED, chunk(message(2, 5) + message(4, 6), 5), chunk(message(4, 7), 7)), 0, [5],
+      chunk(message(3, 6), 6)), [4, 6], 'a damaged or contradictory record'),
+    ((DECLARED, chunk(message(2, 5) + message(4, 6), 5), chunk(message(4, 7), 7)), [5],
      'messages on a channel that no valid record declares'),
-    (AMONG, None, [1, 3, 5], ''),
-    (AMONG, 0, [1, 5], 'messages outside of chunks: no checksum covers them'),
-    (AMONG, 1, [1, 5], 'messages outside of chunks: the checksum of the file is wrong'),
+    (AMONG, [1, 5], 'messages outside of chunks: no checksum covers them'),
     ((DECLARED, channel(65535, '/a'), channel(0, '/a'),
-      chunk(message(0, 2) + message(3, 1) + message(65535, 1), 1)), 0, [1, 1, 2], ''),
-    ((DECLARED, *(chunk(message(2, time), time) for time in ((1 << 64) - 1, 1 << 63, LAST, 0))), 0,
+      chunk(message(0, 2) + message(3, 1) + message(65535, 1), 1)), [1, 1, 2], ''),
+    ((DECLARED, *(chunk(message(2, time), time) for time in ((1 << 64) - 1, 1 << 63, LAST, 0))),
      [0, LAST, LAST, LAST], '')], ids=[
          'channel declared twice', 'channel declared twice in a chunk', 'undeclared channel',
-         'between chunks', 'between chunks, no checksum', 'between chunks, wrong checksum',
+         'between chunks',
          'two channels of a topic', 'times out of range'])
 def test_records_that_are_used_and_records_that_are_damage(
-        records: tuple[bytes, ...], checksum: int | None, times: list[int], missing: str,
+        records: tuple[bytes, ...], times: list[int], missing: str,
         tmp_path: Path) -> None:
     file = tmp_path / 'bag.mcap'
-    file.write_bytes(file_of(*records, checksum=checksum))
+    file.write_bytes(file_of(*records))
     found = read(file)
     assert [when for _, when, _ in found.messages] == times
     assert missing in ''.join(found.missing)

@@ -22,27 +22,25 @@ the first damaged one; nothing after it is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from heapq import heappop, heappush
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 import zlib
 
 import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Footer, Schema, Statistics
+from mcap.records import Channel, Chunk, ChunkIndex, Footer, Schema, Statistics
 from mcap.stream_reader import StreamReader
 import numpy as np
 
-from stewart_dynamics.arrays import Flags, Integers
+from stewart_dynamics.arrays import Integers
 from stewart_dynamics.bags.blocks import (
     compact, cost, described, IN_A_BLOCK, LARGEST_CHUNK, LATEST, merged, split)
-from stewart_dynamics.bags.mcap_scan import (
-    HEAD, IGNORED, MESSAGE_HEAD, NUMBERS, Scan, scanned, UNDECLARED)
+from stewart_dynamics.bags.mcap_scan import HEAD, IGNORED, NUMBERS, Scan, scanned, UNDECLARED
 from stewart_dynamics.errors import BagError, one_line, shown
-from stewart_dynamics.messages.layout import at_any_byte
 from stewart_dynamics.messages.recorded import Messages
 import zstandard
 
@@ -50,26 +48,27 @@ MAGIC = b'\x89MCAP0\r\n'
 
 _FOOTER = HEAD + 20 + len(MAGIC)
 _DATA_END = bytes([Opcode.DATA_END, 4, 0, 0, 0, 0, 0, 0, 0])
+_EMPTY_CHUNK = 64  # bytes; a chunk with a message is longer
 _LARGEST_INDEX = 1 << 28
-# Bytes read at once to follow records: the head of each chunk, and messages outside of chunks.
-_WINDOW, _RUN = 1 << 16, 1 << 20
-# Maximum cost of messages that are held back to sort chunks that overlap in time [bytes].
+_WINDOW = 1 << 20
 _MOST_WAITING = 1 << 27
 _NO_TOPIC = np.full(NUMBERS, IGNORED)
 _ANY_TOPIC = np.zeros(NUMBERS, np.int64)
+_CONTRADICTORY = 'a damaged or contradictory record of a topic or type'
+_DECLARATIONS: dict[int, Any] = {-Opcode.SCHEMA: Schema, -Opcode.CHANNEL: Channel}
+_IN_CHUNK = np.isin(np.arange(256), [Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE])
+_IN_DATA = _IN_CHUNK | np.isin(np.arange(256), [
+    Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA])
 
 
-def _records(*opcodes: int) -> Flags:
-    return np.isin(np.arange(256), opcodes)
+class _Piece(NamedTuple):
+    """A chunk, or records outside of chunks."""
 
-
-# Records of each part of a file; others are damage.
-_IN_CHUNK = _records(Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-_IN_DATA = _IN_CHUNK | _records(Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX,
-                                Opcode.ATTACHMENT, Opcode.METADATA)
-_IN_SUMMARY = _records(
-    Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET)
+    time: int
+    """Time before which it contains no message [ns]."""
+    start: int
+    length: int
+    is_chunk: bool
 
 
 class McapFile:
@@ -94,19 +93,17 @@ class McapFile:
         self._channels: dict[int, Channel] = {}
         self._declared: set[int] = set()
         self._undeclared = 0
-        # Chunks and runs of messages outside of chunks: start time, offset, length, is a run;
-        # (P, 4), sorted by time.
-        self._pieces: Integers = np.empty((0, 4), np.int64)
         self._file = path.open('rb')
         try:
             if self._file.read(len(MAGIC)) != MAGIC:
                 raise BagError('does not begin like an MCAP file')
             self._size = self._file.seek(0, 2)
-            if not self._read_index():
+            pieces = self._indexed()
+            if pieces is None:
                 for known in (self._types, self._channels, self._declared):
                     known.clear()
-                self._follow_records()
-            self._pieces = self._pieces[np.lexsort(self._pieces.T[1::-1])]
+                pieces = self._followed()
+            self._pieces = sorted(pieces)
         except BaseException:
             self._file.close()
             raise
@@ -127,15 +124,15 @@ class McapFile:
                                else IGNORED)
         # First time, position in the file, messages.
         waiting: list[tuple[int, tuple[int, int], Messages]] = []
-        starts = [*self._pieces[:, 0].tolist(), LATEST + 1]
+        starts = [*(piece.time for piece in self._pieces), LATEST + 1]
         reached, held, read = -1, 0, 0
         self._undeclared = 0
-        for n, piece in enumerate(self._pieces.tolist()):
+        for n, piece in enumerate(self._pieces):
             until = starts[n + 1]  # later pieces contain nothing earlier
-            read += piece[2]
+            read += piece.length
             for first, part in self._parts(piece, names, numbers, reached):
                 held += cost(part)
-                heappush(waiting, (int(part.times[0]), (piece[1], first), part))
+                heappush(waiting, (int(part.times[0]), (piece.start, first), part))
             if held > _MOST_WAITING and until <= LATEST:
                 self._note(f'chunks overlap in time by more than {_MOST_WAITING >> 20} MB of '
                            'messages: those too late to be sorted are not read')
@@ -161,7 +158,7 @@ class McapFile:
         """Close the file."""
         self._file.close()
 
-    def _parts(self, piece: Sequence[int], names: tuple[str, ...], numbers: Integers,
+    def _parts(self, piece: _Piece, names: tuple[str, ...], numbers: Integers,
                reached: int) -> list[tuple[int, Messages]]:
         """Return the messages of a piece in the order of time, in parts of limited number."""
         found = self._content(piece, numbers)
@@ -174,8 +171,8 @@ class McapFile:
         if np.any(block.times[1:] < block.times[:-1]):
             block = block.chosen(np.argsort(block.times, kind='stable'))
         if len(block.times) and block.times[0] < reached:
-            self.missing.append(f'the chunk at byte {piece[1]}: part of it is earlier than its '
-                                'declared start')
+            self.missing.append(f'the chunk at byte {piece.start - HEAD}: part of it is earlier '
+                                'than its declared start')
             block = block.chosen(block.times >= reached)
         return [(first, compact(block.chosen(slice(first, first + IN_A_BLOCK))))
                 for first in range(0, len(block.times), IN_A_BLOCK)]
@@ -189,165 +186,126 @@ class McapFile:
         if what not in self.missing:
             self.missing.append(what)
 
-    # The index
-
-    def _read_index(self) -> bool:
-        """Read the index at the end of the file; return whether it is valid and complete."""
+    def _indexed(self) -> list[_Piece] | None:
+        """Return the chunks by the index at the end of the file; None if it cannot be used."""
         try:
-            footer_at = self._size - _FOOTER
-            tail = self._read_at(max(footer_at, 0), _FOOTER)
+            tail = self._read_at(max(self._size - _FOOTER, 0), _FOOTER)
             footer = next(StreamReader(BytesIO(tail), skip_magic=True).records)
             if not isinstance(footer, Footer) or not tail.endswith(MAGIC):
                 raise ValueError
             start = footer.summary_start
-            if not start:
-                return False
-            if not 0 <= footer_at - start <= _LARGEST_INDEX:
+            if not start or not footer.summary_crc:
+                return None
+            if not _FOOTER <= self._size - start <= _LARGEST_INDEX:
                 raise ValueError
             summary = self._read_at(start, self._size - start)
-            if footer.summary_crc and zlib.crc32(
-                    summary[:-len(MAGIC) - 4]) != footer.summary_crc:
+            if zlib.crc32(summary[:-len(MAGIC) - 4]) != footer.summary_crc:
                 raise ValueError
-            found = scanned(summary[:-_FOOTER], _NO_TOPIC, _IN_SUMMARY)
-            if found.end != len(found.data):
-                raise ValueError
-            return bool(footer.summary_crc) and self._use(found, start)
+            chunks: list[_Piece] = []
+            statistics = None
+            for record in StreamReader(BytesIO(summary), skip_magic=True).records:
+                if isinstance(record, ChunkIndex):
+                    chunks.append(_Piece(
+                        min(record.message_start_time, LATEST), record.chunk_start_offset + HEAD,
+                        record.chunk_length - HEAD, True))
+                elif isinstance(record, Statistics):
+                    statistics = record
+                elif isinstance(record, Schema | Channel):
+                    self._declare(record)
         except Exception:  # any bytes can be there
             self.missing.append('the index at the end of the file')
-            return False
-
-    def _use(self, summary: Scan, start: int) -> bool:
-        """Take topics and chunks from an index; return False if it does not list all chunks."""
-        self._declare_all(summary)
-        statistics = [Statistics.read(ReadDataStream(BytesIO(summary.content(n))))
-                      for n in np.flatnonzero(summary.kinds == -Opcode.STATISTICS)[:1]]
-        # Start time, end time, offset, and length with the head of the record.
-        which = np.flatnonzero(summary.kinds == -Opcode.CHUNK_INDEX)
-        entries = np.minimum(at_any_byte(summary.data, 32)[summary.starts[which]].view(
-            '<u8').reshape(-1, 4), np.uint64(LATEST)).astype(np.int64)
+            return None
         # No chunk is listed twice: the time of reading grows with the size of the file.
-        begins, sizes = entries[np.argsort(entries[:, 2]), 2:].T
-        if not statistics or statistics[0].chunk_count != len(entries) or (
-                statistics[0].message_count and not len(entries)) or (
-                np.maximum(begins, sizes) > start).any() or (
-                begins + sizes > [*begins[1:], start][:len(begins)]).any():
-            return False
-        self._pieces = np.column_stack(
-            [entries[:, 0], entries[:, 2], entries[:, 3] - HEAD, np.zeros(len(entries), np.int64)])
-        return True
+        chunks.sort(key=lambda each: each.start)
+        ends = [each.start - HEAD for each in chunks[1:]] + [start] * bool(chunks)
+        if statistics is None or statistics.chunk_count != len(chunks) or (
+                statistics.message_count and not chunks) or any(
+                each.start + each.length > end for each, end in zip(chunks, ends, strict=True)):
+            return None
+        return chunks
 
-    # The records
-
-    def _follow_records(self) -> None:
-        """Follow the records to the end of the data, and note where messages are."""
-        at, run, fault, checksum = len(MAGIC), False, '', 0
-        chunks, runs = [self._pieces], [self._pieces]
-        while not fault:
-            found = scanned(self._read_at(at, _RUN if run else _WINDOW), _ANY_TOPIC, _IN_DATA)
-            heads = found.starts - HEAD - np.where(found.kinds == 0, MESSAGE_HEAD, 0)
-            ends = [*heads[1:].tolist(), found.end]
-            # Only the last record can extend beyond the file.
-            count = len(heads) - (at + found.end > self._size)
-            for n in np.flatnonzero(_is_declaration(found.kinds[:count])).tolist():
-                try:
-                    self._declare(found.kinds[n], self._read_at(
-                        at + int(found.starts[n]), min(int(found.sizes[n]), LARGEST_CHUNK)))
-                except Exception:  # any bytes can be there
-                    count, fault = n, 'a damaged or contradictory record of a topic or type'
-                    break
-            kinds, sizes = found.kinds[:count], found.sizes[:count]
-            which = np.flatnonzero(kinds == -Opcode.CHUNK)
-            # Size of the content; empty chunks are skipped.
-            unpacked = at_any_byte(found.data, 24)[found.starts[which]].view('<u8')[2::3]
-            which = which[unpacked > 0]
-            chunks.append(np.column_stack(
-                [found.times[which], heads[which] + at, sizes[which], np.zeros_like(which)]))
-            loose = np.flatnonzero(kinds == 0)
-            run = len(loose) > 0
-            if run:
-                first, last = heads[loose[0]], ends[loose[-1]]
-                runs.append(np.array([[found.times[loose].min(), first + at, last - first, 1]]))
+    def _followed(self) -> list[_Piece]:
+        """Follow the records to the end of the data; return where messages are."""
+        chunks, runs, at = list[_Piece](), list[_Piece](), len(MAGIC)
+        while True:
+            found = scanned(self._read_at(at, _WINDOW), _ANY_TOPIC, _IN_DATA)
+            ends = at + found.starts + found.sizes
+            count = int(np.sum(ends <= self._size))  # only the last can extend beyond the file
             if not count:
                 break
-            at += ends[count - 1]
-        if not fault:
-            end = self._read_at(at, HEAD + 4)
-            checksum = int.from_bytes(end[HEAD:], 'little')
-            if not end.startswith(_DATA_END):
-                fault = 'the file is cut off, or no record begins there'
-        if fault:
-            self.missing.append(f'byte {at} to the end: {fault}')
-        self._pieces = np.concatenate(chunks)
-        if len(runs) > 1 and self._are_sound(at, 0 if fault else checksum):
-            self._pieces = np.concatenate([self._pieces, *runs])
-        for piece in self._pieces.tolist():
-            if not piece[3]:
-                self._content(piece, _NO_TOPIC, note=False)  # topics declared in chunks
-
-    def _are_sound(self, data_end: int, checksum: int) -> bool:
-        """
-        Return whether messages outside of chunks can be used.
-
-        They are covered by the checksum of the data section, if there is one. In a file
-        without it and without chunks they are read, with a notice. A message between chunks is
-        most likely another record, damaged.
-        """
-        fault = ''
-        if checksum:
-            found = 0
-            for offset in range(0, data_end, _RUN):
-                found = zlib.crc32(self._read_at(offset, min(_RUN, data_end - offset)), found)
-            fault = 'the checksum of the file is wrong' if found != checksum else ''
-        elif len(self._pieces):
-            fault = 'no checksum covers them'
+            loose = np.flatnonzero(found.kinds[:count] == 0)
+            if len(loose):
+                runs.append(_Piece(int(found.times[loose].min()), at, int(ends[loose[-1]]) - at,
+                                   False))
+            for n in np.flatnonzero(found.kinds[:count]):
+                kind, start, size = int(found.kinds[n]), int(found.starts[n]), int(found.sizes[n])
+                if kind == -Opcode.CHUNK and size > _EMPTY_CHUNK:
+                    chunks.append(_Piece(int(found.times[n]), at + start, size, True))
+                elif kind in _DECLARATIONS:
+                    try:
+                        self._read_declaration(
+                            kind, self._read_at(at + start, min(size, LARGEST_CHUNK)))
+                    except Exception as exc:  # any bytes can be there
+                        self._note(one_line(exc))
+            at = int(ends[count - 1])
+        end = self._read_at(at, HEAD + 4)
+        if end[:HEAD] != _DATA_END:
+            self.missing.append(f'byte {at} to the end: the file is cut off, or no record begins '
+                                'there')
+        for piece in chunks:
+            self._content(piece, _NO_TOPIC, note=False)  # topics declared in chunks
+        if chunks and runs:  # a damaged record can look like a message
+            self._note('messages outside of chunks: no checksum covers them')
+        elif runs and end[:HEAD] == _DATA_END and any(end[HEAD:]):
+            checksum = 0
+            for offset in range(0, at, _WINDOW):
+                checksum = zlib.crc32(self._read_at(offset, min(_WINDOW, at - offset)), checksum)
+            if checksum != int.from_bytes(end[HEAD:], 'little'):
+                self._note('messages outside of chunks: the checksum of the file is wrong')
+                return []
         else:
-            self.unchecked = True
-        if fault:
-            self.missing.append(f'messages outside of chunks: {fault}')
-        return not fault
+            self.unchecked = bool(runs)
+        return chunks or runs
 
-    def _declare_all(self, found: Scan) -> None:
-        for n in np.flatnonzero(_is_declaration(found.kinds)).tolist():
-            self._declare(found.kinds[n], found.content(n))
+    def _read_declarations(self, found: Scan) -> None:
+        for n in np.flatnonzero(np.isin(found.kinds, list(_DECLARATIONS))):
+            start = found.starts[n]
+            self._read_declaration(
+                int(found.kinds[n]), found.data[start:start + found.sizes[n]].tobytes())
 
-    def _declare(self, kind: int, content: bytes) -> None:
-        """
-        Note a schema or a channel.
+    def _read_declaration(self, kind: int, content: bytes) -> None:
+        """Note a schema or a channel, see ``_declare``; repetitions are not read again."""
+        if (known := hash((kind, content))) not in self._declared:
+            stream = ReadDataStream(BytesIO(content))
+            record = _DECLARATIONS[kind].read(stream)
+            if stream.count != len(content) or len(self._declared) >= 4 * NUMBERS:
+                raise ValueError(_CONTRADICTORY)
+            self._declare(record)
+            self._declared.add(known)
 
-        Raises any exception if it is damaged, or differs from an earlier one of its number.
-        """
-        if (known := hash((kind, content))) in self._declared:
-            return
-        stream = ReadDataStream(BytesIO(content))
-        own: Any
-        first: Any
-        if kind == -Opcode.SCHEMA:
-            schema = Schema.read(stream)
-            own, first = schema.name, self._types.setdefault(schema.id, schema.name)
+    def _declare(self, record: Schema | Channel) -> None:
+        """Note a schema or a channel; ValueError if it differs from an earlier one of its id."""
+        if isinstance(record, Schema):
+            same = self._types.setdefault(record.id, record.name) == record.name
         else:
-            channel = Channel.read(stream)
-            own, first = map(_used, (channel, self._channels.setdefault(channel.id, channel)))
-        if stream.count != len(content) or own != first or len(self._declared) >= 4 * NUMBERS:
-            raise ValueError('a damaged or contradictory record of a topic or type')
-        self._declared.add(known)
+            same = _used(self._channels.setdefault(record.id, record)) == _used(record)
+        if not same:
+            raise ValueError(_CONTRADICTORY)
 
-    # Chunks
-
-    def _content(self, piece: Sequence[int], numbers: Integers, note: bool = True) -> Scan | None:
+    def _content(self, piece: _Piece, numbers: Integers, note: bool = True) -> Scan | None:
         """Return the records of a piece; None, and a note, if it is damaged."""
-        _, offset, length, is_run = piece
         try:
-            if length > LARGEST_CHUNK:
-                raise ValueError(f'{length} bytes, at most {LARGEST_CHUNK} are read')
-            data = self._read_at(offset, length) if is_run else self._unpacked(offset, length)
-            found = scanned(data, numbers, _IN_CHUNK)
+            if piece.length > LARGEST_CHUNK:
+                raise ValueError(f'{piece.length} bytes, at most {LARGEST_CHUNK} are read')
+            data = (self._unpacked if piece.is_chunk else self._read_at)(piece.start, piece.length)
+            found = scanned(data, numbers, _IN_CHUNK if piece.is_chunk else _IN_DATA)
             if found.end != len(data):
                 raise ValueError('its records are inconsistent')
-            if not is_run:
-                self._declare_all(found)
+            if piece.is_chunk:
+                self._read_declarations(found)
         except Exception as exc:  # damaged bytes: the decompressors raise any exception
             if note:
-                self._note(f'the chunk at byte {offset}: {one_line(exc)}')
+                self._note(f'the chunk at byte {piece.start - HEAD}: {one_line(exc)}')
             return None
         return found
 
@@ -359,8 +317,8 @@ class McapFile:
         to its declared size. Raises ValueError if a size, the compression or the checksum is
         wrong; the decompressors raise other exceptions for damaged bytes.
         """
-        head = bytes([Opcode.CHUNK]) + length.to_bytes(8, 'little')
-        if self._read_at(offset, HEAD) != head:
+        if self._read_at(offset - HEAD, HEAD) != (
+                bytes([Opcode.CHUNK]) + length.to_bytes(8, 'little')):
             raise ValueError('no chunk begins there')
         stream = ReadDataStream(BytesIO(self._file.read(length)))
         chunk = Chunk.read(stream)
@@ -388,8 +346,3 @@ class McapFile:
 
 def _used(channel: Channel) -> tuple[int, str, str]:
     return channel.schema_id, channel.topic, channel.message_encoding
-
-
-def _is_declaration(kinds: Integers) -> Flags:
-    declares: Flags = (kinds == -Opcode.SCHEMA) | (kinds == -Opcode.CHANNEL)
-    return declares

@@ -49,11 +49,6 @@ class Scan(NamedTuple):
     undeclared: int
     """Number of messages on undeclared channels."""
 
-    def content(self, record: int) -> bytes:
-        """Return the content of a record, as far as it is in the data."""
-        start = self.starts[record]
-        return self.data[start:start + self.sizes[record]].tobytes()
-
 
 @compiled
 def _integer(data: Bytes, at: int, size: int) -> np.int64:
@@ -75,7 +70,7 @@ def scan(data: Bytes, numbers: Integers, valid: Flags, found: Integers,
     ----------
     data : (M,)
         The bytes of the records. The scan ends where the fields that it reads are not in them,
-        or where the lengths in a chunk, a message or a message index are inconsistent.
+        or where the lengths in a message or a message index are inconsistent.
     numbers : (65536,)
         Number of the topic of each channel, IGNORED or UNDECLARED.
     valid : (256,)
@@ -94,12 +89,7 @@ def scan(data: Bytes, numbers: Integers, valid: Flags, found: Integers,
         if not valid[opcode] or length < needed or length > (1 << 60) or (
                 begin + needed > len(data)):
             break
-        if opcode == 6:
-            name = _integer(data, begin + 28, 4)  # length of the name of the compression
-            if begin + 40 + name > len(data) or (
-                    _integer(data, int(begin + 32 + name), 8) != length - 40 - name):
-                break
-        elif opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
+        if opcode == 7 and _integer(data, begin + 2, 4) != length - 6:
             break
         kind, first, skipped = -opcode, begin, 0
         if opcode == 5:

@@ -17,9 +17,9 @@ The program that compiles the entry points of one module; ``machine_code`` start
 
 It writes a file: a line with the source files that it has read, on which the machine code depends,
 and an object file. A function is a symbol there, of the type ``void (int64_t *block)``, named by
-its module and its own name; ``functions.EntryPoint`` lays out the block, whose first number
-becomes 0 after an exception. Only C's mathematical functions are called from there, nothing of
-Python or numba, and no memory is allocated.
+its module and its own name; ``functions.EntryPoint`` lays out the block. Only C's mathematical
+functions are called from there, nothing of Python or numba: no memory is allocated, and a function
+that could raise an exception is rejected.
 """
 
 from __future__ import annotations
@@ -59,21 +59,9 @@ def object_file(module: str) -> bytes:
         register_jitable(error_model='numpy', forceinline=inline, no_cfunc_wrapper=True,
                          _nrt=False)(function)
     machine = target_machine()
-    # To catch exceptions takes half of the time again: only if some remain possible.
-    for catching in False, True:
-        whole = _optimized(machine, module, entries, catching)
-        missing = [function.name for function in whole.functions if function.is_declaration
-                   and not function.name.startswith('llvm.') and not hasattr(math, function.name)]
-        if not missing:
-            return cast('bytes', machine.emit_object(whole))
-    raise SystemExit(f'needs {missing[0]}, which machine code cannot call')
-
-
-def _optimized(machine: Any, module: str, entries: list[EntryPoint], catching: bool) -> Any:
-    """Return one LLVM module of all entry points and the functions that they call."""
     whole = llvm.parse_assembly('')
     for entry in entries:
-        callback = _numba.cfunc(_SIGNATURE, error_model='numpy')(_from_block(entry, catching))
+        callback = _numba.cfunc(_SIGNATURE, error_model='numpy')(_from_block(entry))
         part = llvm.parse_assembly(callback.inspect_llvm())
         part.get_function(callback.native_name).name = f'{module}.{entry.function.__name__}'
         whole.link_in(part)
@@ -84,10 +72,14 @@ def _optimized(machine: Any, module: str, entries: list[EntryPoint], catching: b
     options.loop_vectorization = True
     passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(whole, passes)
-    return whole
+    for function in whole.functions:
+        if function.is_declaration and not function.name.startswith('llvm.') and not hasattr(
+                math, function.name):
+            raise SystemExit(f'needs {function.name}, which machine code cannot call')
+    return cast('bytes', machine.emit_object(whole))
 
 
-def _from_block(entry: EntryPoint, catching: bool) -> Callable[[Any], None]:
+def _from_block(entry: EntryPoint) -> Callable[[Any], None]:
     """Return the function that takes an entry point's arguments from a block, see its class."""
     place, arguments = 1, []
     for dtype, dimensions in entry.arguments:
@@ -99,33 +91,28 @@ def _from_block(entry: EntryPoint, catching: bool) -> Callable[[Any], None]:
                               'b': f'integers[{place}] != 0'}[dtype.kind])
         place += 1 + dimensions
     names = {'carray': _numba.carray, 'np': np, 'function': entry.function}
-    call = f'function({", ".join(arguments)})'
-    if catching:
-        call = f'try: {call}\n    except Exception: integers[0] = 0'
     exec(f"""
 def from_block(block):
     integers = carray(block[0], ({place},), np.int64)
     floats = carray(block[0], ({place},), np.float64)
-    {call}
+    function({", ".join(arguments)})
 """, names)
     return cast('Callable[[Any], None]', names['from_block'])
 
 
-def _end_with(parent: int) -> None:
-    """End this process when the program that started it has ended."""
-    while os.getppid() == parent:
-        time.sleep(_POLL_SECONDS)
-    os._exit(1)
-
-
 def main(parent: int, module: str, target: str) -> None:
     """Compile a module into a file; end when the parent process ends."""
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_POLL_SECONDS)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
     gc.disable()  # the process ends soon, and the collector takes a tenth of the time
-    Thread(target=_end_with, args=[parent], daemon=True).start()
     code = object_file(module)
     packages = 'stewart_dynamics', module.partition('.')[0]
-    read = [str(each.__file__) for name, each in sys.modules.items()
-            if name.partition('.')[0] in packages and each.__file__]
-    paths = '\t'.join(path.removeprefix(f'{PACKAGE}{os.sep}') for path in read)
+    paths = '\t'.join(str(each.__file__).removeprefix(f'{PACKAGE}{os.sep}')
+                      for name, each in sys.modules.items()
+                      if name.partition('.')[0] in packages and each.__file__)
     Path(f'{target}.new').write_bytes(paths.encode() + b'\n' + code)
     Path(f'{target}.new').rename(target)

@@ -59,22 +59,13 @@ def compiled(function: Function) -> Function:
 
 
 def entry_point(*types: str) -> Callable[[Callable[..., None]], EntryPoint]:
-    """
-    Make a function one that Python calls; it returns nothing.
-
-    Parameters
-    ----------
-    types : str
-        Types of the arguments: ``f8``, ``i8`` or ``b1``; arrays in C order with ``[::1]`` or
-        ``[:,::1]``, those of bytes begin with ``u1``.
-
-    """
+    """Make a function one that Python calls, see EntryPoint."""
     return lambda function: EntryPoint(function, types)
 
 
 class EntryPoint:
     """
-    A function of arrays and numbers that returns nothing.
+    A function of arrays and numbers; it returns nothing.
 
     Its machine code is loaded, or compiled, at the first call.
 
@@ -83,7 +74,8 @@ class EntryPoint:
     function : callable
         The same in plain Python.
     types : sequence of str
-        Types of the arguments, see ``entry_point``.
+        Types of the arguments: ``f8``, ``i8`` or ``b1``; arrays in C order with ``[::1]`` or
+        ``[:,::1]``, those of bytes begin with ``u1``.
 
     """
 
@@ -118,28 +110,16 @@ class EntryPoint:
         self._prepared()
         return self._address != 0
 
-    def load(self) -> bool:
-        """Load the machine code if it is on disk; return whether a call compiles nothing."""
-        return machine_code.load(self.function.__module__)
-
     def _prepared(self) -> Callable[..., object]:
         if self._call is None:
-            module = self.function.__module__
-            machine_code.prepare(module)
-            self._address = machine_code.address(module, self.function.__name__)
+            machine_code.prepare(self.__module__)
+            self._address = machine_code.address(self.__module__, self.function.__name__)
             if self._address:
-                self._native = ctypes.CFUNCTYPE(None)(self._address)  # lets other threads run
-                self._call = self._call_native
+                native = ctypes.CFUNCTYPE(None)(self._address)  # lets other threads run
+                self._call = lambda *arguments: native(self._block(arguments))
             else:
                 self._call = np.errstate(all='ignore')(self.function)
         return self._call
-
-    def _call_native(self, *arguments: Any) -> None:
-        block = self._block(arguments)
-        self._native(block)
-        if not block[0]:
-            raise RuntimeError(f'{self.function.__module__}.{self.function.__name__}: '
-                               'an exception in compiled code')
 
     def _block(self, arguments: Sequence[Any]) -> Any:
         """
@@ -150,17 +130,17 @@ class EntryPoint:
         """
         numbers = [0]
         for argument, (dtype, dimensions) in zip(arguments, self.arguments, strict=True):
-            if dimensions:
-                if (argument.dtype != dtype or argument.ndim != dimensions
-                        or not argument.flags.c_contiguous):
-                    raise TypeError(
-                        f'{self.function.__module__}.{self.function.__name__}: an array of '
-                        f'{argument.dtype}, shape {argument.shape}: must be of {dtype}, '
-                        f'{dimensions} dimensions, in C order')
-                numbers += (argument.ctypes.data, *argument.shape)
-            else:
+            if not dimensions:
                 numbers.append(unpack('q', pack('d', argument))[0] if dtype.kind == 'f'
                                else int(argument))
+            elif (argument.dtype, argument.ndim, argument.flags.c_contiguous) == (
+                    dtype, dimensions, True):
+                numbers += (argument.ctypes.data, *argument.shape)
+            else:
+                raise TypeError(
+                    f'{self.__module__}.{self.function.__name__}: an array of {argument.dtype}, '
+                    f'shape {argument.shape}: must be of {dtype}, {dimensions} dimensions, in C '
+                    'order')
         block = (ctypes.c_int64 * len(numbers))(*numbers)
         block[0] = ctypes.addressof(block)
         return block
@@ -168,8 +148,8 @@ class EntryPoint:
 
 def prepare(functions: Iterable[EntryPoint]) -> None:
     """Load the machine code of functions; compile missing modules side by side."""
-    modules = {each.function.__module__ for each in functions}
-    missing = [each for each in modules if not machine_code.load(each)]
+    missing = [each for each in {each.__module__ for each in functions}
+               if not machine_code.load(each)]
     remaining = iter(missing)  # shared by the threads
     errors: list[RuntimeWarning] = []
 
@@ -191,26 +171,21 @@ def prepare(functions: Iterable[EntryPoint]) -> None:
 
 
 class Preparation:
-    """
-    Machine code that may be needed later: loaded if it is on disk, else compiled on demand.
-
-    Parameters
-    ----------
-    functions : EntryPoint
-        The functions that the later task calls.
-
-    """
+    """Machine code that may be needed later: loaded if it is on disk, else compiled on demand."""
 
     def __init__(self, *functions: EntryPoint) -> None:
         self._functions = functions
         self._thread: Thread | None = None
-        for function in functions:
-            function.load()
+        for module in self._modules():
+            machine_code.load(module)
+
+    def _modules(self) -> set[str]:
+        return {each.__module__ for each in self._functions}
 
     @property
     def ready(self) -> bool:
         """Whether nothing remains to be compiled."""
-        return all(machine_code.prepared(each.function.__module__) for each in self._functions)
+        return all(map(machine_code.prepared, self._modules()))
 
     def begin(self) -> None:
         """Start to compile missing functions in a thread, once."""

@@ -27,10 +27,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache, partial
-import hashlib
+from hashlib import sha256
 from importlib.metadata import distributions
 from importlib.util import find_spec
-import json
 import os
 from pathlib import Path
 import stat
@@ -47,17 +46,9 @@ NOT_KEPT = ('the compiled dynamics cannot be kept on disk ({reason}): every star
 _UNCOMPILED = ('the dynamics run uncompiled, with the same results but about a thousand times '
                'slower, a millisecond or more for each setpoint')
 PACKAGE = Path(__file__).parents[1]
-_COMPILER = """
-import sys
-import json
-sys.path, *arguments = json.loads(sys.argv[1])
-from stewart_dynamics.compilation.compiler import main
-main(*arguments)
-"""
 # The compiler optimizes the whole by itself. Users' settings of numba would be kept on disk.
 _NUMBA_SETTINGS = {'NUMBA_OPT': '1', 'NUMBA_LOOP_VECTORIZE': '0'}
 _LARGEST = 1 << 24  # bytes of a file; those of the package have less than 200 kB
-_DIGEST = hashlib.sha256
 _DIGEST_SIZE = 32
 
 
@@ -154,8 +145,7 @@ def _load(module: str, code: bytes) -> bool:
             return engine
 
     # In a thread: signal handlers raise in the main thread, and would leave llvmlite's objects
-    # half made.
-    # The first stays: threads that loaded it at the same time may call it already.
+    # half made. The first stays: threads that loaded it at the same time may call it already.
     _engines.setdefault(module, ThreadPoolExecutor(1).submit(engine).result())
     return True
 
@@ -167,11 +157,11 @@ def _compile(module: str) -> bytes:
     with TemporaryDirectory() as folder:
         target = Path(folder, 'answer')
         settings = {name: text for name, text in os.environ.items() if name[:6] != 'NUMBA_'}
-        # The compiler runs in a session of its own, so that signals of the terminal do not reach
-        # it. It answers in a file, since Python may be configured to print at its start.
+        # In a session of its own, so that signals of the terminal do not reach it. It answers in
+        # a file, since Python may be configured to print at its start.
         done = subprocess.run(
-            [sys.executable, '-I', '-c', _COMPILER,
-             json.dumps([paths, os.getpid(), module, str(target)])],
+            [sys.executable, '-I', '-c', f'import sys; sys.path = {paths!r}; from {__package__}.'
+             f'compiler import main; main{os.getpid(), module, str(target)!r}'],
             cwd=folder, env=settings | _NUMBA_SETTINGS, stdin=subprocess.DEVNULL,
             capture_output=True, check=False, start_new_session=True)
         try:
@@ -201,23 +191,15 @@ def _check_writers(status: os.stat_result) -> None:
 
 def _kept(folder: Path, module: str) -> bytes:
     """Return the code of a module on disk; empty if it is missing or not to be used."""
-    opened = []
     try:
-        opened.append(os.open(folder, os.O_RDONLY | os.O_DIRECTORY))
+        _check_writers(folder.stat())
         # Neither the opening of a pipe nor a link to a device may block.
-        opened.append(os.open(_file_name(module), os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK,
-                              dir_fd=opened[0]))
-        for each in opened:
-            _check_writers(status := os.fstat(each))
-        if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
-            return b''
-        with open(opened[1], 'rb', closefd=False) as file:
-            content = file.read(_LARGEST)
+        with open(folder / _file_name(module), 'rb', opener=lambda name, flags: os.open(
+                name, flags | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
+            _check_writers(status := os.fstat(file.fileno()))
+            content = file.read(_LARGEST) if stat.S_ISREG(status.st_mode) else b''
     except OSError:
         return b''
-    finally:
-        for each in opened:
-            os.close(each)
     code = content[_DIGEST_SIZE:]
     return code if content[:_DIGEST_SIZE] == _digest(module, code) else b''
 
@@ -236,12 +218,11 @@ def folder_to_write() -> Path:
 
 def _keep(module: str, code: bytes) -> None:
     """Write the code of a module; RuntimeWarning if that is not possible."""
-    folder = folder_to_write()
-    path = folder / _file_name(module)
+    path = folder_to_write() / _file_name(module)
     # Renamed when it is complete: other processes read and write the same file.
     new = path.with_name(f'{path.name}.tmp.{uuid4().hex[:16]}')
     try:
-        _check_writers(folder.stat())
+        _check_writers(path.parent.stat())
         with open(new, 'xb', opener=lambda name, flags: os.open(name, flags, 0o644)) as file:
             file.write(_digest(module, code) + code)
         new.replace(path)
@@ -252,14 +233,14 @@ def _keep(module: str, code: bytes) -> None:
 
 
 def _file_name(module: str) -> str:
-    return f'{module}.{_DIGEST(repr(_processor()).encode()).hexdigest()[:16]}.code'
+    return f'{module}.{sha256(repr(_processor()).encode()).hexdigest()[:16]}.code'
 
 
 def _digest(module: str, code: bytes) -> bytes:
     """Return the digest of code and of all that it depends on."""
     versions = [each.version for name in ('numba', 'llvmlite')
                 for each in distributions(name=name)]
-    digest = _DIGEST(repr((module, versions, _processor())).encode() + code)
+    digest = sha256(repr((module, versions, _processor())).encode() + code)
     for path in code.partition(b'\n')[0].decode(errors='replace').split('\t'):
         digest.update(_source(path))
     return digest.digest()
@@ -269,7 +250,7 @@ def _digest(module: str, code: bytes) -> bytes:
 def _source(path: str) -> bytes:
     """Return the digest of a source file, its path relative to the package; empty if missing."""
     with suppress(OSError, ValueError):
-        return _DIGEST((PACKAGE / path).read_bytes()).digest()
+        return sha256((PACKAGE / path).read_bytes()).digest()
     return b''
 
 
