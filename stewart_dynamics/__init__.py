@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from stewart_dynamics.capability.reachable import Reachable
     from stewart_dynamics.errors import (
         BagError, MotionError, ParameterError, PoseError, SingularityError, StewartError)
+    from stewart_dynamics.mechanics.drives.motors import Motors
     from stewart_dynamics.mechanics.dynamics.force_breakdown import ForceBreakdown
     from stewart_dynamics.mechanics.dynamics.result import InverseDynamics
     from stewart_dynamics.mechanics.frames.base_motion import BaseMotion
@@ -40,9 +41,10 @@ __version__ = '0.1.0'
 
 __all__ = [
     'BagError', 'BaseMotion', 'Capability', 'Extent', 'ForceBreakdown', 'InverseDynamics',
-    'Motion', 'MotionError', 'NaturalModes', 'ParameterError', 'Parameters', 'PlannedTrajectory',
-    'Pose', 'PoseError', 'Reachable', 'SingularityError', 'StewartError', 'StewartPlatform',
-    'TimedMotion', '__version__', 'approach', 'check_planned_trajectory', 'rest_to_rest']
+    'Motion', 'MotionError', 'Motors', 'NaturalModes', 'ParameterError', 'Parameters',
+    'PlannedTrajectory', 'Pose', 'PoseError', 'Reachable', 'SingularityError', 'StewartError',
+    'StewartPlatform', 'TimedMotion', '__version__', 'approach', 'check_planned_trajectory',
+    'rest_to_rest']
 
 _MODULES = {
     'capability.capability': ('Capability', 'Extent'),
@@ -50,6 +52,7 @@ _MODULES = {
     'errors': ('BagError', 'MotionError', 'ParameterError', 'PoseError', 'SingularityError',
                'StewartError'),
     'mechanics.frames.base_motion': ('BaseMotion',),
+    'mechanics.drives.motors': ('Motors',),
     'mechanics.dynamics.force_breakdown': ('ForceBreakdown',),
     'mechanics.dynamics.result': ('InverseDynamics',),
     'mechanics.frames.motion': ('Motion', 'Pose'),

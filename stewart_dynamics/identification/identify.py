@@ -45,6 +45,7 @@ from stewart_dynamics.identification.recorded_legs import find_topics, RecordedL
 from stewart_dynamics.identification.sums import residual_of, Sums, sums_of
 from stewart_dynamics.identification.unknowns import Unknowns
 from stewart_dynamics.identification.windows import Window
+from stewart_dynamics.mechanics.drives.motors import motor_ratio
 from stewart_dynamics.mechanics.kinematics.home_pose import reach_of, shape_of
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
 from stewart_dynamics.parameters.table import NEGATIVE, Parameters
@@ -202,8 +203,7 @@ class Identification:
             if extraction is None:
                 extraction, begin = self._extraction(window), window.begin
             if options.motor_torque:
-                window = window._replace(
-                    efforts=window.efforts * 2.0 * np.pi / p['actuator.screw_lead'])
+                window = window._replace(efforts=window.efforts * motor_ratio(p))
             fewest = 2 * extraction.margin + 2 * extraction.step
             if len(window.positions) < fewest + lag:
                 left_out += 1

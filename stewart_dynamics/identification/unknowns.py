@@ -36,7 +36,7 @@ from stewart_dynamics.mechanics.dynamics.linear_parameters import (
     LINEAR, linear_parameters, names_of, OFFSET, parameter_values, PISTON_FIRST, PISTON_MASS,
     PISTON_SECOND, REFLECTED_MASS, UNITS, VISCOUS_FRICTION)
 from stewart_dynamics.mechanics.stewart_platform import StewartPlatform
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 
 # Platform parameters as defined in the parameter file.
 _PLATFORM = ('platform.mass', *(f'platform.center_of_mass.{axis}' for axis in 'xyz'),
@@ -227,6 +227,8 @@ class Unknowns:
             found['gravity'] = self.tilt.gravity(values[self.legs.stop:])
         changed: dict[str, Any] = {name: value for name, value in found.items()
                                    if not _alike(value, self._parameters[name])}
+        if 'actuator.reflected_mass' in changed:
+            changed |= dict.fromkeys(DRIVE_INERTIAS)  # from which it would follow
         return self._parameters.replaced(changed, 'identified')
 
     def _masses_of_cylinders(self, theta: Array) -> Array:

@@ -37,7 +37,7 @@ from stewart_dynamics.mechanics.kinematics.home_pose import (
 from stewart_dynamics.mechanics.kinematics.symmetry import odd_joint
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
 from stewart_dynamics.parameters.table import (
-    inertia_matrix, Parameters, STANDARD_GRAVITY)
+    DRIVE_INERTIAS, inertia_matrix, Parameters, STANDARD_GRAVITY)
 
 # Digits of the position of a joint in a message.
 _DIGITS = 5
@@ -225,7 +225,7 @@ def _frames(p: Parameters, shape: Shape, reach: Reach) -> Iterator[str]:
 
 def _reflected_mass(p: Parameters, shape: Shape) -> Iterator[str]:
     name = 'actuator.reflected_mass'
-    if name not in p.given:
+    if name not in p.given and not any(each in p.given for each in DRIVE_INERTIAS):
         given = [each for each in _OF_AN_ACTUATOR if each in p.given]
         if given:
             yield (f'{name}: missing, but {given[0]} is given: it is J (2 pi / lead)^2 of '

@@ -28,6 +28,7 @@ from stewart_dynamics.errors import PoseError, SingularityError
 from stewart_dynamics.mechanics import batch, plausibility, stiffness
 from stewart_dynamics.mechanics.arguments import (
     as_array, check_finite, common_shape, optional_array, wrong_type)
+from stewart_dynamics.mechanics.drives.motors import Drives, MECHANICAL, MOTORS, Motors
 from stewart_dynamics.mechanics.dynamics import base_wrench, forward_dynamics, lagrange, regressor
 from stewart_dynamics.mechanics.dynamics.force_breakdown import (
     ForceBreakdown, ForceBreakdownRows, SOURCES)
@@ -93,6 +94,7 @@ class StewartPlatform:
         self._breakdown: ForceBreakdownRows | None = None
         self._home: Pose | None = None
         self._joint_angles: JointAngles | None = None
+        self._drives: Drives | None = None
         self._still = BaseMotion(parameters['gravity'])
 
     def __reduce__(self) -> tuple[type[StewartPlatform], tuple[Parameters]]:
@@ -170,6 +172,24 @@ class StewartPlatform:
         known[unsolvable] = 0.0
         check_finite('motion', known.reshape(*shape, len(SOURCES), 6), len(shape))
         return ForceBreakdown(*np.moveaxis(forces, 1, 0).reshape(len(SOURCES), *shape, 6))
+
+    def motors(self, motion: Motion, wrench: ArrayLike | None = None,
+               base: BaseMotion | None = None) -> Motors:
+        """
+        Return angles, speeds, torques, currents and power of the motors.
+
+        Quantities that ``actuator.screw_lead`` and ``drive.*`` do not give are nan. Arguments and
+        errors are ``inverse_dynamics``'s.
+        """
+        results = self.inverse_dynamics(motion, wrench, base).rows
+        shape = results.shape[:-1]
+        if self._drives is None:
+            self._drives = Drives(self.parameters)
+        rows = self._drives(copies(motion.rows, shape), results.reshape(-1, RESULT))
+        rows = rows.reshape(*shape, MOTORS)
+        if self.parameters['actuator.screw_lead'] is not None:
+            check_finite('motion', rows[..., MECHANICAL], len(shape))
+        return Motors.of_rows(rows)
 
     def regressor(self, motion: Motion, base: BaseMotion | None = None, *,
                   tilt: bool = False) -> Regressor:

@@ -37,6 +37,8 @@ QUATERNION_TOLERANCE = 1e-3
 # A singularity warning or stop ends below this part of the condition number at which it began, or
 # when the predicted time to the crossing exceeds warn_time divided by it.
 HYSTERESIS = 0.8
+# Relative tolerance of actuator.reflected_mass if drive.* gives the inertias: both may be rounded.
+REFLECTED_MASS_TOLERANCE = 0.01
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """[m/s^2]"""
 
@@ -59,12 +61,71 @@ def _meshes() -> Iterator[Parameter]:
                     1.0, minimum=0.0, above=True)
 
 
+def _drives() -> Iterator[Parameter]:
+    yield _legs('drive.gear_ratio', 'turns of the motor in one turn of the screw', '', (1.0,),
+                minimum=0.0, above=True)
+    yield _legs(MOTOR_INERTIA, 'inertia of rotor, brake and gear at the shaft of the motor; '
+                'actuator.reflected_mass follows from it', 'kg m^2', minimum=0.0)
+    yield _legs(SCREW_INERTIA, 'inertia at the screw; actuator.reflected_mass follows from it',
+                'kg m^2', minimum=0.0)
+    yield _legs('drive.efficiency', 'of screw and gear together where the motor drives the leg; '
+                'near standstill, below actuator.coulomb_velocity, its effect is linear in the '
+                'rate', '', (1.0,), minimum=0.0, above=True, maximum=1.0)
+    yield _legs('drive.back_driving_efficiency', 'the same where the leg drives the motor, 0 or '
+                'less for a self-locking screw; by default 2 - 1 / drive.efficiency', '', (),
+                minimum=-100.0, maximum=1.0)
+    yield _legs('drive.torque_max', 'maximum torque of a motor, to which torques are clipped; '
+                'unlimited if not set', 'N m', (), minimum=0.0, above=True)
+    yield _legs('drive.torque_continuous', 'torque that a motor can hold without end, for the RMS '
+                'torque of a motion', 'N m', (), minimum=0.0, above=True)
+    yield _legs('drive.speed_max', 'maximum speed of a motor; unlimited if not set', 'rad/s', (),
+                minimum=0.0, above=True)
+    yield Parameter('drive.torque_speed', 'double', 'largest torque of a motor at rising speeds, '
+                    'speed and torque of one point after the other, linear between them; from 0 '
+                    'rad/s to the first speed the first torque, above the last speed 0 N m; '
+                    'unlimited if not set', 'rad/s, N m', (), sizes=(2,), repeated=True,
+                    minimum=0.0)
+    yield _legs('drive.torque_constant', 'torque of a motor for each ampere', 'N m/A', (),
+                minimum=0.0, above=True)
+    yield _legs('drive.resistance', 'copper heat of a motor divided by the square of its current: '
+                'with RMS currents of three phases 1.5 times the resistance between two phases',
+                'Ohm', (), minimum=0.0)
+    yield _legs('drive.thermal_resistance', 'from winding to ambient', 'K/W', (), minimum=0.0,
+                above=True)
+    yield _legs('drive.thermal_time_constant', 'of the winding with its motor', 's', (),
+                minimum=0.0, above=True)
+    yield _legs('drive.temperature_rise_max', 'maximum temperature of a winding above ambient; '
+                'unlimited if not set', 'K', (), minimum=0.0, above=True)
+    yield Parameter('drive.screw_rotation', 'string', 'guided: screw and nut cannot turn with the '
+                    'leg; universal: the leg turns between its universal joints, and its motor '
+                    'makes up for it', '', GUIDED, choices=(GUIDED, UNIVERSAL))
+    yield Parameter('drive.screw_hand', 'string', 'hand of the thread, for drive.screw_rotation: '
+                    'universal', '', RIGHT, choices=(RIGHT, LEFT))
+    for end in ('base', 'platform'):
+        yield Parameter(f'drive.{end}_universal_axes', 'double', 'x y z of the axis of each '
+                        f'universal joint that is fixed to the {end}, {end} axes, for '
+                        'drive.screw_rotation: universal; default: across the leg at the home '
+                        'pose, in the plane of the base joints', '', (), sizes=(18,))
+
+
+GUIDED, UNIVERSAL = 'guided', 'universal'
+"""Values of drive.screw_rotation."""
+RIGHT, LEFT = 'right', 'left'
+"""Values of drive.screw_hand."""
+MOTOR_INERTIA, SCREW_INERTIA = DRIVE_INERTIAS = 'drive.motor_inertia', 'drive.screw_inertia'
+"""Parameters from which actuator.reflected_mass follows, where one of them is given."""
 AUTO, POSITIVE, NEGATIVE = 'auto', 'positive', 'negative'
 """Values of geometry.platform_side."""
 IGNORE, CHECK, PREPEND = 'ignore', 'check', 'prepend'
 """Values of trajectory.approach."""
 LEG_SHAPE = 'legs.cylinder.radius', 'legs.cylinder.length', 'legs.piston.radius'
 """Parameters that the clearance between legs needs."""
+
+_NEEDED_BY = {
+    'drive.resistance': ('drive.torque_constant',),
+    'drive.thermal_resistance': ('drive.resistance', 'drive.thermal_time_constant'),
+    'drive.thermal_time_constant': ('drive.thermal_resistance',),
+    'drive.temperature_rise_max': ('drive.thermal_resistance',)}
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
     Parameter('base_frame', 'string', 'frame of setpoints and wrenches', default='base'),
@@ -122,8 +183,9 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType({p.name: p for p in (
           'Coulomb friction along the leg', 'N', minimum=0.0),
     _legs('actuator.coulomb_velocity', 'rate of the leg below which Coulomb friction is linear',
           'm/s', (1e-3,), minimum=0.0, above=True),
-    _legs('actuator.screw_lead', 'travel of a leg in one turn of its motor; used by '
-          'stewart_identify alone, where efforts are torques', 'm', (), minimum=0.0, above=True),
+    _legs('actuator.screw_lead', 'travel of a leg in one turn of its screw; needed by drive.*',
+          'm', (), minimum=0.0, above=True),
+    *_drives(),
     Parameter('gravity', 'double', 'acceleration of free fall: base axes; axes of the world where '
               'base.source is pose or motion; not used where it is imu', 'm/s^2',
               STANDARD_GRAVITY, sizes=(3,)),
@@ -229,6 +291,8 @@ class Parameters(ParameterSet):
 
     table = PARAMETERS
     node = 'stewart_dynamics'
+    drives: tuple[str, ...]
+    """Names of drive.* that are given; without them no motors are computed."""
 
     def _check_together(self, source: str) -> None:
         """Check the rules between parameters."""
@@ -272,11 +336,58 @@ class Parameters(ParameterSet):
                 f'{source}: geometry.platform_joints: all six are at one point')
         if self['singularity.characteristic_length'] is None:
             self._values['singularity.characteristic_length'] = size
-        for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes'):
+        for name in ('geometry.base_joint_axes', 'geometry.platform_joint_axes',
+                     'drive.base_universal_axes', 'drive.platform_universal_axes'):
             axes = self[name]
             if axes is not None and not axes.any(axis=1).all():
                 raise ParameterError(
                     f'{source}: {name}: {axes.tolist()}: a direction must not be 0, 0, 0')
+        self._check_drives(source)
+
+    def _check_drives(self, source: str) -> None:
+        """Check drive.*, and complete it and actuator.reflected_mass."""
+        self.drives = tuple(name for name in self.given
+                            if name.startswith('drive.') and self[name] is not None)
+        lead, ratio = self['actuator.screw_lead'], self['drive.gear_ratio']
+        if self.drives and lead is None:
+            raise ParameterError(
+                f'{source}: actuator.screw_lead: not set: needed by {self.drives[0]}')
+        if self['drive.back_driving_efficiency'] is None:
+            self._set('drive.back_driving_efficiency', 2.0 - 1.0 / self['drive.efficiency'])
+        if any(name in self.given for name in DRIVE_INERTIAS):
+            follows = (2.0 * math.pi * ratio / lead) ** 2 * (
+                self[MOTOR_INERTIA] + self[SCREW_INERTIA] / ratio ** 2)
+            mass = self['actuator.reflected_mass']
+            wrong = np.abs(mass - follows) > REFLECTED_MASS_TOLERANCE * follows
+            if 'actuator.reflected_mass' in self.given and wrong.any():
+                leg = int(np.argmax(wrong))
+                raise ParameterError(
+                    f'{source}: actuator.reflected_mass: {mass[leg]:g} kg: contradicts '
+                    f'{MOTOR_INERTIA} and {SCREW_INERTIA}, with which it is {follows[leg]:.6g} kg')
+            if not np.isfinite(follows).all():
+                raise ParameterError(f'{source}: actuator.reflected_mass: {follows.tolist()} kg '
+                                     f'from {MOTOR_INERTIA} and {SCREW_INERTIA}: must be finite')
+            self._set('actuator.reflected_mass', follows)
+        most, always = self['drive.torque_max'], self['drive.torque_continuous']
+        if most is not None and always is not None and np.any(always > most):
+            raise ParameterError(
+                f'{source}: drive.torque_continuous: {always.tolist()}: must be at most '
+                f'drive.torque_max, {most.tolist()}')
+        curve = self['drive.torque_speed']
+        if curve is not None and np.any(np.diff(curve[:, 0]) <= 0.0):
+            raise ParameterError(
+                f'{source}: drive.torque_speed: speeds {curve[:, 0].tolist()} rad/s: must be '
+                'strictly increasing (the order is speed, torque, speed, torque, ...)')
+        for name, needs in _NEEDED_BY.items():
+            missing = [each for each in needs if self[each] is None]
+            if self[name] is not None and missing:
+                raise ParameterError(
+                    f'{source}: {", ".join(missing)}: not set: needed by {name}')
+
+    def _set(self, name: str, value: Any) -> None:
+        """Set the value of a parameter that follows from others."""
+        value.setflags(write=False)
+        self._values[name] = value
 
 
 def inertia_matrix(six: ArrayLike) -> Any:

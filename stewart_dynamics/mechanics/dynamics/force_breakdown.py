@@ -33,7 +33,7 @@ from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_consta
 from stewart_dynamics.mechanics.rows import (
     ACCELERATION, CONDITION, FORCES, GRAVITY, MOTION, RATES, TWIST)
 from stewart_dynamics.mechanics.singularity_warning import UNSOLVABLE_CONDITION
-from stewart_dynamics.parameters.table import Parameters
+from stewart_dynamics.parameters.table import DRIVE_INERTIAS, Parameters
 
 
 class ForceBreakdown(NamedTuple):
@@ -86,7 +86,8 @@ _NO_GRAVITY = {'gravity': [0.0, 0.0, 0.0]}
 _NO_FRICTION = {'actuator.viscous_friction': 0.0, 'actuator.coulomb_friction': 0.0}
 # The reflected mass of the actuators is part of the inertia of the legs.
 _NO_LEGS = {'legs.cylinder.mass': 0.0, 'legs.cylinder.inertia': 0.0, 'legs.piston.mass': 0.0,
-            'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0}
+            'legs.piston.inertia': 0.0, 'actuator.reflected_mass': 0.0,
+            **dict.fromkeys(DRIVE_INERTIAS)}
 
 # Samples computed at once: they fit into the processor's cache.
 _TOGETHER = 1024

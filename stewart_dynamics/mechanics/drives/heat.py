@@ -1,0 +1,109 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Heat in the windings of the motors: temperature, and the RMS torque of a motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.mechanics.batch import compact
+from stewart_dynamics.parameters.table import Parameters
+
+
+@inlined
+def warmed(rise: float, heat: float, time: float, resistance: float, time_constant: float,
+           ) -> float:
+    """Return a temperature rise [K] after a time [s] of constant copper heat [W]."""
+    steady = heat * resistance
+    return steady + (rise - steady) * math.exp(-time / time_constant)
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[::1]', 'f8[:,::1]')
+def warm(times: Array, heat: Array, resistance: Array, time_constant: Array, rises: Array,
+         ) -> None:
+    """
+    Write temperature rises (N, 6) [K] of windings: ``T' = (heat resistance - T) / time_constant``.
+
+    The heat of each time is held until the next one: for that the rises are exact. The first of
+    them is given.
+
+    Parameters
+    ----------
+    times : (N,)
+        [s]
+    heat : (N, 6)
+        Copper heat [W].
+    resistance, time_constant : (6,)
+        From winding to ambient [K/W], and of the winding [s].
+    rises : (N, 6)
+        Above ambient; the first row is read, the others are written.
+
+    """
+    for n in range(1, len(times)):
+        for leg in range(6):
+            rises[n, leg] = warmed(rises[n - 1, leg], heat[n - 1, leg], times[n] - times[n - 1],
+                                   resistance[leg], time_constant[leg])
+
+
+def temperature_rises(p: Parameters, times: Array, heat: Array, first: Array | None = None,
+                      ) -> Array:
+    """
+    Return the temperature rises (N, 6) [K] of the windings above ambient, see ``warm``.
+
+    ``first`` (6,) is the rise at the first time [K], zero by default. nan without
+    ``drive.thermal_resistance``.
+    """
+    rises = np.full(heat.shape, np.nan)
+    if p['drive.thermal_resistance'] is not None:
+        rises[:1] = 0.0 if first is None else first
+        warm(compact(times), compact(heat), p['drive.thermal_resistance'],
+             p['drive.thermal_time_constant'], rises)
+    return rises
+
+
+def rms_torques(times: Array, torques: Array, window: float = np.inf) -> Array:
+    """
+    Return the RMS torques (N, 6) [N m] over a window up to each time, linear in between.
+
+    Where fewer times precede, the window begins at the first one.
+
+    Parameters
+    ----------
+    times : (N,)
+        Strictly increasing [s].
+    torques : (N, 6)
+        [N m]
+    window : float
+        [s]
+
+    """
+    steps = np.diff(times)[:, None]
+    a, b = torques[:-1], torques[1:]
+    squares = np.concatenate([np.zeros((1, torques.shape[1])), np.cumsum(
+        steps * (a * a + a * b + b * b) / 3.0, axis=0)])
+    begin = np.maximum(times - window, times[0])
+    at = np.clip(np.searchsorted(times, begin, 'right') - 1, 0, max(len(times) - 2, 0))
+    found = np.abs(torques)
+    if len(times) > 1:
+        into = (begin - times[at])[:, None]
+        c = torques[at] + (torques[at + 1] - torques[at]) * into / steps[at]
+        before = squares[at] + into * (torques[at] ** 2 + torques[at] * c + c * c) / 3.0
+        span = (times - begin)[1:, None]
+        found[1:] = np.sqrt(np.maximum(squares - before, 0.0)[1:] / span)
+    return found

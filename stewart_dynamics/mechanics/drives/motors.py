@@ -1,0 +1,300 @@
+# Copyright 2026 The stewart_dynamics developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The motors of the legs: angle, speed, torque, current, power and copper heat; compiled.
+
+A motor turns k = 2 pi gear_ratio / lead radians for each metre of its leg, + extends. The force f
+of the leg is that of ``inverse_dynamics``, with friction and reflected mass m_r; the part through
+the screw is the load f - m_r L'', and J = m_r / k^2 is the inertia at the motor's shaft:
+
+    torque = (f - m_r L'') c / k + J angle''
+    c = 1 + (1 / efficiency - 1) sat(|L'| / coulomb_velocity)              the motor drives
+    c = 1 + (back_driving_efficiency - 1) sat(|L'| / coulomb_velocity)     the leg drives
+
+The losses are friction in proportion to the load, and like Coulomb friction they are linear near
+standstill (``friction``): the torque does not jump where a leg reverses. At rest it is the one
+without losses. There friction can help to hold or be in the way, whichever way the leg moves off:
+the larger of the two torques, the breakaway torque, is what limits are checked with.
+
+    current = torque / torque_constant        copper heat = resistance current^2
+    power = torque speed + copper heat        from the bus; where it is negative, back to the bus
+
+Where the screw turns with the leg, by the twist of ``leg_twist``, a right-handed thread extends
+the leg by lead / (2 pi) for each radian. The motor takes that back: gear_ratio times the twist is
+subtracted from its angle, added where the thread is left-handed. The moments of the screws about
+the legs' axes, force times lead / (2 pi), are not part of the leg forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stewart_dynamics.arrays import Array
+from stewart_dynamics.compilation.functions import entry_point, inlined
+from stewart_dynamics.errors import ParameterError
+from stewart_dynamics.mechanics import batch
+from stewart_dynamics.mechanics.drives.leg_twist import leg_twist, turned
+from stewart_dynamics.mechanics.dynamics.bodies import leg_line
+from stewart_dynamics.mechanics.dynamics.hexapod_constants import hexapod_constants
+from stewart_dynamics.mechanics.kinematics.home_pose import homes
+from stewart_dynamics.mechanics.kinematics.leg_joints import home_directions, mounts
+from stewart_dynamics.mechanics.limits import TOLERANCE
+from stewart_dynamics.mechanics.rows import (
+    ANGULAR_ACCELERATION, ANGULAR_VELOCITY, consecutive, FORCES, LINEAR_ACCELERATION,
+    LINEAR_VELOCITY, POSITION, ROTATION)
+from stewart_dynamics.mechanics.vectors import (
+    add, dot, read3, read9, rotate, scale, subtract)
+from stewart_dynamics.parameters.table import Parameters, RIGHT, UNIVERSAL
+
+# A row of the six motors' quantities, in the order of Motors.
+(ANGLES, SPEEDS, ACCELERATIONS, TORQUES, CURRENTS, POWER, COPPER_HEAT, BREAKAWAY_TORQUES,
+ AVAILABLE_TORQUES) = consecutive(*[6] * 9)
+MOTORS = 54
+MECHANICAL = slice(ANGLES.start, TORQUES.stop)
+
+# Constants of one drive.
+(_RATIO, _ZERO, _MASS, _DRIVING, _DRIVEN, _SLOW, _TORQUE_CONSTANT, _RESISTANCE, _TWIST,
+ _BASE_AXIS) = range(10)
+_PLATFORM_AXIS = 12
+_DRIVE = 15
+
+# Sine of the angle between a leg and the fixed axis of its universal joint.
+_ALONG_A_LEG = 0.1
+
+
+class Motors(NamedTuple):
+    """
+    The six motors in a motion, (..., 6) each; nan where ``drive.*`` does not give them.
+
+    Attributes
+    ----------
+    angles, speeds, accelerations : (..., 6)
+        [rad], [rad/s], [rad/s^2]; + extends the leg. The angle is zero where the published leg
+        position is zero.
+    torques : (..., 6)
+        [N m]; at rest the one without losses.
+    currents : (..., 6)
+        [A]
+    power : (..., 6)
+        Electrical power [W]; where it is negative, power flows back to the bus.
+    copper_heat : (..., 6)
+        Part of it that heats the winding [W].
+    breakaway_torques : (..., 6)
+        [N m]; torques that limits are checked with: at rest, where the leg can move off either
+        way, the larger one.
+    available_torques : (..., 6)
+        Largest torque at this speed, by ``drive.torque_max`` and ``drive.torque_speed`` [N m].
+
+    """
+
+    angles: Array
+    speeds: Array
+    accelerations: Array
+    torques: Array
+    currents: Array
+    power: Array
+    copper_heat: Array
+    breakaway_torques: Array
+    available_torques: Array
+
+    @classmethod
+    def of_rows(cls, rows: Array) -> Motors:
+        """Return the motors of rows (..., MOTORS)."""
+        return cls(*(rows[..., part] for part in (
+            ANGLES, SPEEDS, ACCELERATIONS, TORQUES, CURRENTS, POWER, COPPER_HEAT,
+            BREAKAWAY_TORQUES, AVAILABLE_TORQUES)))
+
+    @property
+    def margins(self) -> Array:
+        """Return available less breakaway torques (..., 6) [N m]; negative where exceeded."""
+        margins: Array = self.available_torques - np.abs(self.breakaway_torques)
+        return margins
+
+    def __repr__(self) -> str:
+        """Return the shape, not the arrays."""
+        return f'<Motors of shape {self.angles.shape[:-1]}: {", ".join(self._fields)}>'
+
+
+@inlined
+def torque_factor(load: float, rate: float, driving: float, driven: float, slow: float) -> float:
+    """Return torque / (load / k): one plus the losses, linear near standstill."""
+    slip = abs(rate) / slow
+    return 1.0 + (driving if load * rate > 0.0 else driven) * (1.0 if slip > 1.0 else slip)
+
+
+@inlined
+def curve_torque(curve: Array, speed: float) -> float:
+    """Return the torque of a torque-speed curve (n, 2) at a speed; inf without points."""
+    points = len(curve)
+    if points == 0:
+        return math.inf
+    speed = abs(speed)
+    torque: float = curve[0, 1]
+    for n in range(1, points):
+        if speed > curve[n - 1, 0]:
+            part = min((speed - curve[n - 1, 0]) / (curve[n, 0] - curve[n - 1, 0]), 1.0)
+            torque = curve[n - 1, 1] + part * (curve[n, 1] - curve[n - 1, 1])
+    return 0.0 if speed > curve[points - 1, 0] * (1.0 + TOLERANCE) else torque
+
+
+@entry_point('f8[::1]', 'f8[:,::1]', 'f8[::1]', 'f8[:,::1]', 'f8[:,::1]', 'f8[:,::1]',
+             'f8[:,::1]')
+def motor_rows(constants: Array, drives: Array, torque_max: Array, curve: Array, motions: Array,
+               results: Array, rows: Array) -> None:
+    """
+    Write the motors of each motion.
+
+    Parameters
+    ----------
+    constants : (CONSTANTS,)
+        Constants of the hexapod, see ``hexapod_constants``.
+    drives : (6, 15)
+        Constants of the drives.
+    torque_max : (6,)
+        [N m]
+    curve : (n, 2)
+        Speed and torque at the points of the torque-speed curve [rad/s, N m].
+    motions, results : (N, MOTION), (N, RESULT)
+        Motions and what ``inverse_dynamics`` gives for them.
+    rows : (N, MOTORS)
+        Written.
+
+    """
+    for n in range(len(motions)):
+        motion, row = motions[n], rows[n]
+        rotation = read9(motion, ROTATION.start)
+        omega = read3(motion, ANGULAR_VELOCITY.start)
+        alpha = read3(motion, ANGULAR_ACCELERATION.start)
+        for leg in range(6):
+            drive = drives[leg]
+            a, length, inverse_length, s = leg_line(
+                constants, leg, read3(motion, POSITION.start), rotation)
+            a_rate, a_acc = turned(a, omega, alpha)
+            x_rate = add(read3(motion, LINEAR_VELOCITY.start), a_rate)
+            x_acc = add(read3(motion, LINEAR_ACCELERATION.start), a_acc)
+            rate = dot(s, x_rate)
+            s_rate = scale(inverse_length, subtract(x_rate, scale(rate, s)))
+            acc = dot(s, x_acc) + length * dot(s_rate, s_rate)
+            ratio = drive[_RATIO]
+            angle, speed, speed_rate = ratio * (length - drive[_ZERO]), ratio * rate, ratio * acc
+            if drive[_TWIST] != 0.0:
+                s_acc = scale(inverse_length, subtract(
+                    subtract(x_acc, scale(acc, s)), scale(2.0 * rate, s_rate)))
+                w = rotate(rotation, read3(drive, _PLATFORM_AXIS))
+                w_rate, w_acc = turned(w, omega, alpha)
+                twist, twist_rate, twist_acc = leg_twist(
+                    read3(drive, _BASE_AXIS), w, w_rate, w_acc, s, s_rate, s_acc)
+                angle += drive[_TWIST] * twist
+                speed += drive[_TWIST] * twist_rate
+                speed_rate += drive[_TWIST] * twist_acc
+            load = results[n, FORCES.start + leg] - drive[_MASS] * acc
+            ideal = load / ratio
+            own = drive[_MASS] / ratio / ratio * speed_rate
+            torque = own + ideal * torque_factor(
+                load, rate, drive[_DRIVING], drive[_DRIVEN], drive[_SLOW])
+            breakaway = torque
+            if abs(rate) < drive[_SLOW]:
+                breakaway = own + ideal * (1.0 + drive[_DRIVING])
+                other = own + ideal * (1.0 + drive[_DRIVEN])
+                if abs(other) > abs(breakaway):
+                    breakaway = other
+            current = torque / drive[_TORQUE_CONSTANT]
+            heat = drive[_RESISTANCE] * current * current
+            row[ANGLES.start + leg] = angle
+            row[SPEEDS.start + leg] = speed
+            row[ACCELERATIONS.start + leg] = speed_rate
+            row[TORQUES.start + leg] = torque
+            row[CURRENTS.start + leg] = current
+            row[POWER.start + leg] = torque * speed + heat
+            row[COPPER_HEAT.start + leg] = heat
+            row[BREAKAWAY_TORQUES.start + leg] = breakaway
+            row[AVAILABLE_TORQUES.start + leg] = min(torque_max[leg], curve_torque(curve, speed))
+
+
+class Drives:
+    """The motors of a hexapod: rows of motions and of their results to rows of motors."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._constants = hexapod_constants(parameters)
+        self._drives = drive_constants(parameters)
+        self._torque_max = _six(parameters, 'drive.torque_max', math.inf)
+        curve = parameters['drive.torque_speed']
+        self._curve = np.empty((0, 2)) if curve is None else np.array(curve)
+
+    def __call__(self, motions: Array, results: Array) -> Array:
+        """Return rows (N, MOTORS) for rows of motion and results, unchecked."""
+        rows = np.empty((len(motions), MOTORS))
+        batch.in_parts(self._compute, self._constants, *map(batch.compact, (motions, results)),
+                       rows)
+        return rows
+
+    def of_one(self, motion: Array, result: Array, row: Array) -> Callable[[], object]:
+        """Return a function that writes the row (1, MOTORS) for the current (1, ...) others."""
+        return motor_rows.bound(self._constants, self._drives, self._torque_max, self._curve,
+                                motion, result, row)
+
+    def _compute(self, constants: Array, motions: Array, results: Array, rows: Array) -> None:
+        motor_rows(constants, self._drives, self._torque_max, self._curve, motions, results, rows)
+
+
+def motor_ratio(parameters: Parameters) -> Array:
+    """Return the turn of the motors for a metre of their legs (6,) [rad/m]; nan if not given."""
+    ratio: Array = (2.0 * math.pi * parameters['drive.gear_ratio']
+                    / _six(parameters, 'actuator.screw_lead', math.nan))
+    return ratio
+
+
+def drive_constants(p: Parameters) -> Array:
+    """Return the constants (6, 15) of the drives; nan where they are not given."""
+    turn: Array = np.zeros(6)
+    axes: Array = np.zeros((6, 6))
+    if p['drive.screw_rotation'] == UNIVERSAL:
+        turn = p['drive.gear_ratio'] * (-1.0 if p['drive.screw_hand'] == RIGHT else 1.0)
+        axes = _universal_axes(p)
+    return np.column_stack([
+        motor_ratio(p), p['geometry.zero_length'], p['actuator.reflected_mass'],
+        1.0 / p['drive.efficiency'] - 1.0, p['drive.back_driving_efficiency'] - 1.0,
+        p['actuator.coulomb_velocity'], _six(p, 'drive.torque_constant', math.nan),
+        _six(p, 'drive.resistance', math.nan), turn, axes])
+
+
+def _universal_axes(p: Parameters) -> Array:
+    """Return the unit vectors (6, 6) of the axes fixed to base, base axes, and to platform."""
+    rotation = homes(p)[1][0]
+    base = p['drive.base_universal_axes']
+    base = mounts(p)[:, :, 0] if base is None else base
+    platform = p['drive.platform_universal_axes']
+    platform = base @ rotation if platform is None else platform
+    base, platform = (axes / np.linalg.norm(axes, axis=1, keepdims=True)
+                      for axes in (base, platform))
+    s, w = home_directions(p).base, platform @ rotation.T
+    for end, axes in (('base', base), ('platform', w)):
+        sine = np.linalg.norm(np.cross(axes, s), axis=1)
+        if np.any(sine < _ALONG_A_LEG):
+            raise ParameterError(
+                f'drive.{end}_universal_axes: {p["joints"][int(np.argmin(sine))]}: along the leg '
+                'at the home pose: must be across it')
+    # The axis of a joint has no sense: of its two directions the one with the smaller twist.
+    cosine = np.sum(base * w, axis=1) - np.sum(base * s, axis=1) * np.sum(w * s, axis=1)
+    return np.column_stack([base, np.where(cosine < 0.0, -1.0, 1.0)[:, None] * platform])
+
+
+def _six(p: Parameters, name: str, missing: float) -> Array:
+    value: Array = np.full(6, missing) if p[name] is None else p[name]
+    return value
